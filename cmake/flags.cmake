@@ -1,0 +1,42 @@
+# Flags that every target shares. The numerical ones are part of the law of determinism: no contraction, no fast-math.
+add_library(ls_flags INTERFACE)
+target_include_directories(ls_flags INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(ls_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-math-errno -fno-fast-math)
+if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3")
+  # The loader, not a SIGILL in a static initialiser, tells the user that the CPU is too old.
+  add_link_options(-Wl,-z,x86-64-v3)
+endif()
+if(LIGHTSHAFT_SANITIZE)
+  target_compile_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE})
+endif()
+
+# ls_library(NAME DIR... [LINK libs...]): a static library of all .cpp files right under this folder.
+function(ls_library name)
+  cmake_parse_arguments(ARG "" "" "LINK;SOURCES" ${ARGN})
+  if(NOT ARG_SOURCES)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  endif()
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(${name} PUBLIC ls_flags ${ARG_LINK})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE ls_flags ${ARG_LINK})
+  endif()
+endfunction()
+
+# ls_test(NAME [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files right under this folder.
+function(ls_test name)
+  cmake_parse_arguments(ARG "" "" "LINK;LABELS;SOURCES" ${ARGN})
+  if(NOT ARG_SOURCES)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
+  endif()
+  if(ARG_SOURCES)
+    add_executable(${name} ${ARG_SOURCES})
+    target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main GTest::gmock ls_flags)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 1200)
+  endif()
+endfunction()

@@ -1,0 +1,58 @@
+// SHA-256 digests: the names of blobs, scenes, settings, units and pixels.
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/base/error.h"
+
+namespace ls {
+
+struct Digest {
+  std::array<std::uint8_t, 32> bytes{};
+
+  std::string hex() const;  // 64 lower-case hexadecimal digits
+  static std::optional<Digest> parse(std::string_view hex);  // exactly 64 digits, else nothing
+  auto operator<=>(const Digest&) const = default;
+};
+
+// Incremental SHA-256. finish() may be called once.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(Sha256&&) noexcept;
+  Sha256& operator=(Sha256&&) noexcept;
+
+  void update(std::span<const std::byte> data);
+  void update(std::string_view text);
+  Digest finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+Digest sha256(std::string_view text);
+Digest sha256(std::span<const std::byte> data);
+Result<Digest> sha256_file(const std::filesystem::path& path);
+
+}  // namespace ls
+
+template <>
+struct std::hash<ls::Digest> {
+  std::size_t operator()(const ls::Digest& d) const noexcept {
+    std::size_t h = 0;
+    std::memcpy(&h, d.bytes.data(), sizeof h);
+    return h;
+  }
+};

@@ -1,0 +1,40 @@
+// Errors as values. Every fallible function returns Result<T>; exceptions do not cross a folder boundary.
+// The message is for the person who must act: what happened, where, what to do.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace ls {
+
+// The gRPC codes that we use; one table each maps them to gRPC and to HTTP.
+enum class Errc {
+  invalid_argument,     // the input is wrong; sending it again will not help
+  not_found,            // no such job, blob, worker, file
+  already_exists,
+  failed_precondition,  // right input, wrong state (cancelled job, other numeric class)
+  resource_exhausted,   // a limit or a full disk
+  permission_denied,
+  unauthenticated,
+  unavailable,  // try again later
+  internal,     // a bug of ours
+};
+
+struct Error {
+  Errc code = Errc::internal;
+  std::string message;
+  bool operator==(const Error&) const = default;
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+inline tl::unexpected<Error> fail(Errc code, std::string message) {
+  return tl::unexpected<Error>(Error{code, std::move(message)});
+}
+
+std::string_view to_string(Errc code);  // "invalid_argument" ...
+
+}  // namespace ls

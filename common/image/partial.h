@@ -1,0 +1,58 @@
+// A unit's result: per-pixel float32 sums of both halves over one sample range of one tile, and its exact identity.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+
+namespace ls {
+
+inline constexpr int kPartialChannels = 6;  // A.R A.G A.B B.R B.G B.B, in this order
+
+// What the pixels of a unit are a function of.
+struct UnitHeader {
+  Digest scene;          // of the canonical scene
+  Digest settings;       // of the canonical RenderSettings (common/job/settings.h)
+  Digest numeric_class;  // of the machine that rendered it
+  PixelRect tile;
+  SampleRange samples;
+  bool operator==(const UnitHeader&) const = default;
+};
+
+// {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys sorted, no spaces.
+std::string canonical_json(const UnitHeader& header);
+Result<UnitHeader> parse_unit_header(std::string_view json);
+
+struct Partial {
+  UnitHeader header;
+  // Planar: six planes of tile.pixels() floats each, row by row. Sums, never averages; how many samples each half has
+  // follows from the range. Every value is finite (a non-finite sample is counted and contributes zero).
+  std::vector<float> sums;
+  bool operator==(const Partial&) const = default;
+};
+
+// SHA-256 over the header's canonical JSON followed by the six planes (little endian); not over file bytes.
+Digest unit_digest(const Partial& partial);
+
+// The EXR of the contract: scanline, uncompressed, FLOAT, dataWindow the tile, displayWindow the frame.
+Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
+
+// Refuses, with what is wrong, anything but exactly such a file: other windows, channels, compression, part counts,
+// sizes, non-finite sums, trailing data. `expected` is compared with the header inside.
+Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame);
+
+// For `lightshaft merge`: the header comes from the file.
+struct PartialFile {
+  Partial partial;
+  FrameSize frame;
+};
+Result<PartialFile> decode_partial_file(std::span<const std::byte> exr);
+
+}  // namespace ls

@@ -1,0 +1,170 @@
+// What coordinator and worker say to each other, as plain values. proto/farm.proto is the same on the wire and documents
+// the exchange; `lightshaft render` passes these values inside one process. Conversions: proto/convert.h.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/id.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+#include "common/job/settings.h"
+
+namespace ls {
+
+inline constexpr int kProtocolVersion = 1;
+
+// The pure task: (job, tile, round). The same unit gives the same bits anywhere in its numeric class.
+struct UnitKey {
+  JobId job;
+  TileIndex tile = 0;
+  RoundIndex round = 0;
+  auto operator<=>(const UnitKey&) const = default;
+};
+
+struct BlobRef {
+  Digest digest;
+  std::uint64_t bytes = 0;
+  std::string name;  // as the scene calls it; for messages only, never a path
+  bool operator==(const BlobRef&) const = default;
+};
+
+// All a worker needs to know of a job. Sent before the job's first lease on a stream.
+struct JobBrief {
+  JobId job;
+  Digest scene;  // blob: the canonical scene (common/scene/serialize.h)
+  RenderSettings settings;
+  Digest settings_digest;
+  std::vector<BlobRef> assets;  // only those that this scene uses
+  bool operator==(const JobBrief&) const = default;
+};
+
+struct LeaseUnit {
+  TileIndex tile = 0;
+  RoundIndex round = 0;
+  PixelRect rect;
+  SampleRange samples;
+  bool operator==(const LeaseUnit&) const = default;
+};
+
+// Units lent to a worker. They are rendered and reported one by one, in order.
+struct Lease {
+  LeaseId id;
+  JobId job;
+  std::vector<LeaseUnit> units;
+  bool operator==(const Lease&) const = default;
+};
+
+// Counts of what went wrong numerically in a unit; all zero on a healthy one.
+struct UnitHealth {
+  std::uint64_t nonfinite = 0;            // samples that were NaN or infinite: counted, contributing zero
+  std::uint64_t negative = 0;             // samples with a negative channel: kept, counted
+  std::uint64_t majorant_violations = 0;  // densities above their bound
+  bool operator==(const UnitHealth&) const = default;
+};
+
+struct UnitResult {
+  UnitKey unit;
+  LeaseId lease;
+  std::vector<std::byte> exr;  // encoded Partial
+  Digest digest;               // unit_digest of it
+  double cpu_seconds = 0;      // of the thread that rendered it
+  UnitHealth health;
+  bool operator==(const UnitResult&) const = default;
+};
+
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say); trying again
+// elsewhere cannot help and the job fails at once. Otherwise it is the task's fault (crash, hang, memory).
+struct UnitFailure {
+  UnitKey unit;
+  LeaseId lease;
+  bool scene_at_fault = false;
+  std::string reason;              // for a person
+  std::optional<int> signal;       // that ended the render child
+  std::optional<std::pair<int, int>> pixel;  // the breadcrumb: where it was
+  std::optional<std::uint64_t> sample;
+  bool operator==(const UnitFailure&) const = default;
+};
+
+// ---- worker -> coordinator ------------------------------------------------------------------------------------------
+struct WorkerHello {
+  int protocol = kProtocolVersion;
+  std::string name;
+  std::string build;
+  Digest numeric_class;
+  int threads = 1;
+  std::uint64_t memory_bytes = 0;
+  std::vector<std::string> tags;
+  std::vector<Digest> blobs_held;
+  std::string join_token;
+  // Given by the coordinator at an earlier Welcome; empty for a new worker. The same worker keeps its id over reconnects.
+  WorkerId previous_id;
+  bool operator==(const WorkerHello&) const = default;
+};
+// Renews the named leases' deadlines. Sent about once a second while there is work.
+struct WorkerProgress {
+  struct Entry {
+    LeaseId lease;
+    std::uint32_t units_done = 0;
+    bool operator==(const Entry&) const = default;
+  };
+  std::vector<Entry> leases;
+  std::string activity;  // "loading bath.vdb", "rendering", "idle": for the dashboard
+  double cpu_seconds_total = 0;
+  std::uint64_t rss_bytes = 0;
+  double load_seconds = 0;  // last world build
+  bool operator==(const WorkerProgress&) const = default;
+};
+// No more leases, please; what is finished is handed in, the rest comes back with LeaseReturned.
+struct WorkerDraining {
+  bool operator==(const WorkerDraining&) const = default;
+};
+// Units of this lease that were not and will not be rendered here (drain, cancel).
+struct LeaseReturned {
+  LeaseId lease;
+  std::vector<UnitKey> unrendered;
+  bool operator==(const LeaseReturned&) const = default;
+};
+using FromWorker = std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
+
+// ---- coordinator -> worker ------------------------------------------------------------------------------------------
+struct Welcome {
+  WorkerId worker;
+  std::uint64_t epoch = 0;  // grows with every registration of this worker; an older stream is closed
+  bool operator==(const Welcome&) const = default;
+};
+struct Refused {  // the stream ends after it
+  Error error;
+  bool retry = false;
+  bool operator==(const Refused&) const = default;
+};
+struct AssignLease {
+  Lease lease;
+  std::optional<JobBrief> brief;  // with a job's first lease on this stream
+  bool operator==(const AssignLease&) const = default;
+};
+struct ResultAck {  // the result is durable (or refused with a reason): drop it from the outbox
+  UnitKey unit;
+  std::optional<Error> refused;
+  bool operator==(const ResultAck&) const = default;
+};
+struct CancelJob {  // stop its units now; results are no longer wanted
+  JobId job;
+  bool operator==(const CancelJob&) const = default;
+};
+struct CancelLease {
+  LeaseId lease;
+  bool operator==(const CancelLease&) const = default;
+};
+struct DrainNow {
+  bool operator==(const DrainNow&) const = default;
+};
+using ToWorker = std::variant<Welcome, Refused, AssignLease, ResultAck, CancelJob, CancelLease, DrainNow>;
+
+}  // namespace ls

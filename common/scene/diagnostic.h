@@ -1,0 +1,29 @@
+// What is wrong with a scene, and where.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace ls {
+
+struct SourcePlace {
+  std::string file;
+  int line = 0, column = 0;  // from 1; 0: the file as a whole
+  bool operator==(const SourcePlace&) const = default;
+};
+
+struct Diagnostic {
+  enum class Severity { warning, error };
+  Severity severity = Severity::error;
+  SourcePlace place;
+  std::string text;
+  std::string source_line;  // the line itself, for the caret; empty if there is none
+  int length = 1;           // of the underlined part
+  bool operator==(const Diagnostic&) const = default;
+};
+
+// "file:line:column: error: text", the line and a caret under the place.
+std::string format_diagnostic(const Diagnostic& d);
+std::string format_diagnostics(const std::vector<Diagnostic>& all);
+
+}  // namespace ls

@@ -1,0 +1,289 @@
+// The scene as plain data: what a scene file becomes, whatever its dialect. No pointers, no library types; cross references
+// are typed indices; every file is named by digest. Semantics are Mitsuba 3's. Lengths are scene units, angles degrees
+// (as in the files), colours linear RGB. Two equal Scenes have the same canonical serialisation and so the same digest.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/image/frame.h"
+
+namespace ls {
+
+using Rgb = std::array<double, 3>;
+using Vec3 = std::array<double, 3>;
+
+// Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
+struct Transform {
+  std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  bool operator==(const Transform&) const = default;
+};
+// Row-major 3 x 3 acting on (u, v, 1).
+struct UvTransform {
+  std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  bool operator==(const UvTransform&) const = default;
+};
+
+template <class Tag>
+struct Index {
+  std::uint32_t value = 0;
+  auto operator<=>(const Index&) const = default;
+};
+using AssetIndex = Index<struct AssetTag>;
+using TextureIndex = Index<struct TextureTag>;
+using BsdfIndex = Index<struct BsdfTag>;
+using VolumeIndex = Index<struct VolumeTag>;
+using PhaseIndex = Index<struct PhaseTag>;
+using MediumIndex = Index<struct MediumTag>;
+
+// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by digest.
+struct Asset {
+  std::string name;
+  Digest digest;
+  std::uint64_t bytes = 0;
+  bool operator==(const Asset&) const = default;
+};
+
+// ---- textures -------------------------------------------------------------------------------------------------------
+enum class TextureFilter { nearest, bilinear };
+enum class Wrap { repeat, mirror, clamp };
+
+struct ConstantTexture {
+  Rgb value{.5, .5, .5};
+  bool operator==(const ConstantTexture&) const = default;
+};
+// v = 0 is the bottom row for Mitsuba: the reader leaves v as it is, the renderer flips when it looks up.
+struct BitmapTexture {
+  AssetIndex file;
+  TextureFilter filter = TextureFilter::bilinear;
+  Wrap wrap = Wrap::repeat;
+  bool raw = false;  // true: no sRGB decoding of 8-bit files
+  UvTransform to_uv;
+  bool operator==(const BitmapTexture&) const = default;
+};
+// color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's `checkerboard`).
+struct CheckerboardTexture {
+  TextureIndex color0, color1;
+  UvTransform to_uv;
+  bool operator==(const CheckerboardTexture&) const = default;
+};
+using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture>;
+
+// ---- surfaces -------------------------------------------------------------------------------------------------------
+enum class Microfacet { beckmann, ggx };
+
+struct DiffuseBsdf {
+  TextureIndex reflectance;
+  bool operator==(const DiffuseBsdf&) const = default;
+};
+struct ConductorBsdf {
+  Rgb eta{0, 0, 0}, k{1, 1, 1};  // eta = 0, k = 1 reflects everything (Mitsuba's `none`)
+  TextureIndex specular_reflectance;
+  bool operator==(const ConductorBsdf&) const = default;
+};
+struct RoughConductorBsdf {
+  Microfacet distribution = Microfacet::beckmann;
+  TextureIndex alpha_u, alpha_v;
+  Rgb eta{0, 0, 0}, k{1, 1, 1};
+  TextureIndex specular_reflectance;
+  bool operator==(const RoughConductorBsdf&) const = default;
+};
+struct DielectricBsdf {
+  double int_ior = 1.5046, ext_ior = 1.000277;
+  TextureIndex specular_reflectance, specular_transmittance;
+  bool operator==(const DielectricBsdf&) const = default;
+};
+struct RoughPlasticBsdf {
+  Microfacet distribution = Microfacet::beckmann;
+  double alpha = .1;
+  double int_ior = 1.49, ext_ior = 1.000277;
+  bool nonlinear = false;
+  TextureIndex diffuse_reflectance, specular_reflectance;
+  bool operator==(const RoughPlasticBsdf&) const = default;
+};
+struct NullBsdf {  // index-matched boundary: light passes unchanged
+  bool operator==(const NullBsdf&) const = default;
+};
+struct TwoSidedBsdf {
+  BsdfIndex front, back;
+  bool operator==(const TwoSidedBsdf&) const = default;
+};
+using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughPlasticBsdf, NullBsdf,
+                          TwoSidedBsdf>;
+
+// ---- volumes and media ----------------------------------------------------------------------------------------------
+struct ConstVolume {
+  Rgb value{1, 1, 1};
+  bool operator==(const ConstVolume&) const = default;
+};
+enum class VolumeFilter { nearest, trilinear };
+// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With use_grid_bbox the file's
+// own bounding box is placed first. VDB grids are placed by their own transform (see docs/scene-format.md).
+struct GridVolume {
+  AssetIndex file;
+  std::string grid_name;  // for files with named grids; empty: the only one, or "density"
+  VolumeFilter filter = VolumeFilter::trilinear;
+  Wrap wrap = Wrap::clamp;
+  bool use_grid_bbox = false;
+  bool raw = true;
+  Transform to_world;
+  bool operator==(const GridVolume&) const = default;
+};
+using Volume = std::variant<ConstVolume, GridVolume>;
+
+struct IsotropicPhase {
+  bool operator==(const IsotropicPhase&) const = default;
+};
+struct HgPhase {
+  double g = .8;  // mean cosine, in (-1, 1)
+  bool operator==(const HgPhase&) const = default;
+};
+using Phase = std::variant<IsotropicPhase, HgPhase>;
+
+// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale.
+struct HomogeneousMedium {
+  Rgb sigma_t{1, 1, 1};
+  Rgb albedo{.75, .75, .75};
+  double scale = 1;
+  PhaseIndex phase;
+  bool operator==(const HomogeneousMedium&) const = default;
+};
+struct HeterogeneousMedium {
+  VolumeIndex sigma_t;
+  VolumeIndex albedo;
+  double scale = 1;
+  PhaseIndex phase;
+  bool operator==(const HeterogeneousMedium&) const = default;
+};
+using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
+
+// ---- shapes ---------------------------------------------------------------------------------------------------------
+struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
+  bool operator==(const RectangleShape&) const = default;
+};
+struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
+  bool operator==(const CubeShape&) const = default;
+};
+struct SphereShape {  // center and radius before to_world
+  Vec3 center{0, 0, 0};
+  double radius = 1;
+  bool operator==(const SphereShape&) const = default;
+};
+struct DiskShape {  // unit disk in z = 0, normal +z
+  bool operator==(const DiskShape&) const = default;
+};
+enum class MeshFormat { obj, ply };
+struct MeshShape {
+  AssetIndex file;
+  MeshFormat format = MeshFormat::obj;
+  bool face_normals = false;
+  bool flip_tex_coords = false;
+  bool operator==(const MeshShape&) const = default;
+};
+using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape>;
+
+struct AreaEmitter {  // radiance leaves on the side of the normal only
+  TextureIndex radiance;
+  bool operator==(const AreaEmitter&) const = default;
+};
+
+struct Shape {
+  Geometry geometry;
+  Transform to_world;
+  bool flip_normals = false;
+  BsdfIndex bsdf;
+  std::optional<AreaEmitter> emitter;
+  std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
+  bool is_medium_transition = false;              // interior or exterior was given
+  bool operator==(const Shape&) const = default;
+};
+
+// ---- emitters without a shape ---------------------------------------------------------------------------------------
+struct ConstantEmitter {  // radiance from everywhere
+  Rgb radiance{1, 1, 1};
+  bool operator==(const ConstantEmitter&) const = default;
+};
+struct DirectionalEmitter {  // `direction`: the way light travels, in the world; irradiance on a plane facing it
+  Vec3 direction{0, 0, 1};
+  Rgb irradiance{1, 1, 1};
+  bool operator==(const DirectionalEmitter&) const = default;
+};
+struct PointEmitter {
+  Vec3 position{0, 0, 0};
+  Rgb intensity{1, 1, 1};  // W/sr
+  bool operator==(const PointEmitter&) const = default;
+};
+struct SpotEmitter {  // at the origin of to_world, shining along its +z
+  Transform to_world;
+  Rgb intensity{1, 1, 1};
+  double cutoff_angle = 20;             // degrees from the axis: dark beyond
+  double beam_width = 15;               // full intensity within; in between linear in the angle
+  std::optional<TextureIndex> texture;  // projected, as Mitsuba's
+  bool operator==(const SpotEmitter&) const = default;
+};
+using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter>;
+
+// ---- camera, film, integrator ---------------------------------------------------------------------------------------
+enum class FovAxis { x, y, diagonal, smaller, larger };
+struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
+  Transform to_world;
+  double fov = 50;  // degrees, along fov_axis
+  FovAxis fov_axis = FovAxis::x;
+  double near_clip = 1e-2, far_clip = 1e4;
+  std::array<double, 2> principal_point_offset{0, 0};
+  double aperture_radius = 0;  // 0: pinhole
+  double focus_distance = 1;
+  std::optional<MediumIndex> medium;  // that the camera sits in
+  bool operator==(const Sensor&) const = default;
+};
+
+struct BoxFilter {
+  double radius = .5;
+  bool operator==(const BoxFilter&) const = default;
+};
+struct TentFilter {
+  double radius = 1;
+  bool operator==(const TentFilter&) const = default;
+};
+struct GaussianFilter {  // cut at 4 stddev, shifted to reach 0 there (Mitsuba)
+  double stddev = .5;
+  bool operator==(const GaussianFilter&) const = default;
+};
+using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>;
+
+struct FilmSettings {
+  FrameSize size{768, 576};
+  ReconstructionFilter filter = GaussianFilter{};
+  bool operator==(const FilmSettings&) const = default;
+};
+
+struct IntegratorSettings {
+  std::string name = "volpath";  // ours: "volpath" or "path"
+  int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light
+  int rr_depth = 5;
+  bool hide_emitters = false;
+  bool operator==(const IntegratorSettings&) const = default;
+};
+
+struct Scene {
+  std::vector<Asset> assets;
+  std::vector<Texture> textures;
+  std::vector<Bsdf> bsdfs;
+  std::vector<Volume> volumes;
+  std::vector<Phase> phases;
+  std::vector<Medium> media;
+  std::vector<Shape> shapes;
+  std::vector<Emitter> emitters;
+  Sensor sensor;
+  FilmSettings film;
+  IntegratorSettings integrator;
+  std::uint64_t sample_count = 4;
+  bool operator==(const Scene&) const = default;
+};
+
+}  // namespace ls

@@ -1,0 +1,181 @@
+// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/ put it on the
+// network; `lightshaft render` uses it in process.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/error.h"
+#include "common/base/id.h"
+#include "common/protocol/messages.h"
+#include "common/scene/diagnostic.h"
+#include "common/scene/read.h"
+
+namespace ls::coordinator {
+
+enum class JobState { queued, running, paused, done, failed, cancelled };
+std::string_view to_string(JobState state);
+
+struct ErrorFigures {  // of the image as folded up to one complete round over all tiles
+  double rmse = 0;
+  double relmse = 0;
+  double relmse_lo = 0, relmse_hi = 0;  // 95 % interval for the realised error
+};
+struct ConvergencePoint {
+  double seconds = 0;       // since the first ray
+  double core_seconds = 0;  // CPU time of workers
+  double spp = 0;
+  ErrorFigures error;
+};
+
+struct JobView {
+  JobId id;
+  std::string name;  // scene file name, for people
+  JobState state = JobState::queued;
+  std::string stopped;  // "spp", "error", "time", "user" once done
+  double progress = 0;  // 0..1
+  std::uint64_t spp = 0;  // asked
+  double spp_done = 0;    // mean over pixels
+  std::optional<ErrorFigures> error_now;
+  std::optional<double> eta_seconds;
+  std::string error;                        // why it failed
+  std::vector<std::string> warnings;        // of the scene
+  FrameSize size;
+  int tile = 32;
+  int priority = 0;
+  std::uint64_t units_done = 0, units_total = 0;
+  double elapsed_seconds = 0, core_seconds = 0;
+  double submitted_unix = 0;  // wall clock, for people
+  UnitHealth health;
+};
+
+struct TileView {
+  TileIndex tile = 0;
+  PixelRect rect;
+  RoundIndex rounds_folded = 0;
+  std::uint64_t spp = 0;
+  std::vector<std::string> workers;  // names of those rendering it now
+};
+
+struct WorkerView {
+  WorkerId id;
+  std::string name;
+  std::string build;
+  Digest numeric_class;
+  int threads = 1;
+  std::vector<std::string> tags;
+  std::string state;     // "connected", "draining", "lost", "sick"
+  std::string activity;  // what it said last
+  std::string job;       // that it works on; may be empty
+  std::uint64_t units_done = 0;
+  double cpu_seconds = 0;
+  std::uint64_t rss_bytes = 0;
+  double last_seen_seconds = 0;  // ago
+};
+
+// A thing that happened, as the event stream tells it. `data` is JSON. Ids grow by one and survive restarts.
+struct StreamEvent {
+  std::uint64_t id = 0;
+  std::string type;  // "job", "tile", "worker"
+  std::string data;
+};
+
+struct SubmitRequest {
+  std::string scene_name;                   // of the main file, for diagnostics
+  std::string scene_text;                   // Mitsuba XML
+  std::map<std::string, Digest> assets;     // the files it may name; their blobs must be in the store
+  JobSpec spec;
+};
+struct Rejected {
+  Error error;
+  std::vector<Diagnostic> diagnostics;
+};
+
+// Where messages to one worker go. Called from any thread; must not block and must not call back.
+class WorkerSink {
+ public:
+  virtual ~WorkerSink() = default;
+  virtual void send(ToWorker message) = 0;
+  virtual void close() = 0;
+};
+
+// One registered stream. After disconnected() nothing more is sent to its sink.
+class WorkerSession {
+ public:
+  virtual ~WorkerSession() = default;
+  virtual void receive(FromWorker message) = 0;
+  virtual void disconnected() = 0;
+};
+
+// Bytes by digest. put() verifies; a blob is visible only when complete.
+class BlobStore {
+ public:
+  virtual ~BlobStore() = default;
+  virtual bool has(const Digest& digest) const = 0;
+  virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
+  virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const = 0;
+  virtual Result<void> put(const Digest& digest, std::span<const std::byte> bytes) = 0;
+  // Streaming upload: append in order, finish() verifies the digest; abandoned ones leave nothing behind.
+  class Upload {
+   public:
+    virtual ~Upload() = default;
+    virtual Result<void> append(std::span<const std::byte> bytes) = 0;
+    virtual Result<void> finish() = 0;
+  };
+  virtual Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) = 0;
+};
+
+class Coordinator {
+ public:
+  struct Options {
+    std::filesystem::path data;  // empty: everything in memory, nothing survives (`lightshaft render`)
+    std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made under `data`
+    std::string join_token;      // empty: any worker may join
+    std::shared_ptr<const Clock> clock;
+    std::optional<Duration> tick;  // how often Tick events are raised by an own thread; nothing: the caller calls tick()
+  };
+  static Result<std::unique_ptr<Coordinator>> open(Options options);
+  virtual ~Coordinator() = default;
+
+  // ---- jobs ----
+  virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
+  virtual std::vector<JobView> jobs() const = 0;
+  virtual Result<JobView> job(const JobId& id) const = 0;
+  virtual Result<void> cancel(const JobId& id) = 0;
+  virtual Result<void> pause(const JobId& id) = 0;
+  virtual Result<void> resume(const JobId& id) = 0;
+  virtual Result<void> set_priority(const JobId& id, int priority) = 0;
+  virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;  // to this new total
+  virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;  // as it is now, or final
+  virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const = 0;
+  virtual Result<std::string> report_json(const JobId& id) const = 0;
+  virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
+  virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
+  virtual Result<std::string> job_log(const JobId& id) const = 0;
+  virtual Result<void> wait(const JobId& id) const = 0;  // until it is done, failed or cancelled
+
+  // ---- workers ----
+  virtual std::vector<WorkerView> workers() const = 0;
+  virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) = 0;
+
+  // ---- events ----
+  // Calls back (any thread, in order) for every event after `after_id` that is still kept, then live. The subscription
+  // ends when the returned handle is destroyed. A reader that can't keep up must drop by itself.
+  virtual std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) = 0;
+  virtual std::uint64_t last_event_id() const = 0;
+
+  virtual BlobStore& blobs() = 0;
+  virtual bool ready(std::string* why_not) const = 0;
+  virtual void tick() = 0;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,69 @@
+// The renderer's public face. It knows scenes, files and pixels; nothing of jobs or networks.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+#include "common/job/settings.h"
+#include "common/scene/scene.h"
+
+namespace ls::render {
+
+class World;
+
+// Where the bytes of the scene's assets lie on this machine.
+using AssetFiles = std::map<Digest, std::filesystem::path>;
+
+// Builds BVH, grids and light tables. invalid_argument: the scene or one of its files is at fault, and the message says
+// which and why; resource_exhausted: a limit. Deterministic for any `threads`.
+Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings, const AssetFiles& files,
+                                                 int threads);
+
+struct Health {
+  std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
+};
+// Where the renderer is, for whoever must explain its death. Written with relaxed stores.
+struct Breadcrumb {
+  std::atomic<std::int32_t> x{-1}, y{-1};
+  std::atomic<std::uint64_t> sample{0};
+};
+
+struct TileResult {
+  std::vector<float> sums;  // six planes, see common/image/partial.h
+  Health health;
+  bool stopped = false;  // `stop` was seen: sums are not valid
+};
+
+// Renders the sample range of a tile, on the calling thread. A pure function of (world, tile, samples).
+TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
+                       Breadcrumb* breadcrumb);
+
+// One sample of one pixel: its radiance, for replay.
+struct SampleValue {
+  double rgb[3];
+  bool finite;
+};
+SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
+
+// What the scene makes us use and leave out, in words; and the bytes of each structure.
+struct WorldReport {
+  std::vector<std::string> used, left_out;
+  std::vector<std::pair<std::string, std::uint64_t>> bytes;
+  std::string variant;  // the integrator instantiation
+  std::uint64_t clamped_inputs = 0;  // negative densities set to 0, degenerate triangles dropped, ...
+};
+WorldReport describe(const World& world);
+
+// SHA-256 of the build and a start-up battery: machines of one class give the same bits. Computed once.
+const Digest& numeric_class();
+
+}  // namespace ls::render
