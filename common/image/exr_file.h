@@ -1,0 +1,56 @@
+// The one door to OpenEXR: reading a picture of someone else's, writing our own. Partials have theirs beside
+// it (exr_partial.h). Nothing of the library shows here, and no exception of it leaves.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/image/frame.h"
+
+namespace ls {
+
+struct RgbImage {
+  FrameSize size;          // of the data window
+  std::vector<float> rgb;  // interleaved, row by row from the top; values as stored (may be NaN or infinite)
+};
+
+struct ExrLimits {
+  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // of the file
+  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // of the data window
+  int max_side = 65536;
+};
+
+// Flat scanline or tiled EXR, half/float, any compression; single part, or the first part that has colour.
+// Channels R G B, or Y alone (grey); alpha is left out. Chroma-subsampled (luminance/chroma) and deep files
+// are refused. `name` is for the messages. Sizes are checked before anything is allocated.
+Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
+                              const ExrLimits& limits = {});
+Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
+
+// A picture of several planes of one size.
+struct ExrHalf {
+  std::vector<float> values;
+};  // converted; the caller has clamped to +-65504
+struct ExrFloat {
+  std::vector<float> values;
+};
+struct ExrUint {
+  std::vector<std::uint32_t> values;
+};
+struct ExrPicture {
+  FrameSize size;
+  std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;  // "R", "stderr.R", "spp", ...
+  std::map<std::string, std::string> strings;                                // header attributes
+};
+// Scanline, ZIP compressed. The bytes are a function of the picture only.
+Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
+
+}  // namespace ls

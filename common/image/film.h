@@ -1,0 +1,109 @@
+// The film: per-pixel double sums of both halves (A: even sample indices, B: odd ones) of every tile, folded
+// round by round in order. Its pixels are a function of the partials alone, not of when or in what order they
+// came.
+//
+// A round that is shorter than its full range (the last one of a job) is a tile's *tail*: it is kept beside
+// the sums, counts in everything that is read, and is replaced when a longer range of the same round comes.
+// So an N-sample film that is continued to 2N has the bits of a 2N film rendered at once.
+//
+// Not thread-safe: the caller locks. Copies are cheap (tiles are immutable and shared; a fold makes a new
+// one): copy under the lock, read or write files outside it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/error_estimate.h"
+#include "common/image/frame.h"
+#include "common/image/partial.h"
+#include "common/image/rounds.h"
+
+namespace ls {
+
+// One tile's pixels as they stand; interleaved R, G, B, row by row.
+struct TilePixels {
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  std::vector<double> mean;            // (sumA + sumB) / (nA + nB); zero if spp is 0
+  std::vector<double> standard_error;  // |A - B| / 2 of the half means
+};
+
+class Film {
+ public:
+  explicit Film(TileGrid grid);
+
+  const TileGrid& grid() const { return grid_; }
+
+  // Folds round `round` of tile `tile`. Rounds come in order 0, 1, 2, ... per tile; a cut round only as the
+  // last.
+  //   invalid_argument: the partial is not of this tile or round;
+  //   failed_precondition: an earlier round is missing (the message says which is next);
+  //   already_exists: this round, or more of it, is folded already. The film is unchanged by any error.
+  // `digest` is unit_digest(partial), where the caller has it already.
+  Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
+  Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
+
+  // Forgets a tile (a worker lied): it starts again from round 0.
+  void discard(TileIndex tile) { tiles_[tile] = nullptr; }
+
+  // ---- one tile ----
+  RoundIndex full_rounds(TileIndex tile) const;  // complete rounds; also the index of the next round to fold
+  RoundIndex rounds_folded(TileIndex tile) const;  // the same, and one more if there is a tail
+  std::optional<SampleRange> tail(TileIndex tile) const;
+  std::uint64_t spp(TileIndex tile) const;
+  TileError error(
+      TileIndex tile) const;  // as of the last fold; zeros (and its pixel count) if there was none
+  // SHA-256 chain over the unit digests in round order: c = SHA-256(c || unit digest), beginning with 32 zero
+  // bytes.
+  Digest tile_digest(TileIndex tile) const;
+  TilePixels pixels(TileIndex tile) const;
+
+  // ---- the image ----
+  std::uint64_t samples() const;       // over all pixels
+  std::uint64_t memory_bytes() const;  // of the sums
+  TileError error() const;             // over all tiles, in tile order
+
+  // ---- restart ----
+  // Versioned, closed by a SHA-256; whole or one tile at a time. load refuses damaged or foreign bytes.
+  std::vector<std::byte> save() const;
+  static Result<Film> load(std::span<const std::byte> bytes);
+  std::vector<std::byte> save_tile(TileIndex tile) const;
+  Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
+
+  bool operator==(const Film& other) const;  // same grid, same bits in every tile
+
+ private:
+  struct Tail {
+    SampleRange samples;
+    Digest digest;
+    std::vector<float> sums;
+    bool operator==(const Tail&) const = default;
+  };
+  struct Tile {
+    RoundIndex full_rounds = 0;
+    Digest chain;              // over the full rounds
+    std::vector<double> sums;  // six planes as in Partial, of the full rounds
+    std::optional<Tail> tail;
+    TileError error;  // with the tail
+    std::uint64_t spp() const;
+    bool operator==(const Tile&) const = default;
+  };
+  static std::array<std::vector<double>, 2> halves(
+      const Tile& tile);  // sums with the tail; R, G, B planes of A and of B
+  static TileError estimate(const Tile& tile, const PixelRect& rect);
+  Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
+  std::vector<std::byte> tile_bytes(TileIndex tile) const;
+  Result<std::shared_ptr<const Tile>> parse_tile(TileIndex tile, std::span<const std::byte> bytes) const;
+
+  TileGrid grid_;
+  std::vector<std::shared_ptr<const Tile>> tiles_;  // null: nothing folded yet
+};
+
+}  // namespace ls

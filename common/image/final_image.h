@@ -1,0 +1,38 @@
+// What is handed out of a film: the final EXR, its pixel digest, and a preview PNG.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/film.h"
+
+namespace ls {
+
+// SHA-256 over float32((sumA+sumB)/(nA+nB)), divided in double, -0 made +0; R, G, B interleaved per pixel,
+// row by row, little endian. Pixels not rendered yet are zero.
+Digest pixels_sha256(const Film& film);
+
+// The header strings `lightshaft:...` of the final EXR; `:relmse` and `:tiles` come from the film.
+struct Provenance {
+  Digest scene;
+  std::string settings_json;  // canonical RenderSettings
+  std::string build;
+  Digest numeric_class;
+  std::uint64_t seed = 0;
+  double seconds = 0;  // render time
+};
+struct FinalImage {
+  std::vector<std::byte> exr;
+  std::uint64_t clamped = 0;  // values whose magnitude was above 65504, the largest half
+};
+// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp. Works on an unfinished film, too.
+Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+
+// 8-bit sRGB of the mean times 2^exposure. NaN is magenta; tiles without a sample show a quiet dark checker.
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);
+
+}  // namespace ls
