@@ -19,11 +19,9 @@
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
 #include "common/scene/read.h"
+#include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
-
-enum class JobState { queued, running, paused, done, failed, cancelled };
-std::string_view to_string(JobState state);
 
 struct ErrorFigures {  // of the image as folded up to one complete round over all tiles
   double rmse = 0;
@@ -87,6 +85,7 @@ struct StreamEvent {
   std::uint64_t id = 0;
   std::string type;  // "job", "tile", "worker"
   std::string data;
+  std::string job;   // id of the job that a `job` or `tile` event is about; empty: of no one job, told to every reader
 };
 
 struct SubmitRequest {

@@ -1,0 +1,117 @@
+// What the farm wants done. Effects are carried out in the order given.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/id.h"
+#include "common/protocol/messages.h"
+#include "coordinator/domain/job_state.h"
+
+namespace ls::coordinator {
+
+// AssignLease (its tiles are now leased to this worker), CancelLease or CancelJob.
+struct Send {
+  WorkerId worker;
+  ToWorker message;
+};
+
+// These units are no longer lent under this lease and wait for another worker (unless another lease holds them too).
+struct UnitsFreed {
+  JobId job;
+  LeaseId lease;
+  WorkerId worker;
+  std::vector<UnitKey> units;
+  std::string why;  // "worker lost", "deadline passed", "returned", "failed", "cancelled"
+};
+
+// This result is the unit's accepted one: record it (unit, worker, digest).
+struct RecordUnit {
+  UnitKey unit;
+  SampleRange samples;
+  Digest digest;
+  WorkerId worker;
+};
+
+// Fold this unit's accepted partial into the film, then raise UnitFolded. Rounds of a tile come in order, each once; no
+// round beyond a target's stop is ever asked for.
+struct Fold {
+  UnitKey unit;
+  SampleRange samples;
+};
+
+// A second result of a unit, equal to the first: nothing to do but to let the worker drop it.
+struct DropDuplicate {
+  UnitKey unit;
+  WorkerId worker;
+};
+// A result nobody wants: of a job that has ended, a round past its stop, another range or numeric class.
+struct DropUnwanted {
+  UnitKey unit;
+  WorkerId worker;
+  std::string why;
+};
+// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A running job fails.
+struct DigestMismatch {
+  UnitKey unit;
+  Digest first, second;
+  WorkerId first_worker, second_worker;
+};
+
+struct JobPinned {
+  JobId job;
+  Digest numeric_class;
+};
+struct JobStateChanged {
+  JobId job;
+  JobState from = JobState::queued;
+  JobState to = JobState::queued;
+};
+// Round `round` is folded over all tiles: time for a point of the convergence curve and a snapshot.
+struct Checkpoint {
+  JobId job;
+  RoundIndex round = 0;
+  std::uint64_t spp = 0;
+};
+// With an extension the cut round `round` is rendered again: its folded tail is to be replaced, its partials are void.
+struct ReopenRound {
+  JobId job;
+  RoundIndex round = 0;
+};
+// All that is wanted is folded. Follows the JobStateChanged to `done`.
+struct JobFinished {
+  JobId job;
+  StopReason stopped = StopReason::spp;
+};
+// For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to `failed`.
+struct JobFailed {
+  JobId job;
+  std::string error;
+  std::optional<UnitFailure> failure;  // the one that decided
+};
+
+struct WorkerStateChanged {
+  WorkerId worker;
+  WorkerState to = WorkerState::connected;
+  std::string why;
+};
+// A worker gets no more of this job for a while.
+struct WorkerBlocked {
+  WorkerId worker;
+  JobId job;
+  std::string why;
+};
+// A worker that was lost long ago is no longer known.
+struct WorkerForgotten {
+  WorkerId worker;
+};
+
+using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
+                            JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed, WorkerStateChanged,
+                            WorkerBlocked, WorkerForgotten>;
+
+}  // namespace ls::coordinator

@@ -1,0 +1,136 @@
+// What the farm is told. Every fact that decides anything arrives here; the farm reads no clock and no file.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/digest.h"
+#include "common/base/id.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+#include "common/protocol/messages.h"
+#include "coordinator/domain/job_state.h"
+
+namespace ls::coordinator {
+
+// What a job asks for, resolved: the scene's own defaults are already in it.
+struct JobPlan {
+  JobBrief brief;
+  TileGrid grid;
+  std::optional<std::uint64_t> spp;    // nothing: limits.h kMaxSppWithoutLimit
+  std::optional<double> target_error;  // relMSE of the image
+  std::optional<double> time;          // seconds from the first ray
+  int priority = 0;                    // higher first
+  std::vector<std::string> tags;       // a worker must carry all of them
+};
+
+// ---- jobs -----------------------------------------------------------------------------------------------------------
+struct JobSubmitted {
+  JobPlan plan;
+};
+
+// After a restart, before any other event of the job.
+struct JobRestored {
+  struct Unit {
+    TileIndex tile = 0;
+    RoundIndex round = 0;
+    SampleRange samples;  // one that is no longer wanted (a cut round, extended since) is passed over
+    Digest digest;
+    WorkerId worker;
+  };
+  JobPlan plan;
+  JobState state = JobState::queued;
+  std::optional<StopReason> stopped;           // of a job that is done
+  std::optional<Digest> numeric_class;         // it was pinned to
+  std::vector<Unit> accepted;                  // durable results, in any order
+  std::vector<RoundIndex> folded;              // rounds in the restored film, by tile; empty: nothing is folded yet
+  std::vector<std::vector<double>> rel_error;  // [round][tile] of what is folded, as UnitFolded said; only with a target
+  double elapsed_seconds = 0;                  // since its first ray, before the restart
+};
+
+struct JobCancelled {
+  JobId job;
+};
+struct JobPaused {
+  JobId job;
+};
+struct JobResumed {
+  JobId job;
+};
+// Finish with what is leased: the job ends as `done`, stopped by the user.
+struct JobStopped {
+  JobId job;
+};
+struct JobPriority {
+  JobId job;
+  int priority = 0;
+};
+// To this new total, of a running, paused or done job. A target error or time already reached no longer applies.
+struct JobExtended {
+  JobId job;
+  std::uint64_t spp = 0;
+};
+// Forget a job that has ended; its id may not come again.
+struct JobForgotten {
+  JobId job;
+};
+
+// ---- workers --------------------------------------------------------------------------------------------------------
+// A stream has been registered. An older stream of the same worker counts as lost.
+struct WorkerJoined {
+  WorkerId worker;
+  std::uint64_t epoch = 0;
+  std::string name;
+  Digest numeric_class;
+  int threads = 1;
+  std::vector<std::string> tags;
+};
+// The stream has closed. With an epoch that is not the worker's last it means nothing.
+struct WorkerLost {
+  WorkerId worker;
+  std::uint64_t epoch = 0;
+};
+struct WorkerDrains {
+  WorkerId worker;
+};
+struct LeaseProgress {
+  WorkerId worker;
+  std::vector<WorkerProgress::Entry> leases;
+};
+struct LeaseCameBack {
+  WorkerId worker;
+  LeaseReturned returned;
+};
+
+// ---- units ----------------------------------------------------------------------------------------------------------
+// A verified and durable result. Raised once per arrival; the farm sorts out duplicates.
+struct UnitAccepted {
+  UnitKey unit;
+  SampleRange samples;
+  Digest digest;
+  WorkerId worker;
+  double cpu_seconds = 0;
+};
+// The assembler did what Fold asked for.
+struct UnitFolded {
+  UnitKey unit;
+  // Sum over pixels and channels of the tile of squared error / (reference^2 + 0.01) with all rounds up to this one.
+  double rel_error_sum = 0;
+};
+struct UnitFailed {
+  WorkerId worker;
+  UnitFailure failure;
+};
+
+// Raised regularly (about once a second): deadlines, speculation, forgiveness, time budgets.
+struct Tick {};
+
+using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
+                           JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains, LeaseProgress,
+                           LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+
+}  // namespace ls::coordinator
