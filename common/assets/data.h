@@ -1,0 +1,60 @@
+// What the decoders return, and the limits that hold for every file a scene names. Every size is checked against a limit
+// and against the bytes that are really there before anything is allocated.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls {
+
+inline constexpr std::uint64_t kMaxAssetBytes = std::uint64_t{8} << 30;
+inline constexpr std::uint64_t kMaxMeshVertices = std::uint64_t{1} << 28;
+inline constexpr std::uint64_t kMaxMeshTriangles = std::uint64_t{1} << 28;
+inline constexpr std::uint32_t kMaxPolygonCorners = 1 << 16;
+inline constexpr std::uint32_t kMaxImageSide = 1 << 15;
+inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
+inline constexpr std::uint32_t kMaxGridSide = 1 << 13;
+inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
+
+// A triangle mesh. Three floats a vertex in positions and (if the file has any) normals, two in uvs; three indices a
+// triangle, all below vertex_count(). uvs are as in the file.
+struct MeshData {
+  std::vector<float> positions, normals, uvs;
+  std::vector<std::uint32_t> indices;
+  std::uint64_t dropped_triangles = 0;  // of zero area or with a vertex that is not finite; none of them in indices
+
+  std::size_t vertex_count() const { return positions.size() / 3; }
+  std::size_t triangle_count() const { return indices.size() / 3; }
+};
+
+// An image, row by row from the top. Exactly one of `u8` (codes 0..255) and `f32` is filled, channels interleaved.
+// channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
+struct ImageData {
+  std::uint32_t width = 0, height = 0, channels = 0;
+  std::vector<std::uint8_t> u8;
+  std::vector<float> f32;
+  bool srgb = false;  // the values are sRGB-encoded (8- and 16-bit files); else linear
+
+  bool operator==(const ImageData&) const = default;
+};
+
+// A dense grid: x fastest, then y, then z, channels interleaved. All values finite and not negative.
+struct GridData {
+  std::uint32_t nx = 0, ny = 0, nz = 0, channels = 0;
+  std::vector<float> values;
+  std::array<float, 3> bbox_min{0, 0, 0}, bbox_max{1, 1, 1};
+  std::uint64_t negatives = 0;  // values below zero in the file: set to 0
+};
+
+// The bytes of a file of at most `limit` bytes. `name` (as the scene writes it) is for messages.
+Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name,
+                                          std::uint64_t limit = kMaxAssetBytes);
+
+}  // namespace ls

@@ -1,0 +1,64 @@
+// Surface scattering by index: one flat table, a switch on a kind tag, textures read only where they are not constant.
+// Values are Mitsuba 3's (separable Smith masking, its Beckmann rational fit, its rough plastic tables).
+//
+// Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer or the
+// previous vertex) and wi (where the path goes next, or the light) are unit vectors that point AWAY from the surface.
+// All values are for radiance carried from wi to wo: refraction includes the factor 1 / eta^2.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/scene/scene.h"
+#include "worker/render/math.h"
+#include "worker/render/texture/texture.h"
+
+namespace ls::render {
+
+struct BsdfEval {
+  C3 f_cos{0, 0, 0};  // f |cos wi| [1/sr]; delta lobes give 0
+  float pdf = 0;      // of sample() choosing wi by a smooth lobe [1/sr]; positive wherever f_cos is
+};
+
+struct BsdfSample {
+  V3 wi{0, 0, 1};
+  C3 weight{0, 0, 0};  // f |cos wi| / pdf, lobe choice included; for delta lobes the factor itself
+  float pdf = 0;       // [1/sr], equal to eval(wi).pdf; for delta lobes the probability of the lobe
+  bool delta = false;
+  bool transmitted = false;  // wi is on the other side of the surface than wo
+  float eta = 1;             // refractive index on the side of wi over that on the side of wo; 1 unless refracted
+};
+
+class BsdfTable {
+ public:
+  BsdfTable();
+  ~BsdfTable();
+  BsdfTable(BsdfTable&&) noexcept;
+  BsdfTable& operator=(BsdfTable&&) noexcept;
+
+  // `textures` must outlive the table. invalid_argument: an index out of range, a two-sided material whose side lets
+  // light through, an index of refraction or roughness that is not a positive finite number.
+  static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
+
+  BsdfEval eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const;
+  // Nothing: absorbed, or the sampled direction is on the wrong side. u_lobe and u are in [0, 1).
+  std::optional<BsdfSample> sample(BsdfIndex i, V2 uv, const V3& wo, float u_lobe, V2 u) const;
+
+  bool is_null(BsdfIndex i) const;     // index-matched boundary: light passes unchanged
+  bool has_smooth(BsdfIndex i) const;  // any lobe that is not a delta: next-event estimation makes sense
+  bool transmits(BsdfIndex i) const;   // light can cross the surface (null, dielectric)
+  std::size_t size() const;
+  std::uint64_t bytes() const;
+  std::uint64_t clamped_inputs() const;  // reflectances above 1 or below 0 brought into [0, 1]
+
+  struct Material;
+
+ private:
+  std::vector<Material> materials_;
+  const TextureTable* textures_ = nullptr;
+  std::uint64_t clamped_ = 0;
+};
+
+}  // namespace ls::render

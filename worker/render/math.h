@@ -1,0 +1,104 @@
+// Vectors, frames and the few formulas that every part of the renderer shares. All of it is branch-light float32 code;
+// whatever needs more than float32 says so where it is used.
+#pragma once
+
+#include <Imath/ImathVec.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace ls::render {
+
+using V2 = Imath::V2f;
+using V3 = Imath::V3f;
+using V3d = Imath::V3d;
+using C3 = Imath::V3f;  // linear RGB
+
+inline constexpr float kPi = 3.14159265358979323846f;
+inline constexpr float kTwoPi = 6.28318530717958647692f;
+inline constexpr float kFourPi = 12.5663706143591729539f;
+inline constexpr float kInvPi = .318309886183790671538f;
+inline constexpr float kInvTwoPi = .159154943091895335769f;
+inline constexpr float kInvFourPi = .0795774715459476678845f;
+
+template <class T>
+constexpr T sqr(T x) {
+  return x * x;
+}
+inline float safe_sqrt(float x) { return std::sqrt(std::max(x, 0.f)); }
+inline double safe_sqrt(double x) { return std::sqrt(std::max(x, 0.)); }
+
+inline float dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline V3 cross(const V3& a, const V3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+// A zero or non-finite vector stays what it is: callers test before they rely on the length.
+inline V3 normalize(const V3& v) {
+  const float l2 = dot(v, v);
+  return l2 > 0 ? v * (1 / std::sqrt(l2)) : v;
+}
+// The mirror image of w about the unit vector m, both pointing away from the surface.
+inline V3 reflect(const V3& w, const V3& m) { return m * (2 * dot(w, m)) - w; }
+
+// Rec. 709 luminance.
+inline float luminance(const C3& c) { return .212671f * c.x + .715160f * c.y + .072169f * c.z; }
+inline float max_component(const C3& c) { return std::max(c.x, std::max(c.y, c.z)); }
+inline float mean_component(const C3& c) { return (c.x + c.y + c.z) * (1.f / 3); }
+inline bool is_black(const C3& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
+inline bool is_finite(const V3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+// (1 - e^-x) / x, continued to 1 at x = 0; right for every x, negative ones too: the mean of e^-t over [0, x].
+inline float phi(float x) {
+  if (std::abs(x) < 1e-4f) return 1 - x * (.5f - x * (1.f / 6));  // next term x^3/24: below 5e-14
+  return -std::expm1(-x) / x;
+}
+inline double phi(double x) {
+  if (std::abs(x) < 1e-5) return 1 - x * (.5 - x * (1. / 6));
+  return -std::expm1(-x) / x;
+}
+
+// Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+struct Frame {
+  V3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
+
+  Frame() = default;
+  Frame(const V3& s_, const V3& t_, const V3& n_) : s(s_), t(t_), n(n_) {}
+  explicit Frame(const V3& normal) : n(normal) {
+    const float sign = std::copysign(1.f, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+    s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+    t = {b, sign + n.y * n.y * a, -n.y};
+  }
+  // With s as near to `tangent` as n allows; any frame if the tangent is parallel to n or no direction.
+  static Frame from_tangent(const V3& normal, const V3& tangent) {
+    const V3 s = tangent - normal * dot(normal, tangent);
+    const float l2 = dot(s, s);
+    if (!(l2 > 1e-12f * dot(tangent, tangent)) || !std::isfinite(l2)) return Frame(normal);
+    const V3 u = s * (1 / std::sqrt(l2));
+    return {u, cross(normal, u), normal};
+  }
+  V3 to_local(const V3& w) const { return {dot(w, s), dot(w, t), dot(w, n)}; }
+  V3 to_world(const V3& l) const { return s * l.x + t * l.y + n * l.z; }
+};
+
+// ---- sample transformations: u in [0, 1)^2 --------------------------------------------------------------------------
+// Uniform in the unit disk, continuous and of low distortion (Shirley and Chiu 1997); the centre maps to the origin.
+inline V2 concentric_disk(const V2& u) {
+  const float x = 2 * u.x - 1, y = 2 * u.y - 1;
+  if (x == 0 && y == 0) return {0, 0};
+  const bool wide = std::abs(x) > std::abs(y);
+  const float r = wide ? x : y;
+  const float angle = wide ? kPi / 4 * (y / x) : kPi / 2 - kPi / 4 * (x / y);
+  return {r * std::cos(angle), r * std::sin(angle)};
+}
+// About +z with density cos / pi.
+inline V3 cosine_hemisphere(const V2& u) {
+  const V2 d = concentric_disk(u);
+  return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};
+}
+// Density 1 / (4 pi).
+inline V3 uniform_sphere(const V2& u) {
+  const float z = 1 - 2 * u.x, r = 2 * safe_sqrt(u.x * (1 - u.x)), a = kTwoPi * u.y;
+  return {r * std::cos(a), r * std::sin(a), z};
+}
+
+}  // namespace ls::render

@@ -1,0 +1,46 @@
+// Textures by index: constants, bitmaps, checkerboards. Lookups are Mitsuba's: (u, v) = (0, 0) is the lower left corner
+// of the image, to_uv acts first, sRGB is decoded before filtering. Safe for any uv, NaN included.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "common/assets/data.h"
+#include "common/base/error.h"
+#include "common/scene/scene.h"
+#include "worker/render/math.h"
+
+namespace ls::render {
+
+using ImageLoader = std::function<Result<ImageData>(const Asset&)>;
+
+class TextureTable {
+ public:
+  TextureTable();
+  ~TextureTable();
+  TextureTable(TextureTable&&) noexcept;
+  TextureTable& operator=(TextureTable&&) noexcept;
+
+  // Loads each file once. invalid_argument: an index out of range, textures that refer to each other in a circle or deeper
+  // than kMaxTextureDepth, a texel that is NaN or infinite (with file and texel).
+  static Result<TextureTable> build(const Scene& scene, const ImageLoader& load);
+
+  C3 eval(TextureIndex i, V2 uv) const;
+  bool is_constant(TextureIndex i) const;
+  C3 constant(TextureIndex i) const;  // its value if is_constant(i), else its mean
+  C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights
+  std::size_t size() const;
+  std::uint64_t bytes() const;            // held by texels
+  std::uint64_t clamped_texels() const;   // negative ones, made 0
+
+  struct Data;
+  const Data& data() const { return *data_; }  // stays where it is when the table moves
+
+ private:
+  std::unique_ptr<Data> data_;
+};
+
+inline constexpr int kMaxTextureDepth = 16;  // checkerboards of checkerboards
+
+}  // namespace ls::render
