@@ -24,6 +24,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -78,9 +79,10 @@ ImageError image_error(const TileError& sums);
 // figures.
 class Checkpoints {
  public:
-  explicit Checkpoints(TileIndex tiles) : tiles_(tiles) {}
+  explicit Checkpoints(TileIndex tiles) : tiles_(tiles), waiting_(tiles) {}
 
-  // After each fold. A round given twice (a cut round replaced by the full one) takes the newer figures.
+  // After each fold. A round given again (a cut round replaced by the full one, a tile begun anew) replaces
+  // what stood from it on, except in checkpoints that are complete already: those are history.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // No more rounds will come for this tile unless folded() is called for it again.
   void stopped(TileIndex tile);
@@ -91,15 +93,17 @@ class Checkpoints {
 
  private:
   struct Tile {
-    std::vector<TileError> pending;  // rounds not yet complete, from complete() on
+    std::vector<TileError> pending;  // figures of round complete() and those after it
     TileError last;
-    RoundIndex reached = 0;
+    RoundIndex reached = 0;  // one past the last round folded
     bool stopped = false;
   };
+  bool ready(const Tile& tile) const;  // for the next checkpoint
+  void change(TileIndex index, const std::function<void(Tile&)>& edit);
   void settle();
-  TileIndex tile_count() const { return static_cast<TileIndex>(tiles_.size()); }
 
   std::vector<Tile> tiles_;
+  TileIndex waiting_ = 0;  // tiles that are not ready
   std::vector<TileError> done_;
 };
 

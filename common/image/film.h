@@ -71,7 +71,8 @@ class Film {
   TileError error() const;             // over all tiles, in tile order
 
   // ---- restart ----
-  // Versioned, closed by a SHA-256; whole or one tile at a time. load refuses damaged or foreign bytes.
+  // Versioned, closed by a SHA-256; whole or one tile at a time (no bytes: nothing folded). Loading refuses
+  // damaged or foreign bytes.
   std::vector<std::byte> save() const;
   static Result<Film> load(std::span<const std::byte> bytes);
   std::vector<std::byte> save_tile(TileIndex tile) const;

@@ -23,7 +23,8 @@ struct PixelRect {
 
 using TileIndex = std::uint32_t;
 
-// Tiles of `tile` x `tile` pixels (smaller at the right and bottom edges), numbered row by row from the top left.
+// Tiles of `tile` x `tile` pixels (smaller at the right and bottom edges), numbered row by row from the top
+// left.
 struct TileGrid {
   FrameSize frame;
   int tile = 32;

@@ -1,4 +1,5 @@
-// A unit's result: per-pixel float32 sums of both halves over one sample range of one tile, and its exact identity.
+// A unit's result: per-pixel float32 sums of both halves over one sample range of one tile, and its exact
+// identity.
 #pragma once
 
 #include <cstddef>
@@ -32,8 +33,9 @@ Result<UnitHeader> parse_unit_header(std::string_view json);
 
 struct Partial {
   UnitHeader header;
-  // Planar: six planes of tile.pixels() floats each, row by row. Sums, never averages; how many samples each half has
-  // follows from the range. Every value is finite (a non-finite sample is counted and contributes zero).
+  // Planar: six planes of tile.pixels() floats each, row by row. Sums, never averages; how many samples each
+  // half has follows from the range. Every value is finite (a non-finite sample is counted and contributes
+  // zero).
   std::vector<float> sums;
   bool operator==(const Partial&) const = default;
 };
@@ -44,8 +46,8 @@ Digest unit_digest(const Partial& partial);
 // The EXR of the contract: scanline, uncompressed, FLOAT, dataWindow the tile, displayWindow the frame.
 Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
 
-// Refuses, with what is wrong, anything but exactly such a file: other windows, channels, compression, part counts,
-// sizes, non-finite sums, trailing data. `expected` is compared with the header inside.
+// Refuses, with what is wrong, anything but exactly such a file: other windows, channels, compression, part
+// counts, sizes, non-finite sums, trailing data. `expected` is compared with the header inside.
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame);
 
 // For `lightshaft merge`: the header comes from the file.

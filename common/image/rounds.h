@@ -1,5 +1,6 @@
-// Rounds: the grouping of a tile's samples, 2, 2, 4, 8, 16, 32, then 64 each. A constant: it never depends on spp, cost or
-// timing, so that any two jobs group the same samples alike and their double sums are equal bit for bit.
+// Rounds: the grouping of a tile's samples, 2, 2, 4, 8, 16, 32, then 64 each. A constant: it never depends on
+// spp, cost or timing, so that any two jobs group the same samples alike and their double sums are equal bit
+// for bit.
 #pragma once
 
 #include <algorithm>

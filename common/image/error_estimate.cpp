@@ -1,0 +1,163 @@
+#include "common/image/error_estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+
+namespace ls {
+namespace {
+
+constexpr double kDark = 0.01;             // of relMSE's denominator
+constexpr int kReach = 2;                  // of the 5 x 5 window
+constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
+// Fewer pixels than this carry the error: their own scatter (sqrt(4/3/100) = 12 % of the sum) says more than
+// the sum does. Gaussian noise of even strength spreads over a third of the pixels, so small images are asked
+// for half of that.
+constexpr double kFewPixels = 100;
+constexpr double kLargeShare = 0.1;
+
+// out[i] = sum of in[i - kReach .. i + kReach] along a line of `count` values `stride` apart, clipped to the
+// line.
+void box(const double* in, double* out, int count, std::ptrdiff_t stride) {
+  for (int i = 0; i < count; ++i) {
+    const int first = std::max(0, i - kReach), last = std::min(count - 1, i + kReach);
+    double sum = 0;
+    for (int j = first; j <= last; ++j) sum += in[j * stride];
+    out[i * stride] = sum;
+  }
+}
+
+int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::max(0, i - kReach) + 1; }
+
+// One channel's 1 / (window^2 + 0.01), with the window of the header's comment.
+std::vector<double> weights(const HalfMeans& h, std::size_t plane) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  std::vector<double> both(n), rows(n), sums(n);
+  for (std::size_t i = 0; i < n; ++i) both[i] = h.a[plane + i] + h.b[plane + i];
+  for (int y = 0; y < h.height; ++y)
+    box(&both[static_cast<std::size_t>(y) * h.width], &rows[static_cast<std::size_t>(y) * h.width], h.width,
+        1);
+  for (int x = 0; x < h.width; ++x)
+    box(&rows[static_cast<std::size_t>(x)], &sums[static_cast<std::size_t>(x)], h.height, h.width);
+  for (int y = 0, i = 0; y < h.height; ++y) {
+    for (int x = 0; x < h.width; ++x, ++i) {
+      const int others = span_of(x, h.width) * span_of(y, h.height) - 1;
+      const auto p = static_cast<std::size_t>(i);
+      const double mean = others > 0 ? (sums[p] - both[p]) / (2 * others) : both[p] / 2;
+      sums[p] = 1 / (mean * mean + kDark);
+    }
+  }
+  return sums;
+}
+
+// d: three planes of `width` x `height` values.
+NoiseSums noise_sums(const std::vector<double>& d, int width, int height) {
+  NoiseSums out;
+  const auto n = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const double *r = d.data(), *g = r + n, *b = g + n;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const std::size_t p = static_cast<std::size_t>(y) * width + x;
+      const double rr = r[p] * r[p], gg = g[p] * g[p], bb = b[p] * b[p], sum = rr + gg + bb;
+      out.squares += sum;
+      out.channel_fourth += rr * rr + gg * gg + bb * bb;
+      out.pixel_fourth += sum * sum;
+      out.largest = std::max(out.largest, sum);
+      if (x == 0) continue;
+      const std::size_t q = p - 1;
+      const double r2 = r[q] * r[q], g2 = g[q] * g[q], b2 = b[q] * b[q];
+      out.pair_covariance +=
+          r[p] * g[p] * r[q] * g[q] + r[p] * b[p] * r[q] * b[q] + g[p] * b[p] * g[q] * b[q];
+      out.pair_variance += 0.5 * (rr * g2 + gg * r2 + rr * b2 + bb * r2 + gg * b2 + bb * g2);
+    }
+  }
+  return out;
+}
+
+// Standard deviation of (estimated - realised) sum of squares over the estimated sum; see the header for the
+// derivation.
+double relative_spread(const NoiseSums& s) {
+  if (!(s.squares > 0)) return 0;
+  const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
+  const double cross = std::max(0.0, s.pixel_fourth - s.channel_fourth);
+  return std::sqrt(4 * (s.channel_fourth / 3 + cross * r2 / (1 + 2 * r2))) / s.squares;
+}
+
+void judge(ImageError& out, double pixels) {
+  const double few = std::min(kFewPixels, pixels / 6);
+  if (out.effective_pixels == 0) {
+    out.trusted = out.spp >= 64;
+    if (!out.trusted)
+      out.verdict = "the two halves of the samples do not differ yet: too few samples to tell the error";
+  } else if (out.effective_pixels < few ||
+             (out.top_share > kLargeShare && pixels * kLargeShare > kFewPixels)) {
+    out.verdict = fmt::format(
+        "don't trust yet: few pixels carry the error (like {:.0f} of {:.0f}; the worst one {:.0f} %); bright "
+        "outliers may still "
+        "be missing, so the true error may be larger",
+        out.effective_pixels, pixels, 100 * out.top_share);
+  } else {
+    out.trusted = true;
+  }
+}
+
+}  // namespace
+
+void NoiseSums::add(const NoiseSums& o) {
+  squares += o.squares;
+  channel_fourth += o.channel_fourth;
+  pixel_fourth += o.pixel_fourth;
+  pair_covariance += o.pair_covariance;
+  pair_variance += o.pair_variance;
+  largest = std::max(largest, o.largest);
+}
+
+void TileError::add(const TileError& o) {
+  pixels += o.pixels;
+  samples += o.samples;
+  plain.add(o.plain);
+  relative.add(o.relative);
+}
+
+TileError estimate_error(const HalfMeans& h, std::uint64_t spp) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
+        h.b.size(), h.width, h.height);
+  TileError out{.pixels = n, .samples = spp * n};
+  std::vector<double> d(3 * n);
+  for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
+  out.plain = noise_sums(d, h.width, h.height);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::vector<double> w = weights(h, c * n);
+    for (std::size_t i = 0; i < n; ++i) d[c * n + i] *= std::sqrt(w[i]);
+  }
+  out.relative = noise_sums(d, h.width, h.height);
+  return out;
+}
+
+ImageError image_error(const TileError& sums) {
+  ImageError out;
+  if (sums.pixels == 0) return out;
+  const auto pixels = static_cast<double>(sums.pixels);
+  // The interval is laid on a log scale, so that its lower end stays above zero.
+  const double spread = k95 * relative_spread(sums.plain),
+               relative_spread_95 = k95 * relative_spread(sums.relative);
+  out.rmse = std::sqrt(sums.plain.squares / (3 * pixels));
+  out.rmse_lo = out.rmse * std::exp(-spread / 2);
+  out.rmse_hi = out.rmse * std::exp(spread / 2);
+  out.relmse = sums.relative.squares / (3 * pixels);
+  out.relmse_lo = out.relmse * std::exp(-relative_spread_95);
+  out.relmse_hi = out.relmse * std::exp(relative_spread_95);
+  out.spp = static_cast<double>(sums.samples) / pixels;
+  if (sums.relative.pixel_fourth > 0) {
+    out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
+    out.top_share = sums.relative.largest / sums.relative.squares;
+  }
+  judge(out, pixels);
+  return out;
+}
+
+}  // namespace ls

@@ -1,0 +1,62 @@
+// Writing partials. Reading them is in partial_gate.cpp, without the library: it is hostile input of one
+// fixed shape.
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+
+#include "common/image/exr_memory.h"
+#include "common/image/partial.h"
+#include "common/image/partial_gate.h"
+
+namespace ls {
+namespace {
+
+Result<void> check(const Partial& partial, FrameSize frame) {
+  const PixelRect& t = partial.header.tile;
+  if (t.x0 < 0 || t.y0 < 0 || t.x0 >= t.x1 || t.y0 >= t.y1 || t.x1 > frame.width || t.y1 > frame.height)
+    return fail(Errc::invalid_argument,
+                fmt::format("partial: tile [{},{},{},{}] does not lie in the frame {}x{}", t.x0, t.y0, t.x1,
+                            t.y1, frame.width, frame.height));
+  if (t.pixels() > kMaxPartialPixels)
+    return fail(Errc::invalid_argument,
+                fmt::format("partial: tile of {} pixels, the limit is {}", t.pixels(), kMaxPartialPixels));
+  const auto want = static_cast<std::uint64_t>(t.pixels()) * kPartialChannels;
+  if (partial.sums.size() != want)
+    return fail(Errc::invalid_argument,
+                fmt::format("partial: {} sums, the tile needs {}", partial.sums.size(), want));
+  if (const auto finite = all_finite(partial); !finite) return tl::unexpected(finite.error());
+  return {};
+}
+
+Imath::Box2i inclusive(int x0, int y0, int x1, int y1) { return {{x0, y0}, {x1 - 1, y1 - 1}}; }
+
+}  // namespace
+
+Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame) {
+  if (const auto ok = check(partial, frame); !ok) return tl::unexpected(ok.error());
+  return exr::guarded(Errc::internal, "encoding a partial", [&]() -> Result<std::vector<std::byte>> {
+    const PixelRect& t = partial.header.tile;
+    Imf::Header header(inclusive(0, 0, frame.width, frame.height), inclusive(t.x0, t.y0, t.x1, t.y1), 1,
+                       {0, 0}, 1, Imf::INCREASING_Y, Imf::NO_COMPRESSION);
+    header.insert(kUnitAttribute, Imf::StringAttribute(canonical_json(partial.header)));
+    Imf::FrameBuffer buffer;
+    for (int c = 0; c < kPartialChannels; ++c) {
+      header.channels().insert(kPartialChannelNames[c], Imf::Channel(Imf::FLOAT));
+      const float* plane = partial.sums.data() + c * t.pixels();
+      buffer.insert(kPartialChannelNames[c],
+                    Imf::Slice::Make(Imf::FLOAT, plane, {t.x0, t.y0}, t.width(), t.height()));
+    }
+    exr::MemoryWriter out;
+    out.reserve(partial.sums.size() * sizeof(float) + static_cast<std::size_t>(t.height()) * 16 + 2048);
+    {
+      Imf::OutputFile file(out, header, /*numThreads=*/0);
+      file.setFrameBuffer(buffer);
+      file.writePixels(t.height());
+    }
+    return out.take();
+  });
+}
+
+}  // namespace ls

@@ -1,0 +1,178 @@
+#include "common/image/film.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/base/check.h"
+
+namespace ls {
+namespace {
+
+std::string show(const SampleRange& r) { return fmt::format("[{}, {})", r.s0, r.s1); }
+
+Digest chained(const Digest& chain, const Digest& unit) {
+  Sha256 hash;
+  hash.update(std::as_bytes(std::span(chain.bytes)));
+  hash.update(std::as_bytes(std::span(unit.bytes)));
+  return hash.finish();
+}
+
+}  // namespace
+
+Film::Film(TileGrid grid) : grid_(grid) {
+  CHECK(grid.frame.width > 0 && grid.frame.height > 0 && grid.tile > 0, "a film of {} x {} in tiles of {}",
+        grid.frame.width, grid.frame.height, grid.tile);
+  tiles_.resize(grid.count());
+}
+
+std::uint64_t Film::Tile::spp() const {
+  if (tail) return tail->samples.s1;
+  return full_rounds ? round_range(full_rounds - 1).s1 : 0;
+}
+
+Result<void> Film::accepts(TileIndex index, RoundIndex round, const Partial& partial) const {
+  if (index >= tiles_.size())
+    return fail(Errc::invalid_argument,
+                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+  const PixelRect rect = grid_.rect(index);
+  const SampleRange full = round_range(round), got = partial.header.samples;
+  if (partial.header.tile != rect ||
+      partial.sums.size() != static_cast<std::size_t>(rect.pixels()) * kPartialChannels)
+    return fail(Errc::invalid_argument,
+                fmt::format("the partial's rectangle or size is not that of tile {}", index));
+  if (got.s0 != full.s0 || got.s1 <= got.s0 || got.s1 > full.s1 || got.s1 % 2 != 0)
+    return fail(Errc::invalid_argument, fmt::format("tile {}: samples {} are not of round {}, which has {}",
+                                                    index, show(got), round, show(full)));
+  const RoundIndex next = full_rounds(index);
+  if (round > next)
+    return fail(Errc::failed_precondition,
+                fmt::format("tile {}: round {} cannot be folded before round {}", index, round, next));
+  if (round < next)
+    return fail(Errc::already_exists, fmt::format("tile {}: round {} is folded already", index, round));
+  if (const auto cut = tail(index); cut && got.s1 <= cut->s1)
+    return fail(Errc::already_exists,
+                fmt::format("tile {}: samples {} of round {} are folded already", index, show(*cut), round));
+  return {};
+}
+
+Result<TileError> Film::fold(TileIndex tile, RoundIndex round, const Partial& partial) {
+  return fold(tile, round, partial, unit_digest(partial));
+}
+
+Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& partial,
+                             const Digest& digest) {
+  if (const auto ok = accepts(index, round, partial); !ok) return tl::unexpected(ok.error());
+  auto next = std::make_shared<Tile>();
+  if (const Tile* old = tiles_[index].get()) {
+    next->full_rounds = old->full_rounds;
+    next->chain = old->chain;
+    next->sums = old->sums;
+  } else {
+    next->sums.resize(partial.sums.size());
+  }
+  if (partial.header.samples == round_range(round)) {
+    for (std::size_t i = 0; i < partial.sums.size(); ++i) next->sums[i] += partial.sums[i];
+    next->chain = chained(next->chain, digest);
+    ++next->full_rounds;
+  } else {
+    next->tail = Tail{partial.header.samples, digest, partial.sums};
+  }
+  next->error = estimate(*next, grid_.rect(index));
+  const TileError error = next->error;
+  tiles_[index] = std::move(next);
+  return error;
+}
+
+std::array<std::vector<double>, 2> Film::halves(const Tile& tile) {
+  const std::size_t n = tile.sums.size() / 2;
+  std::array<std::vector<double>, 2> out;
+  for (std::size_t h = 0; h < 2; ++h) {
+    out[h].assign(tile.sums.begin() + static_cast<std::ptrdiff_t>(h * n),
+                  tile.sums.begin() + static_cast<std::ptrdiff_t>((h + 1) * n));
+    if (tile.tail)
+      for (std::size_t i = 0; i < n; ++i) out[h][i] += tile.tail->sums[h * n + i];
+  }
+  return out;
+}
+
+TileError Film::estimate(const Tile& tile, const PixelRect& rect) {
+  auto means = halves(tile);
+  const std::uint64_t spp = tile.spp();
+  const double samples = static_cast<double>(spp / 2);  // of each half: counts are even
+  for (auto& half : means)
+    for (double& v : half) v /= samples;
+  return estimate_error({rect.width(), rect.height(), means[0], means[1]}, spp);
+}
+
+RoundIndex Film::full_rounds(TileIndex tile) const { return tiles_[tile] ? tiles_[tile]->full_rounds : 0; }
+
+RoundIndex Film::rounds_folded(TileIndex tile) const { return full_rounds(tile) + (tail(tile) ? 1 : 0); }
+
+std::optional<SampleRange> Film::tail(TileIndex tile) const {
+  if (!tiles_[tile] || !tiles_[tile]->tail) return std::nullopt;
+  return tiles_[tile]->tail->samples;
+}
+
+std::uint64_t Film::spp(TileIndex tile) const { return tiles_[tile] ? tiles_[tile]->spp() : 0; }
+
+TileError Film::error(TileIndex tile) const {
+  if (tiles_[tile]) return tiles_[tile]->error;
+  return TileError{.pixels = static_cast<std::uint64_t>(grid_.rect(tile).pixels())};
+}
+
+Digest Film::tile_digest(TileIndex index) const {
+  const Tile* tile = tiles_[index].get();
+  if (!tile) return {};
+  return tile->tail ? chained(tile->chain, tile->tail->digest) : tile->chain;
+}
+
+TilePixels Film::pixels(TileIndex index) const {
+  TilePixels out{.rect = grid_.rect(index), .spp = spp(index)};
+  const auto n = static_cast<std::size_t>(out.rect.pixels());
+  out.mean.resize(3 * n);
+  out.standard_error.resize(3 * n);
+  if (!out.spp) return out;
+  const auto sums = halves(*tiles_[index]);
+  const auto samples = static_cast<double>(out.spp), half = static_cast<double>(out.spp / 2);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t p = 0; p < n; ++p) {
+      const double a = sums[0][c * n + p], b = sums[1][c * n + p];
+      out.mean[3 * p + c] = (a + b) / samples;
+      out.standard_error[3 * p + c] = 0.5 * std::abs(a / half - b / half);
+    }
+  }
+  return out;
+}
+
+std::uint64_t Film::samples() const {
+  std::uint64_t sum = 0;
+  for (TileIndex i = 0; i < tiles_.size(); ++i)
+    if (tiles_[i]) sum += tiles_[i]->spp() * static_cast<std::uint64_t>(grid_.rect(i).pixels());
+  return sum;
+}
+
+std::uint64_t Film::memory_bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& tile : tiles_)
+    if (tile)
+      sum += tile->sums.size() * sizeof(double) + (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0);
+  return sum;
+}
+
+TileError Film::error() const {
+  TileError sum;
+  for (TileIndex i = 0; i < tiles_.size(); ++i) sum.add(error(i));
+  return sum;
+}
+
+bool Film::operator==(const Film& other) const {
+  if (grid_ != other.grid_) return false;
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    const Tile *a = tiles_[i].get(), *b = other.tiles_[i].get();
+    if (a != b && (!a || !b || !(*a == *b))) return false;
+  }
+  return true;
+}
+
+}  // namespace ls

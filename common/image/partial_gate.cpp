@@ -1,0 +1,282 @@
+// Reading partials: they come from machines we don't control. A partial has exactly one shape (uncompressed
+// scanlines of six float channels under a known header), so it is read here, byte by byte against that shape,
+// instead of by a library that understands every EXR there is. Nothing is allocated before the sizes are
+// known to be those of the tile.
+#include "common/image/partial_gate.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <string_view>
+
+namespace ls {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "EXR is little endian");
+
+constexpr std::int32_t kMaxSide = 65536;
+constexpr std::int32_t kMaxUnitJson = 1024;
+
+tl::unexpected<Error> refuse(std::string what) {
+  return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
+}
+
+class Cursor {
+ public:
+  explicit Cursor(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  std::size_t position() const { return position_; }
+  std::size_t left() const { return bytes_.size() - position_; }
+
+  std::optional<std::span<const std::byte>> take(std::size_t n) {
+    if (n > left()) return std::nullopt;
+    position_ += n;
+    return bytes_.subspan(position_ - n, n);
+  }
+  template <class T>
+  std::optional<T> value() {
+    const auto raw = take(sizeof(T));
+    if (!raw) return std::nullopt;
+    T v;
+    std::memcpy(&v, raw->data(), sizeof(T));
+    return v;
+  }
+  // Zero-terminated, at most 31 characters (the format's limit for names without the long-names flag).
+  std::optional<std::string_view> name() {
+    const std::size_t most = std::min<std::size_t>(left(), 32);
+    const auto* begin = reinterpret_cast<const char*>(bytes_.data() + position_);
+    const void* end = std::memchr(begin, 0, most);
+    if (!end) return std::nullopt;
+    const auto length = static_cast<std::size_t>(static_cast<const char*>(end) - begin);
+    position_ += length + 1;
+    return std::string_view(begin, length);
+  }
+
+ private:
+  std::span<const std::byte> bytes_;
+  std::size_t position_ = 0;
+};
+
+struct Shape {
+  std::optional<PixelRect> data, display;
+  std::optional<std::string_view> unit;
+  std::size_t pixels_at = 0;  // byte offset of the line table
+};
+
+struct Attribute {
+  std::string_view name, type;
+  std::int32_t size;  // 0: any
+};
+constexpr Attribute kAttributes[] = {
+    {"channels", "chlist", 0},        {"compression", "compression", 1}, {"dataWindow", "box2i", 16},
+    {"displayWindow", "box2i", 16},   {"lineOrder", "lineOrder", 1},     {"pixelAspectRatio", "float", 4},
+    {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4}, {kUnitAttribute, "string", 0},
+};
+
+Result<void> check_magic(Cursor& in) {
+  const auto magic = in.value<std::uint32_t>(), version = in.value<std::uint32_t>();
+  if (!magic || !version) return refuse("the file ends in its first 8 bytes");
+  if (*magic != 20000630u) return refuse("not an EXR file (wrong magic number)");
+  if ((*version & 0xff) != 2) return refuse(fmt::format("file version {}, expected 2", *version & 0xff));
+  if (*version & 0x200) return refuse("it is tiled; a partial has scanlines");
+  if (*version & 0x800) return refuse("it has deep data");
+  if (*version & 0x1000) return refuse("it has several parts; a partial has one");
+  if (*version >> 8) return refuse(fmt::format("unexpected version flags {:#x}", *version));
+  return {};
+}
+
+Result<void> check_channels(std::span<const std::byte> raw) {
+  Cursor in(raw);
+  for (const int plane : kFileOrder) {
+    const std::string_view want = kPartialChannelNames[static_cast<std::size_t>(plane)];
+    const auto name = in.name();
+    if (!name || *name != want)
+      return refuse(fmt::format("channel '{}' stands where '{}' belongs (A.B A.G A.R B.B B.G B.R, no others)",
+                                name.value_or("?"), want));
+    const auto type = in.value<std::int32_t>(), linear = in.value<std::int32_t>(),
+               xs = in.value<std::int32_t>(), ys = in.value<std::int32_t>();
+    if (!type || !linear || !xs || !ys) return refuse("the channel list is cut off");
+    if (*type != 2) return refuse(fmt::format("channel '{}' is not of type FLOAT", want));
+    if (*xs != 1 || *ys != 1)
+      return refuse(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", want, *xs, *ys));
+  }
+  const auto end = in.name();
+  if (!end || !end->empty() || in.left() != 0)
+    return refuse("more than the six channels A.B A.G A.R B.B B.G B.R");
+  return {};
+}
+
+Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> raw) {
+  std::int32_t v[4];  // inclusive
+  std::memcpy(v, raw.data(), sizeof v);
+  for (const std::int32_t x : v)
+    if (x < 0 || x >= kMaxSide)
+      return refuse(fmt::format("{} [{},{},{},{}] is out of range", name, v[0], v[1], v[2], v[3]));
+  if (v[0] > v[2] || v[1] > v[3]) return refuse(fmt::format("{} is empty", name));
+  return PixelRect{v[0], v[1], v[2] + 1, v[3] + 1};
+}
+
+Result<void> read_attribute(const Attribute& attribute, std::span<const std::byte> raw, Shape& shape) {
+  if (attribute.name == "channels") return check_channels(raw);
+  if (attribute.name == "compression" && raw[0] != std::byte{0})
+    return refuse("it is compressed; partials are not");
+  if (attribute.name == "lineOrder" && raw[0] != std::byte{0})
+    return refuse("its lines are not in order from the top");
+  if (attribute.name == kUnitAttribute)
+    shape.unit = std::string_view(reinterpret_cast<const char*>(raw.data()), raw.size());
+  if (attribute.type == "box2i") {
+    const auto window = read_window(attribute.name, raw);
+    if (!window) return tl::unexpected(window.error());
+    (attribute.name == "dataWindow" ? shape.data : shape.display) = *window;
+  }
+  return {};
+}
+
+Result<const Attribute*> find_attribute(std::string_view name, std::string_view type, std::int32_t size) {
+  for (const Attribute& a : kAttributes) {
+    if (a.name != name) continue;
+    if (a.type != type)
+      return refuse(fmt::format("attribute '{}' has type '{}', expected '{}'", name, type, a.type));
+    if (size < 0 || size > kMaxUnitJson || (a.size && size != a.size))
+      return refuse(fmt::format("attribute '{}' has {} bytes", name, size));
+    return &a;
+  }
+  return refuse(fmt::format("attribute '{}' does not belong in a partial", name));
+}
+
+Result<Shape> read_shape(std::span<const std::byte> exr) {
+  Cursor in(exr);
+  if (const auto ok = check_magic(in); !ok) return tl::unexpected(ok.error());
+  Shape shape;
+  std::uint32_t seen = 0;
+  while (true) {
+    const auto name = in.name();
+    if (!name) return refuse("the header is cut off or has an over-long name");
+    if (name->empty()) break;
+    const auto type = in.name();
+    const auto size = in.value<std::int32_t>();
+    if (!type || !size) return refuse(fmt::format("the header is cut off at attribute '{}'", *name));
+    const auto attribute = find_attribute(*name, *type, *size);
+    if (!attribute) return tl::unexpected(attribute.error());
+    const auto bit = std::uint32_t{1} << (*attribute - kAttributes);
+    if (seen & bit) return refuse(fmt::format("attribute '{}' occurs twice", *name));
+    seen |= bit;
+    const auto raw = in.take(static_cast<std::size_t>(*size));
+    if (!raw) return refuse(fmt::format("the header is cut off in attribute '{}'", *name));
+    if (const auto ok = read_attribute(**attribute, *raw, shape); !ok) return tl::unexpected(ok.error());
+  }
+  for (const Attribute& a : kAttributes)
+    if (!(seen & (std::uint32_t{1} << (&a - kAttributes))))
+      return refuse(fmt::format("attribute '{}' is missing", a.name));
+  if (shape.display->x0 != 0 || shape.display->y0 != 0)
+    return refuse("displayWindow does not begin at (0, 0)");
+  shape.pixels_at = in.position();
+  return shape;
+}
+
+std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]", r.x0, r.y0, r.x1, r.y1); }
+
+Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Shape& shape) {
+  const PixelRect& t = *shape.data;
+  if (t.pixels() > kMaxPartialPixels)
+    return refuse(
+        fmt::format("tile {} has {} pixels, the limit is {}", show(t), t.pixels(), kMaxPartialPixels));
+  const auto width = static_cast<std::size_t>(t.width()), height = static_cast<std::size_t>(t.height());
+  const std::size_t line = width * kPartialChannels * sizeof(float);
+  const std::size_t want = shape.pixels_at + height * (8 + 8 + line);
+  if (exr.size() != want)
+    return refuse(fmt::format("{} bytes, but tile {} needs exactly {}", exr.size(), show(t), want));
+
+  std::vector<float> sums(width * height * kPartialChannels);
+  Cursor table(exr.subspan(shape.pixels_at, height * 8)), lines(exr.subspan(shape.pixels_at + height * 8));
+  for (std::size_t y = 0; y < height; ++y) {
+    const std::uint64_t at = shape.pixels_at + height * 8 + y * (8 + line);
+    if (table.value<std::uint64_t>() != at) return refuse(fmt::format("line table: entry {} is wrong", y));
+    if (lines.value<std::int32_t>() != t.y0 + static_cast<std::int32_t>(y) ||
+        lines.value<std::int32_t>() != static_cast<std::int32_t>(line))
+      return refuse(fmt::format("line {}: wrong number or size", y));
+    for (const int plane : kFileOrder) {
+      const auto row = lines.take(width * sizeof(float));  // there: the size was checked
+      std::memcpy(sums.data() + (static_cast<std::size_t>(plane) * height + y) * width, row->data(),
+                  row->size());
+    }
+  }
+  return sums;
+}
+
+Result<UnitHeader> read_header(const Shape& shape) {
+  auto header = parse_unit_header(*shape.unit);
+  if (!header) return refuse(header.error().message);
+  if (header->tile != *shape.data)
+    return refuse(
+        fmt::format("dataWindow {} is not the unit's tile {}", show(*shape.data), show(header->tile)));
+  if (header->tile.x1 > shape.display->x1 || header->tile.y1 > shape.display->y1)
+    return refuse(fmt::format("tile {} is not inside the frame {}x{}", show(header->tile), shape.display->x1,
+                              shape.display->y1));
+  return header;
+}
+
+Result<void> check_unit(const UnitHeader& got, const UnitHeader& want) {
+  const auto digest = [](std::string_view what, const Digest& g, const Digest& w) {
+    return refuse(fmt::format("it is of {} {}, expected {}", what, g.hex(), w.hex()));
+  };
+  if (got.scene != want.scene) return digest("scene", got.scene, want.scene);
+  if (got.settings != want.settings) return digest("settings", got.settings, want.settings);
+  if (got.numeric_class != want.numeric_class)
+    return digest("numeric class", got.numeric_class, want.numeric_class);
+  if (got.tile != want.tile)
+    return refuse(fmt::format("it is of tile {}, expected {}", show(got.tile), show(want.tile)));
+  if (got.samples != want.samples)
+    return refuse(fmt::format("it has samples [{}, {}), expected [{}, {})", got.samples.s0, got.samples.s1,
+                              want.samples.s0, want.samples.s1));
+  return {};
+}
+
+Result<Partial> finish(std::span<const std::byte> exr, const Shape& shape, UnitHeader header) {
+  auto sums = read_pixels(exr, shape);
+  if (!sums) return tl::unexpected(sums.error());
+  Partial partial{std::move(header), std::move(*sums)};
+  if (const auto finite = all_finite(partial); !finite) return tl::unexpected(finite.error());
+  return partial;
+}
+
+}  // namespace
+
+Result<void> all_finite(const Partial& partial) {
+  const PixelRect& t = partial.header.tile;
+  const auto pixels = static_cast<std::size_t>(t.pixels());
+  for (std::size_t i = 0; i < partial.sums.size(); ++i) {
+    if (std::isfinite(partial.sums[i])) continue;
+    const auto p = static_cast<int>(i % pixels);
+    return refuse(fmt::format("channel {} of pixel ({}, {}) is {}", kPartialChannelNames[i / pixels],
+                              t.x0 + p % t.width(), t.y0 + p / t.width(), partial.sums[i]));
+  }
+  return {};
+}
+
+Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame) {
+  const auto shape = read_shape(exr);
+  if (!shape) return tl::unexpected(shape.error());
+  const PixelRect& display = *shape->display;
+  if (display.x1 != frame.width || display.y1 != frame.height)
+    return refuse(
+        fmt::format("its frame is {}x{}, expected {}x{}", display.x1, display.y1, frame.width, frame.height));
+  auto header = read_header(*shape);
+  if (!header) return tl::unexpected(header.error());
+  if (const auto ok = check_unit(*header, expected); !ok) return tl::unexpected(ok.error());
+  return finish(exr, *shape, std::move(*header));
+}
+
+Result<PartialFile> decode_partial_file(std::span<const std::byte> exr) {
+  const auto shape = read_shape(exr);
+  if (!shape) return tl::unexpected(shape.error());
+  auto header = read_header(*shape);
+  if (!header) return tl::unexpected(header.error());
+  auto partial = finish(exr, *shape, std::move(*header));
+  if (!partial) return tl::unexpected(partial.error());
+  return PartialFile{std::move(*partial), {shape->display->x1, shape->display->y1}};
+}
+
+}  // namespace ls

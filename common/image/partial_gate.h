@@ -1,0 +1,22 @@
+// What encoding and decoding of partials share.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/image/partial.h"
+
+namespace ls {
+
+inline constexpr char kUnitAttribute[] = "lightshaft:unit";
+// In the order of the planes. A file sorts them by name: kFileOrder[i] is the plane of the file's i-th
+// channel.
+inline constexpr std::array<const char*, kPartialChannels> kPartialChannelNames = {"A.R", "A.G", "A.B",
+                                                                                   "B.R", "B.G", "B.B"};
+inline constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};
+inline constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // the largest tile
+
+// Names the first pixel, channel and value that is not finite.
+Result<void> all_finite(const Partial& partial);
+
+}  // namespace ls
