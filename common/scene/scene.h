@@ -57,7 +57,7 @@ struct ConstantTexture {
   Rgb value{.5, .5, .5};
   bool operator==(const ConstantTexture&) const = default;
 };
-// v = 0 is the bottom row for Mitsuba: the reader leaves v as it is, the renderer flips when it looks up.
+// v = 0 is the top row (Mitsuba 3): nothing flips in the lookup; OBJ meshes flip v at load, see MeshShape.
 struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;

@@ -1,5 +1,5 @@
-// Textures by index: constants, bitmaps, checkerboards. Lookups are Mitsuba's: (u, v) = (0, 0) is the lower left corner
-// of the image, to_uv acts first, sRGB is decoded before filtering. Safe for any uv, NaN included.
+// Textures by index: constants, bitmaps, checkerboards. Lookups are Mitsuba 3's: (u, v) = (0, 0) is the UPPER left corner
+// of the image (it is OBJ loading that flips v), to_uv acts first, sRGB is decoded before filtering. Safe for any uv, NaN included.
 #pragma once
 
 #include <cstdint>

@@ -1,0 +1,53 @@
+// Fresnel reflectances for unpolarised light.
+#pragma once
+
+#include "worker/render/math.h"
+
+namespace ls::render {
+
+struct DielectricFresnel {
+  double reflectance = 0;
+  double cos_t = 0;     // of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection
+  double eta_it = 1;    // index on the transmitted side over the index on the incident side
+  double eta_ti = 1;    // its inverse
+};
+
+// cos_i > 0: from the outside, whose index is 1/eta of the inside's. In double: near eta = 1 the amplitudes cancel.
+inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
+  const bool outside = cos_i >= 0;
+  DielectricFresnel f;
+  f.eta_it = outside ? eta : 1 / eta;
+  f.eta_ti = outside ? 1 / eta : eta;
+  if (eta == 1) return {0, -cos_i, 1, 1};
+  const double c = std::abs(cos_i);
+  const double cos_t2 = 1 - (1 - c) * (1 + c) * f.eta_ti * f.eta_ti;
+  if (cos_t2 <= 0) {
+    f.reflectance = 1;
+    return f;
+  }
+  const double t = std::sqrt(cos_t2);
+  const double rs = (c - f.eta_it * t) / (c + f.eta_it * t), rp = (f.eta_it * c - t) / (f.eta_it * c + t);
+  f.reflectance = .5 * (rs * rs + rp * rp);
+  f.cos_t = outside ? -t : t;
+  return f;
+}
+
+// Complex index eta + i k relative to the outside; cos_i in [0, 1]. (0, k) reflects everything.
+inline float fresnel_conductor(float cos_i, float eta, float k) {
+  const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
+  const float t1 = eta * eta - k * k - s2;
+  const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
+  const float a = safe_sqrt(.5f * (a2b2 + t1));
+  const float p = a2b2 + c2, q = 2 * cos_i * a;
+  if (!(p + q > 0)) return 1;
+  const float rs = (p - q) / (p + q);
+  const float u = a2b2 * c2 + s2 * s2, v = q * s2;
+  if (!(u + v > 0)) return rs;  // eta = k = 0 at normal incidence
+  return .5f * (rs + rs * (u - v) / (u + v));
+}
+inline C3 fresnel_conductor(float cos_i, const C3& eta, const C3& k) {
+  return {fresnel_conductor(cos_i, eta.x, k.x), fresnel_conductor(cos_i, eta.y, k.y),
+          fresnel_conductor(cos_i, eta.z, k.z)};
+}
+
+}  // namespace ls::render

@@ -1,0 +1,58 @@
+#include "worker/render/bsdf/microfacet.h"
+
+namespace ls::render::beckmann {
+
+// M. Giles, "Approximating the erfinv function" (2010), single precision polynomials: relative error below 1e-6.
+double erf_inverse(double x) {
+  double w = -std::log((1 - x) * (1 + x)), p;
+  if (w < 5) {
+    w -= 2.5;
+    p = 2.81022636e-08;
+    for (const double c : {3.43273939e-07, -3.5233877e-06, -4.39150654e-06, 0.00021858087, -0.00125372503,
+                           -0.00417768164, 0.246640727, 1.50140941})
+      p = c + p * w;
+  } else {
+    w = std::sqrt(w) - 3;
+    p = -0.000200214257;
+    for (const double c : {0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773, -0.0076224613, 0.00943887047,
+                           1.00167406, 2.83297682})
+      p = c + p * w;
+  }
+  return p * x;
+}
+
+// Visible slopes s have the density exp(-s^2) (cos - s sin)+, whose integral up to s is
+//   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2),  s <= cot.
+// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. Bounded: each step that does not converge
+// quadratically halves the bracket, and 64 halvings exhaust a double.
+double visible_slope(double cos_theta, double sin_theta, double u) {
+  constexpr double kHalfSqrtPi = .886226925452758014;
+  constexpr double kEnd = 6.5;  // exp(-42): beyond any float32 u
+  const auto H = [&](double s, double e) { return cos_theta * kHalfSqrtPi * std::erfc(-s) + .5 * sin_theta * e; };
+  double lo = -kEnd, hi = cos_theta < kEnd * sin_theta ? cos_theta / sin_theta : kEnd;
+  const double target = u * H(hi, std::exp(-hi * hi));
+  double s = std::clamp(erf_inverse(std::clamp(2 * u - 1, -1 + 1e-12, 1 - 1e-12)), lo, hi);
+  for (int i = 0; i < 64; ++i) {
+    const double e = std::exp(-s * s), excess = H(s, e) - target;
+    (excess > 0 ? hi : lo) = s;
+    const double slope = e * (cos_theta - s * sin_theta);
+    double next = s - excess / slope;
+    if (!(next > lo && next < hi)) next = .5 * (lo + hi);
+    if (std::abs(next - s) <= 1e-9 * (1 + std::abs(next))) return next;
+    s = next;
+  }
+  return s;
+}
+
+V3 sample_normal(const V3& wo, float ax, float ay, const V2& u) {
+  const double x = double{ax} * wo.x, y = double{ay} * wo.y, z = wo.z;
+  const double r = std::sqrt(x * x + y * y), l = std::sqrt(r * r + z * z);
+  const double cos_phi = r > 0 ? x / r : 1, sin_phi = r > 0 ? y / r : 0;
+  const double along = visible_slope(z / l, r / l, u.x);
+  const double across = erf_inverse(std::clamp(2. * u.y - 1, -1 + 1e-12, 1 - 1e-12));
+  const double sx = ax * (cos_phi * along - sin_phi * across), sy = ay * (sin_phi * along + cos_phi * across);
+  const double n = 1 / std::sqrt(1 + sx * sx + sy * sy);
+  return {static_cast<float>(-sx * n), static_cast<float>(-sy * n), static_cast<float>(n)};
+}
+
+}  // namespace ls::render::beckmann

@@ -1,0 +1,91 @@
+// Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba. All
+// directions are in the local frame, above the surface (z > 0), unit length. Nothing here divides by a cosine.
+//
+// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because that is the dialect's
+// definition of the material; in the *density* of sampling it is the exact one, so that sampling is exact.
+#pragma once
+
+#include "common/scene/scene.h"
+#include "worker/render/math.h"
+
+namespace ls::render {
+
+// Below this both roughnesses mean a perfect mirror; a lone smaller one is raised to kMinAlpha.
+inline constexpr float kSpecularAlpha = 1e-3f;
+inline constexpr float kMinAlpha = 1e-4f;
+
+// w as seen by a surface of roughness 1: (ax x, ay y, z), and the length of its tangential part.
+inline float stretched_sine(const V3& w, float ax, float ay) { return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y)); }
+
+namespace ggx {
+// Written with the tangential part of m, so that nothing cancels near the normal.
+inline float D(const V3& m, float ax, float ay) {
+  return 1 / (kPi * ax * ay * sqr(sqr(m.x / ax) + sqr(m.y / ay) + m.z * m.z));
+}
+inline float G1_over_cos(const V3& w, float ax, float ay) {
+  return 2 / (w.z + std::sqrt(sqr(ax * w.x) + sqr(ay * w.y) + w.z * w.z));
+}
+// Of the bounded visible normals (Tokuyoshi and Eto 2024): how much of the cap below the horizon is left out.
+inline float bound_k(const V3& wo, float ax, float ay) {
+  const float a = std::min(std::min(ax, ay), 1.f), s = 1 + std::sqrt(wo.x * wo.x + wo.y * wo.y);
+  return (1 - a * a) * s * s / (s * s + a * a * wo.z * wo.z);
+}
+// Density of the reflected direction over D(m).
+inline float pdf_over_D(const V3& wo, float ax, float ay) {
+  const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
+  return .5f / (bound_k(wo, ax, ay) * wo.z + t);
+}
+inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u) {
+  const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
+  const float b = bound_k(wo, ax, ay) * i.z;
+  const float z = (1 - u.y) * (1 + b) - b, r = safe_sqrt((1 - z) * (1 + z)), angle = kTwoPi * u.x;
+  const V3 m = V3(r * std::cos(angle), r * std::sin(angle), z) + i;
+  return normalize(V3(ax * m.x, ay * m.y, std::max(m.z, 0.f)));
+}
+}  // namespace ggx
+
+namespace beckmann {
+inline float D(const V3& m, float ax, float ay) {
+  const float c2 = m.z * m.z, e = (sqr(m.x / ax) + sqr(m.y / ay)) / c2;
+  return e < 87 ? std::exp(-e) / (kPi * ax * ay * c2 * c2) : 0;  // also 0 where e is NaN: c2 = 0
+}
+inline float G1_over_cos(const V3& w, float ax, float ay) {
+  const float s = stretched_sine(w, ax, ay);
+  if (w.z >= 1.6f * s) return 1 / w.z;
+  const float a = w.z / s;
+  return (3.535f + 2.181f * a) / ((1 + a * (2.276f + 2.577f * a)) * s);
+}
+// The exact G1 / cos: one over the projected area of the visible microfacets.
+inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
+  const float s = stretched_sine(w, ax, ay);
+  if (w.z > 6 * s) return 1 / w.z;  // erf(6) is 1 and exp(-36) nothing, in float32
+  const float a = w.z / s;
+  return 1 / (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
+}
+inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_G1_over_cos(wo, ax, ay); }
+// By inversion, in double; u in [0, 1)^2.
+V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
+// The slope along the viewer, of roughness 1, for a viewer at this angle: where the share u of visible slopes ends.
+double visible_slope(double cos_theta, double sin_theta, double u);
+double erf_inverse(double x);
+}  // namespace beckmann
+
+struct Microfacets {
+  Microfacet type = Microfacet::ggx;
+  float ax = .1f, ay = .1f;
+
+  float D(const V3& m) const {
+    return type == Microfacet::ggx ? ggx::D(m, ax, ay) : beckmann::D(m, ax, ay);
+  }
+  float G1_over_cos(const V3& w) const {
+    return type == Microfacet::ggx ? ggx::G1_over_cos(w, ax, ay) : beckmann::G1_over_cos(w, ax, ay);
+  }
+  float pdf_over_D(const V3& wo) const {
+    return type == Microfacet::ggx ? ggx::pdf_over_D(wo, ax, ay) : beckmann::pdf_over_D(wo, ax, ay);
+  }
+  V3 sample_normal(const V3& wo, const V2& u) const {
+    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u) : beckmann::sample_normal(wo, ax, ay, u);
+  }
+};
+
+}  // namespace ls::render

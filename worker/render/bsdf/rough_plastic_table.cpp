@@ -1,0 +1,91 @@
+#include "worker/render/bsdf/rough_plastic_table.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/microfacet.h"
+
+namespace ls::render {
+
+namespace {
+
+struct Quadrature {
+  std::vector<double> x, w;  // on [0, 1]
+};
+
+// Gauss-Legendre: roots of P_n by Newton's method from Tricomi's estimate.
+Quadrature gauss_legendre(int n) {
+  Quadrature q;
+  for (int i = 0; i < n; ++i) {
+    double x = std::cos(M_PI * (i + .75) / (n + .5)), dp = 0;
+    for (int step = 0; step < 8; ++step) {
+      double p0 = 1, p1 = x;
+      for (int k = 2; k <= n; ++k) p0 = std::exchange(p1, ((2 * k - 1) * x * p1 - (k - 1) * p0) / k);
+      dp = n * (x * p1 - p0) / (x * x - 1);
+      x -= p1 / dp;
+    }
+    q.x.push_back(.5 * (1 - x));
+    q.w.push_back(1 / ((1 - x * x) * dp * dp));
+  }
+  return q;
+}
+
+double masking(Microfacet type, double alpha, double x, double y, double z) {
+  const double s = alpha * std::hypot(x, y);
+  if (type == Microfacet::ggx) return 2 * z / (z + std::hypot(s, z));
+  if (z >= 1.6 * s) return 1;
+  const double a = z / s;
+  return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
+}
+
+// F(i.m) G1(o) for the reflection o of i = (sin, 0, cos) about m.
+double reflected(Microfacet type, double alpha, double eta, double sin, double cos, double mx, double my, double mz) {
+  const double im = sin * mx + cos * mz;
+  const double oz = 2 * im * mz - cos;
+  if (!(im > 0) || !(oz > 0)) return 0;
+  const double ox = 2 * im * mx - sin, oy = 2 * im * my;
+  return fresnel_dielectric(im, eta).reflectance * masking(type, alpha, ox, oy, oz);
+}
+
+double rough_reflectance(Microfacet type, double alpha, double eta, double mu, const Quadrature& q) {
+  if (alpha < kSpecularAlpha) return fresnel_dielectric(mu, eta).reflectance;
+  const double sin = std::sqrt(1 - mu * mu), l = std::hypot(alpha * sin, mu);
+  const double is = alpha * sin / l, ic = mu / l;  // the viewer, stretched to roughness 1
+  double sum = 0;
+  for (std::size_t a = 0; a < q.x.size(); ++a) {
+    double x, y, z, row = 0;
+    const double slope = type == Microfacet::beckmann ? beckmann::visible_slope(ic, is, q.x[a]) : 0;
+    const double cap = (1 - q.x[a]) * (1 + ic) - ic, r = safe_sqrt((1 - cap) * (1 + cap));
+    for (std::size_t b = 0; b < q.x.size(); ++b) {
+      if (type == Microfacet::beckmann) {  // the two halves across the viewer are alike
+        x = -alpha * slope, y = alpha * beckmann::erf_inverse(q.x[b]), z = 1;
+      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); both halves alike
+        x = alpha * (r * std::cos(M_PI * q.x[b]) + is), y = alpha * r * std::sin(M_PI * q.x[b]), z = cap + ic;
+      }
+      const double n = 1 / std::sqrt(x * x + y * y + z * z);
+      row += q.w[b] * reflected(type, alpha, eta, sin, mu, x * n, y * n, z * n);
+    }
+    sum += q.w[a] * row;
+  }
+  return sum;
+}
+
+}  // namespace
+
+RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta) {
+  static const Quadrature kOutside = gauss_legendre(48), kInside = gauss_legendre(96);  // inside: total reflection has a kink
+  RoughPlasticTable t;
+  double internal = 0;
+  for (int i = 0; i < kPlasticNodes; ++i) {
+    const double mu = std::max(1e-6, i / (kPlasticNodes - 1.));
+    t.transmittance[i] =
+        static_cast<float>(1 - rough_reflectance(type, alpha, eta, mu, eta > 1 ? kOutside : kInside));
+    internal += mu * rough_reflectance(type, alpha, 1 / eta, mu, eta > 1 ? kInside : kOutside);
+  }
+  t.internal_reflectance = static_cast<float>(2 * internal / kPlasticNodes);
+  return t;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,30 @@
+// What the dielectric coat of a rough plastic lets through, on average over its microfacets.
+#pragma once
+
+#include <array>
+
+#include "common/scene/scene.h"
+
+namespace ls::render {
+
+inline constexpr int kPlasticNodes = 64;
+
+struct RoughPlasticTable {
+  std::array<float, kPlasticNodes> transmittance{};  // from outside, at cos = i / (kPlasticNodes - 1); linear between
+  float internal_reflectance = 0;  // of diffuse light from inside
+
+  float at(float cos_theta) const {
+    const float x = cos_theta * (kPlasticNodes - 1);
+    const int i = x < kPlasticNodes - 2 ? static_cast<int>(x) : kPlasticNodes - 2;
+    const float t = x - static_cast<float>(i);
+    return transmittance[i] * (1 - t) + transmittance[i + 1] * t;
+  }
+};
+
+// The nodes, the linear interpolation between them and the internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a
+// plain mean, not a quadrature: it lies about 0.009 below the integral) are the dialect's definition of the material.
+// The rough reflectances at the nodes are integrals over visible normals, done here by Gauss-Legendre in double.
+// alpha < kSpecularAlpha: a smooth coat. eta: inside over outside.
+RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);
+
+}  // namespace ls::render

@@ -1,0 +1,221 @@
+// eval() and sample(). Both take the values of a material's textures once, as a Lobes value, so that value, density and
+// sampling of one vertex can't disagree.
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/material.h"
+
+namespace ls::render {
+
+namespace {
+
+using Material = BsdfTable::Material;
+
+struct Lookup {
+  const TextureTable& textures;
+  V2 uv;
+
+  C3 reflectance(const Slot& s) const {
+    if (s.constant) return s.value;
+    const C3 c = textures.eval(s.texture, uv);
+    return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
+  }
+  float alpha(const Slot& s) const {
+    const C3 c = s.constant ? s.value : textures.eval(s.texture, uv);
+    return c.x == c.y && c.y == c.z ? c.x : luminance(c);
+  }
+  struct Roughness {
+    Microfacets facets;
+    bool mirror;
+  };
+  Roughness roughness(const Material& m) const {
+    const float u = alpha(m.alpha_u), v = alpha(m.alpha_v);
+    return {{m.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)}, u < kSpecularAlpha && v < kSpecularAlpha};
+  }
+};
+
+V3 mirrored(const V3& w) { return {-w.x, -w.y, w.z}; }
+
+// ---- diffuse --------------------------------------------------------------------------------------------------------
+BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
+  const float p = wi.z * kInvPi;
+  return {reflectance * p, p};
+}
+
+// ---- conductors -----------------------------------------------------------------------------------------------------
+struct Metal {
+  C3 eta, k, tint;
+  C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
+};
+
+BsdfEval eval_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo, const V3& wi) {
+  const V3 h = normalize(wo + wi);
+  const float D = facets.D(h), G = facets.G1_over_cos(wo) * facets.G1_over_cos(wi) * wi.z;
+  return {metal.reflectance(dot(wo, h)) * (.25f * D * G), D * facets.pdf_over_D(wo)};
+}
+
+// The weight is F G1(wi) times a ratio near 1: D, which may be huge or lose digits, stays out of it.
+std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo, const V2& u) {
+  const V3 h = facets.sample_normal(wo, u);
+  const V3 wi = normalize(reflect(wo, h));
+  const float pdf_over_D = facets.pdf_over_D(wo), pdf = facets.D(h) * pdf_over_D;
+  if (!(wi.z > 0) || !(pdf > 0)) return std::nullopt;
+  const float ratio = .25f * facets.G1_over_cos(wo) / pdf_over_D;
+  BsdfSample s;
+  s.wi = wi;
+  s.weight = metal.reflectance(dot(wo, h)) * (facets.G1_over_cos(wi) * wi.z * ratio);
+  s.pdf = pdf;
+  return s;
+}
+
+std::optional<BsdfSample> sample_mirror(const C3& weight, const V3& wo) {
+  BsdfSample s;
+  s.wi = mirrored(wo);
+  s.weight = weight;
+  s.pdf = 1;
+  s.delta = true;
+  return s;
+}
+
+// ---- dielectric -----------------------------------------------------------------------------------------------------
+std::optional<BsdfSample> sample_dielectric(const Material& m, const Lookup& look, const V3& wo, float u_lobe) {
+  const DielectricFresnel f = fresnel_dielectric(wo.z, m.ior);
+  const float R = static_cast<float>(f.reflectance);
+  if (u_lobe < R) {
+    auto s = sample_mirror(look.reflectance(m.specular_slot), wo);
+    s->pdf = R;
+    return s;
+  }
+  const float eta_ti = static_cast<float>(f.eta_ti);
+  BsdfSample s;
+  s.wi = m.ior == 1 ? -wo : normalize(V3(-eta_ti * wo.x, -eta_ti * wo.y, static_cast<float>(f.cos_t)));
+  s.weight = look.reflectance(m.second_slot) * static_cast<float>(f.eta_ti * f.eta_ti);
+  s.pdf = 1 - R;
+  s.delta = true;
+  s.transmitted = true;
+  s.eta = static_cast<float>(f.eta_it);
+  return s;
+}
+
+// ---- rough plastic --------------------------------------------------------------------------------------------------
+struct Plastic {
+  const Material& m;
+  C3 diffuse, tint;
+  Microfacets facets;
+  float t_o;         // the coat's transmittance towards wo
+  float p_specular;  // probability that the coat is sampled
+
+  Plastic(const Material& material, const Lookup& look, const V3& wo)
+      : m(material),
+        diffuse(look.reflectance(m.second_slot)),
+        tint(look.reflectance(m.specular_slot)),
+        facets{m.distribution, m.alpha_u.value.x, m.alpha_v.value.x},
+        t_o(m.coat.at(wo.z)) {
+    const float s = (1 - t_o) * m.specular_weight, d = t_o * (1 - m.specular_weight);
+    p_specular = s + d > 0 ? s / (s + d) : .5f;
+  }
+
+  // Light that entered, was scattered any number of times below the coat, and left.
+  C3 diffuse_f_cos(const V3& wi) const {
+    const float r = m.coat.internal_reflectance;
+    const C3 inside = m.nonlinear ? C3(1) - diffuse * r : C3(1 - r);
+    return diffuse / inside * (kInvPi / (m.ior * m.ior) * wi.z * t_o * m.coat.at(wi.z));
+  }
+};
+
+float coat_reflectance(float cos, float ior) { return static_cast<float>(fresnel_dielectric(cos, ior).reflectance); }
+
+BsdfEval eval_plastic(const Plastic& p, const V3& wo, const V3& wi) {
+  BsdfEval e{p.diffuse_f_cos(wi), (1 - p.p_specular) * wi.z * kInvPi};
+  if (p.m.specular) return e;
+  const V3 h = normalize(wo + wi);
+  const float D = p.facets.D(h), G = p.facets.G1_over_cos(wo) * p.facets.G1_over_cos(wi) * wi.z;
+  e.f_cos += p.tint * (coat_reflectance(dot(wo, h), p.m.ior) * .25f * D * G);
+  e.pdf += p.p_specular * D * p.facets.pdf_over_D(wo);
+  return e;
+}
+
+std::optional<BsdfSample> sample_plastic(const Plastic& p, const V3& wo, float u_lobe, const V2& u) {
+  const bool coat = u_lobe < p.p_specular;
+  if (coat && p.m.specular) {
+    auto s = sample_mirror(p.tint * (coat_reflectance(wo.z, p.m.ior) / p.p_specular), wo);
+    s->pdf = p.p_specular;
+    return s;
+  }
+  BsdfSample s;
+  s.wi = coat ? normalize(reflect(wo, p.facets.sample_normal(wo, u))) : cosine_hemisphere(u);
+  if (!(s.wi.z > 0)) return std::nullopt;
+  const BsdfEval e = eval_plastic(p, wo, s.wi);
+  if (!(e.pdf > 0)) return std::nullopt;
+  s.weight = e.f_cos / e.pdf;
+  s.pdf = e.pdf;
+  return s;
+}
+
+std::optional<BsdfSample> sample_diffuse(const C3& reflectance, const V2& u) {
+  BsdfSample s;
+  s.wi = cosine_hemisphere(u);
+  s.weight = reflectance;
+  s.pdf = s.wi.z * kInvPi;
+  if (!(s.pdf > 0)) return std::nullopt;
+  return s;
+}
+
+V3 flipped(const V3& w) { return {w.x, w.y, -w.z}; }
+
+}  // namespace
+
+BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
+  const Material* m = &materials_[i.value];
+  V3 o = wo, in = wi;
+  if (m->kind == MaterialKind::two_sided) {
+    m = &materials_[o.z < 0 ? m->back : m->front];
+    if (o.z < 0) o = flipped(o), in = flipped(in);
+  }
+  if (!(o.z > 0) || !(in.z > 0)) return {};  // no smooth lobe of ours transmits, and none shines on the back
+  const Lookup look{*textures_, uv};
+  switch (m->kind) {
+    case MaterialKind::diffuse: return eval_diffuse(look.reflectance(m->second_slot), in);
+    case MaterialKind::rough_conductor: {
+      const auto rough = look.roughness(*m);
+      if (rough.mirror) return {};
+      return eval_rough_metal({m->eta, m->k, look.reflectance(m->specular_slot)}, rough.facets, o, in);
+    }
+    case MaterialKind::rough_plastic: return eval_plastic(Plastic(*m, look, o), o, in);
+    default: return {};
+  }
+}
+
+std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, V2 uv, const V3& wo, float u_lobe, V2 u) const {
+  const Material* m = &materials_[i.value];
+  if (m->kind == MaterialKind::null) {
+    BsdfSample s;
+    s.wi = -wo;
+    s.weight = C3(1);
+    s.pdf = 1;
+    s.delta = s.transmitted = true;
+    return s;
+  }
+  V3 o = wo;
+  const bool from_behind = m->kind == MaterialKind::two_sided && o.z < 0;
+  if (m->kind == MaterialKind::two_sided) m = &materials_[from_behind ? m->back : m->front];
+  if (from_behind) o = flipped(o);
+  const Lookup look{*textures_, uv};
+  if (m->kind == MaterialKind::dielectric) return o.z != 0 ? sample_dielectric(*m, look, o, u_lobe) : std::nullopt;
+  if (!(o.z > 0)) return std::nullopt;
+  std::optional<BsdfSample> s;
+  const auto metal = [&] { return Metal{m->eta, m->k, look.reflectance(m->specular_slot)}; };
+  switch (m->kind) {
+    case MaterialKind::diffuse: s = sample_diffuse(look.reflectance(m->second_slot), u); break;
+    case MaterialKind::conductor: s = sample_mirror(metal().reflectance(o.z), o); break;
+    case MaterialKind::rough_conductor: {
+      const auto rough = look.roughness(*m);
+      s = rough.mirror ? sample_mirror(metal().reflectance(o.z), o) : sample_rough_metal(metal(), rough.facets, o, u);
+      break;
+    }
+    case MaterialKind::rough_plastic: s = sample_plastic(Plastic(*m, look, o), o, u_lobe, u); break;
+    default: break;
+  }
+  if (s && from_behind) s->wi = flipped(s->wi);
+  return s;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,121 @@
+#include "worker/render/texture/texels.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace ls::render {
+
+double srgb_to_linear(double v) {
+  return v <= .04045 ? v / 12.92 : std::pow((v + .055) / 1.055, 2.4);
+}
+
+namespace {
+
+// One coordinate folded into [0, 1]; any finite u, however large.
+float fold(float u, Wrap wrap) {
+  switch (wrap) {
+    case Wrap::repeat: return u - std::floor(u);
+    case Wrap::mirror: {
+      const float t = u - 2 * std::floor(u * .5f);  // in [0, 2]
+      return t > 1 ? 2 - t : t;
+    }
+    case Wrap::clamp: break;
+  }
+  return std::clamp(u, 0.f, 1.f);
+}
+
+struct Span2 {
+  std::uint32_t lo, hi;
+  float t;  // weight of hi
+};
+// The two texels around u in [0, 1]. The neighbour over the edge is the opposite edge when repeating, else the edge itself
+// (also when mirroring: texel -1 mirrors to texel 0).
+Span2 neighbours(float u, std::uint32_t n, Wrap wrap) {
+  const float x = u * static_cast<float>(n) - .5f, f = std::floor(x);
+  const std::int64_t lo = static_cast<std::int64_t>(f), last = n - 1;
+  const auto at = [&](std::int64_t i) {
+    if (wrap == Wrap::repeat) return static_cast<std::uint32_t>(i < 0 ? last : i > last ? 0 : i);
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, last));
+  };
+  return {at(std::min(lo, last)), at(std::min(lo, last) + 1), x - f};
+}
+
+std::uint32_t nearest(float u, std::uint32_t n) {
+  return std::min(static_cast<std::uint32_t>(u * static_cast<float>(n)), n - 1);
+}
+
+C3 mean_of(const Texels& t) {
+  double sum[3] = {0, 0, 0};
+  for (std::uint32_t y = 0; y < t.height; ++y)
+    for (std::uint32_t x = 0; x < t.width; ++x) {
+      const C3 c = t.texel(x, y);
+      for (int k = 0; k < 3; ++k) sum[k] += c[k];
+    }
+  const double n = static_cast<double>(t.width) * t.height;
+  return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
+}
+
+// Keeps the first `keep` of `have` interleaved channels.
+template <class T>
+void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t keep) {
+  if (have == keep) return;
+  const std::size_t n = v.size() / have;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::uint32_t k = 0; k < keep; ++k) v[i * keep + k] = v[i * have + k];
+  v.resize(n * keep);
+  v.shrink_to_fit();
+}
+
+Result<void> check_texels(std::string_view name, Texels& t) {
+  for (std::size_t i = 0; i < t.f32.size(); ++i) {
+    float& v = t.f32[i];
+    if (!std::isfinite(v)) {
+      const std::size_t p = i / t.channels;
+      return fail(Errc::invalid_argument,
+                  fmt::format("texture '{}': the texel at x {}, y {} (from the top left) is {}; repair the image", name,
+                              p % t.width, p / t.width, std::isnan(v) ? "not a number" : "infinite"));
+    }
+    if (v < 0) {
+      v = 0;
+      ++t.clamped;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
+  const float u = fold(uv.x, wrap), v = fold(uv.y, wrap);
+  if (filter == TextureFilter::nearest) return texel(nearest(u, width), nearest(v, height));
+  const Span2 x = neighbours(u, width, wrap), y = neighbours(v, height, wrap);
+  const C3 top = texel(x.lo, y.lo) * (1 - x.t) + texel(x.hi, y.lo) * x.t;
+  const C3 bottom = texel(x.lo, y.hi) * (1 - x.t) + texel(x.hi, y.hi) * x.t;
+  return top * (1 - y.t) + bottom * y.t;
+}
+
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw) {
+  const std::uint64_t values = std::uint64_t{image.width} * image.height * image.channels;
+  if (values == 0 || image.channels > 4 || (image.u8.empty() ? image.f32.size() : image.u8.size()) != values)
+    return fail(Errc::invalid_argument, fmt::format("texture '{}' has no pixels", name));
+  const std::uint32_t keep = image.channels < 3 ? 1 : 3;
+  Texels t;
+  t.width = image.width;
+  t.height = image.height;
+  t.channels = keep;
+  const bool decode = image.srgb && !raw;
+  for (int i = 0; i < 256; ++i)
+    t.decode[i] = static_cast<float>(decode ? srgb_to_linear(i / 255.) : i / 255.);
+  t.u8 = std::move(image.u8);
+  t.f32 = std::move(image.f32);
+  drop_channels(t.u8, image.channels, keep);
+  drop_channels(t.f32, image.channels, keep);
+  if (auto ok = check_texels(name, t); !ok) return tl::unexpected(ok.error());
+  if (decode)
+    for (float& v : t.f32) v = static_cast<float>(srgb_to_linear(v));
+  t.mean = mean_of(t);
+  return t;
+}
+
+}  // namespace ls::render

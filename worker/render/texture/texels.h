@@ -1,0 +1,43 @@
+// The texels of one image, ready to look up: 8-bit codes stay 8 bits (a table decodes them before filtering), all else is
+// linear float32. Grey keeps one channel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "common/assets/data.h"
+#include "common/scene/scene.h"
+#include "worker/render/math.h"
+
+namespace ls::render {
+
+// IEC 61966-2-1; exactly 0 at 0 and 1 at 1.
+double srgb_to_linear(double v);
+
+struct Texels {
+  std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3
+  std::vector<std::uint8_t> u8;                       // one of the two
+  std::vector<float> f32;
+  std::array<float, 256> decode{};  // of u8
+  C3 mean{0, 0, 0};
+  std::uint64_t clamped = 0;  // negative values made 0
+
+  C3 texel(std::uint32_t x, std::uint32_t y) const {
+    const std::size_t i = (static_cast<std::size_t>(y) * width + x) * channels;
+    if (!u8.empty()) {
+      if (channels == 1) return C3(decode[u8[i]]);
+      return {decode[u8[i]], decode[u8[i + 1]], decode[u8[i + 2]]};
+    }
+    if (channels == 1) return C3(f32[i]);
+    return {f32[i], f32[i + 1], f32[i + 2]};
+  }
+  // uv finite, (0, 0) the upper left corner of the image.
+  C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
+};
+
+// Drops alpha, decodes sRGB unless raw, refuses NaN and infinity with the texel's place.
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw);
+
+}  // namespace ls::render

@@ -1,0 +1,160 @@
+#include "worker/render/texture/texture.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "common/base/overloaded.h"
+#include "worker/render/texture/texels.h"
+
+namespace ls::render {
+
+namespace {
+
+struct UvAffine {
+  float a = 1, b = 0, c = 0, d = 0, e = 1, f = 0;
+  // Not finite becomes 0: a lookup never sees NaN.
+  V2 operator()(const V2& uv) const {
+    const V2 p(a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f);
+    return {std::isfinite(p.x) ? p.x : 0, std::isfinite(p.y) ? p.y : 0};
+  }
+};
+
+Result<UvAffine> affine(const UvTransform& t) {
+  for (int i = 0; i < 6; ++i)
+    if (!std::isfinite(static_cast<float>(t.m[i])))
+      return fail(Errc::invalid_argument, "a texture's to_uv has an entry that is not finite");
+  const auto m = [&](int i) { return static_cast<float>(t.m[i]); };
+  return UvAffine{m(0), m(1), m(2), m(3), m(4), m(5)};
+}
+
+enum class Kind : std::uint8_t { constant, bitmap, checkerboard };
+
+struct Entry {
+  Kind kind = Kind::constant;
+  TextureFilter filter = TextureFilter::bilinear;
+  Wrap wrap = Wrap::repeat;
+  std::uint32_t first = 0, second = 0;  // texels, or the two textures of a checkerboard
+  C3 value{0, 0, 0};                    // of a constant; else the mean
+  UvAffine to_uv;
+};
+
+}  // namespace
+
+struct TextureTable::Data {
+  std::vector<Entry> entries;
+  std::vector<Texels> texels;
+  std::uint64_t clamped = 0;
+};
+
+namespace {
+
+using TexelsKey = std::pair<std::uint32_t, bool>;  // asset, raw
+
+Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
+                                  TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {
+  if (b.file.value >= scene.assets.size())
+    return fail(Errc::invalid_argument, fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
+  const TexelsKey key{b.file.value, b.raw};
+  if (const auto it = loaded.find(key); it != loaded.end()) return it->second;
+  const Asset& asset = scene.assets[b.file.value];
+  auto image = load(asset);
+  if (!image) return tl::unexpected(image.error());
+  auto texels = make_texels(asset.name, std::move(*image), b.raw);
+  if (!texels) return tl::unexpected(texels.error());
+  data.clamped += texels->clamped;
+  data.texels.push_back(std::move(*texels));
+  return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
+}
+
+// Means of checkerboards, children first. A chain of n takes n passes; one that never settles is a circle.
+Result<void> resolve_checkerboards(TextureTable::Data& data) {
+  std::vector<int> depth(data.entries.size(), 0);
+  for (int pass = 0; pass <= kMaxTextureDepth; ++pass) {
+    bool changed = false;
+    for (std::size_t i = 0; i < data.entries.size(); ++i) {
+      Entry& e = data.entries[i];
+      if (e.kind != Kind::checkerboard) continue;
+      e.value = (data.entries[e.first].value + data.entries[e.second].value) * .5f;
+      const int d = 1 + std::max(depth[e.first], depth[e.second]);
+      changed |= d != depth[i];
+      depth[i] = d;
+    }
+    if (!changed) return {};
+  }
+  return fail(Errc::invalid_argument,
+              fmt::format("checkerboard textures contain each other in a circle, or more than {} deep", kMaxTextureDepth));
+}
+
+const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv) {
+  while (e->kind == Kind::checkerboard) {
+    const V2 p = e->to_uv(uv);
+    const bool right = p.x - std::floor(p.x) > .5f, lower = p.y - std::floor(p.y) > .5f;
+    e = &data.entries[right == lower ? e->first : e->second];
+  }
+  return *e;
+}
+
+}  // namespace
+
+TextureTable::TextureTable() : data_(std::make_unique<Data>()) {}
+TextureTable::~TextureTable() = default;
+TextureTable::TextureTable(TextureTable&&) noexcept = default;
+TextureTable& TextureTable::operator=(TextureTable&&) noexcept = default;
+
+Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& load) {
+  TextureTable table;
+  Data& data = *table.data_;
+  std::map<TexelsKey, std::uint32_t> loaded;
+  const auto constant = [](const ConstantTexture& t) -> Result<Entry> {
+    Entry e;
+    e.value = {static_cast<float>(t.value[0]), static_cast<float>(t.value[1]), static_cast<float>(t.value[2])};
+    if (!is_finite(e.value)) return fail(Errc::invalid_argument, "a constant texture has a value that is not finite");
+    return e;
+  };
+  const auto bitmap = [&](const BitmapTexture& t) -> Result<Entry> {
+    const auto to_uv = affine(t.to_uv);
+    if (!to_uv) return tl::unexpected(to_uv.error());
+    const auto texels = load_texels(scene, t, load, data, loaded);
+    if (!texels) return tl::unexpected(texels.error());
+    return Entry{Kind::bitmap, t.filter, t.wrap, *texels, 0, data.texels[*texels].mean, *to_uv};
+  };
+  const auto checkerboard = [&](const CheckerboardTexture& t) -> Result<Entry> {
+    const auto to_uv = affine(t.to_uv);
+    if (!to_uv) return tl::unexpected(to_uv.error());
+    if (std::max(t.color0.value, t.color1.value) >= scene.textures.size())
+      return fail(Errc::invalid_argument, "a checkerboard names a texture that does not exist");
+    return Entry{Kind::checkerboard, {}, {}, t.color0.value, t.color1.value, {0, 0, 0}, *to_uv};
+  };
+  for (const Texture& t : scene.textures) {
+    auto entry = std::visit(overloaded{constant, bitmap, checkerboard}, t);
+    if (!entry) return tl::unexpected(entry.error());
+    data.entries.push_back(*entry);
+  }
+  if (auto ok = resolve_checkerboards(data); !ok) return tl::unexpected(ok.error());
+  return table;
+}
+
+C3 TextureTable::eval(TextureIndex i, V2 uv) const {
+  const Entry* e = &data_->entries[i.value];
+  if (e->kind == Kind::constant) return e->value;
+  const Entry& t = leaf(*data_, e, uv);
+  return t.kind == Kind::constant ? t.value : data_->texels[t.first].lookup(t.to_uv(uv), t.filter, t.wrap);
+}
+
+bool TextureTable::is_constant(TextureIndex i) const { return data_->entries[i.value].kind == Kind::constant; }
+C3 TextureTable::constant(TextureIndex i) const { return data_->entries[i.value].value; }
+C3 TextureTable::mean(TextureIndex i) const { return data_->entries[i.value].value; }
+std::size_t TextureTable::size() const { return data_->entries.size(); }
+std::uint64_t TextureTable::clamped_texels() const { return data_->clamped; }
+
+std::uint64_t TextureTable::bytes() const {
+  std::uint64_t n = 0;
+  for (const Texels& t : data_->texels) n += t.u8.size() + t.f32.size() * sizeof(float);
+  return n;
+}
+
+}  // namespace ls::render
