@@ -1,0 +1,69 @@
+// Fixed answers of a coordinator, for the storybook and its tests. The shapes are those of the HTTP interface.
+
+const kNow = 1765000000; // unix seconds
+
+const job = (id, name, state, more = {}) => ({
+  id, name, state, stopped: "", progress: 0, spp: 512, spp_done: 0, rmse: null, relmse: null, relmse_ci95: null, target_error: null,
+  eta_seconds: null, error: "", warnings: [], size: [640, 360], tile: 32, priority: 0, units_done: 0, units_total: 2880,
+  elapsed_seconds: 0, core_seconds: 0, submitted_unix: kNow, health: { nonfinite: 0, negative: 0, majorant_violations: 0 }, ...more,
+});
+
+const half = {
+  progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252,
+  units_done: 1240, elapsed_seconds: 187, core_seconds: 742,
+};
+
+export const jobs = [
+  job("j-7f3a91c2", "steam-bath.xml", "running", { ...half, submitted_unix: kNow - 240 }),
+  job("j-a04be6d1", "shafts.xml", "running", { progress: 0.071, spp_done: 36, relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], eta_seconds: 4310, submitted_unix: kNow - 900, size: [1920, 1080] }),
+  job("j-22c81f09", "cloud.xml", "paused", { progress: 0.31, spp_done: 158.7, relmse: 0.000072, relmse_ci95: [0.000069, 0.000076], submitted_unix: kNow - 1500 }),
+  job("j-5be0d7aa", "tint.xml", "queued", { spp: 4096, submitted_unix: kNow - 20 }),
+  job("j-91d2c3f4", "fogbox.xml", "done", { progress: 1, spp_done: 512, spp: 512, stopped: "error", rmse: 0.0152, relmse: 0.00098, relmse_ci95: [0.00094, 0.00102], target_error: 0.001, units_done: 2880, elapsed_seconds: 423, core_seconds: 1684, submitted_unix: kNow - 5400 }),
+  job("j-c6e8b510", "forge-v12.xml", "failed", {
+    progress: 0.02, spp_done: 10, submitted_unix: kNow - 7200, elapsed_seconds: 6, core_seconds: 9,
+    error: "unit (tile 37, round 3) ended the renderer with SIGSEGV on 3 workers (lab-01, lab-02, lab-04),\nat pixel 412,96, sample 11. The job was stopped.\nReplay it: lightshaft render forge-v12.xml --pixel 412,96 --sample 11",
+  }),
+  job("j-0a4417bb", "spotfog.xml", "cancelled", { progress: 0.55, spp_done: 281, relmse: 0.0021, relmse_ci95: [0.0019, 0.0023], submitted_unix: kNow - 90000, elapsed_seconds: 99 }),
+];
+
+export const unhealthy = job("j-7f3a91c2", "steam-bath.xml", "running", {
+  ...half, submitted_unix: kNow - 240, health: { nonfinite: 3, negative: 0, majorant_violations: 1204 },
+  warnings: ["steam-bath.xml:31:9: warning: 'strict_normals' means nothing here and is ignored", "steam-bath.xml:52:5: warning: 37 voxels of \"steam\" were negative and became 0"],
+});
+
+const tileRect = (tile) => {
+  const [x, y] = [(tile % 20) * 32, Math.floor(tile / 20) * 32];
+  return [x, y, x + 32, Math.min(y + 32, 360)];
+};
+export const tiles = [[103, "lab-01"], [104, "lab-01"], [105, "lab-02"], [106, "lab-03"], [107, "lab-03"], [109, "attic"]].map(([tile, name]) => ({
+  tile, rect: tileRect(tile), rounds: 6, spp: 128, workers: [name],
+}));
+export const foldedTile = (tile, worker) => ({ job: "j-7f3a91c2", tile, rect: tileRect(tile), state: "folded", spp: 192, worker });
+
+const worker = (id, name, more = {}) => ({
+  id, name, build: "lightshaft 0.1.0", numeric_class: "9c41f0aa27d3b85e", threads: 8, tags: [], state: "connected", activity: "rendering tile 104, round 6",
+  job: "j-7f3a91c2", units_done: 341, cpu_seconds: 1480, rss_bytes: 412 * 2 ** 20, last_seen_seconds: 0.4, ...more,
+});
+export const workers = [
+  worker("w-1", "lab-01", { tags: ["avx512", "lab"] }),
+  worker("w-2", "lab-02", { activity: "rendering tile 105, round 6", units_done: 338, tags: ["lab"] }),
+  worker("w-3", "lab-03", { activity: "fetching steam.vdb (61 MiB)", threads: 16, units_done: 702, cpu_seconds: 3012, rss_bytes: 1.3 * 2 ** 30 }),
+  worker("w-4", "attic", { numeric_class: "02be77c19d40e3f6", threads: 4, activity: "rendering tile 12, round 2", job: "j-a04be6d1", units_done: 90, cpu_seconds: 655 }),
+  worker("w-5", "lab-04", { state: "lost", activity: "", job: "", units_done: 17, cpu_seconds: 70, rss_bytes: null, last_seen_seconds: 372 }),
+];
+
+// Error falls as 1/time, with the scatter of a real run; [seconds, relative scatter].
+const kRun = [[0.9, 1.06], [1.8, 0.97], [3.6, 1.03], [7.1, 1.01], [14.4, 0.985], [28.6, 1.02], [57.8, 0.99], [116, 1.01], [187, 1]];
+export const report = {
+  convergence: kRun.map(([seconds, scatter]) => {
+    const relmse = (0.00418 * 187 * scatter) / seconds;
+    const spread = 0.07 + 0.35 / Math.sqrt(seconds + 1);
+    return { seconds, core_seconds: seconds * 3.97, spp: Math.max(2, 1.147 * seconds), rmse: Math.sqrt(relmse) * 0.48, relmse, relmse_ci95: [relmse / (1 + spread), relmse * (1 + spread)] };
+  }),
+};
+
+export const diagnostics = [
+  { severity: "error", file: "bath.xml", line: 14, column: 16, text: "medium \"grid\" has no parameter 'sigmat'; did you mean 'sigma_t'?", source_line: "    <float name=\"sigmat\" value=\"2\"/>", length: 13 },
+  { severity: "error", file: "bath.xml", line: 22, column: 5, text: "no medium has the id \"steem\"; defined here: \"steam\" (line 9)", source_line: "    <ref name=\"interior\" id=\"steem\"/>", length: 4 },
+  { severity: "warning", file: "bath.xml", line: 31, column: 9, text: "'strict_normals' means nothing here and is ignored", source_line: "", length: 1 },
+];

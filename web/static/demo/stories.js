@@ -1,0 +1,58 @@
+// The views as the storybook shows them: a name -> a state. Made through the same functions as the live page.
+import * as data from "./data.js";
+import { initialState, openJob, withEvent, withJobs, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
+
+const signedIn = (route = { view: "jobs", id: null }) => ({ ...initialState(), session: "in", link: "live", route });
+const farm = (route) => withWorkers(withJobs(signedIn(route), data.jobs), data.workers);
+
+function jobPage(id, more = {}, jobs = data.jobs) {
+  const state = withWorkers(withJobs(signedIn({ view: "job", id }), jobs), data.workers);
+  return withOpen({ ...state, open: openJob(id) }, { report: data.report, ...more });
+}
+
+function rendering() {
+  const state = withTiles(jobPage("j-7f3a91c2"), data.tiles);
+  return withEvent(withEvent(state, "tile", data.foldedTile(101, "lab-02")), "tile", data.foldedTile(102, "lab-01"));
+}
+
+const file = (path, bytes) => ({ path, file: { name: path.split("/").pop(), size: bytes } });
+const kFiles = [file("bath/bath.xml", 6120), file("bath/meshes/tub.obj", 812400), file("bath/steam.vdb", 61.4 * 2 ** 20), file("bath/notes.txt", 900)];
+const kPlan = {
+  main: kFiles[0].file, missing: [], unused: ["bath/notes.txt"],
+  assets: [{ name: "meshes/tub.obj", file: kFiles[1].file }, { name: "steam.vdb", file: kFiles[2].file }],
+};
+const submitting = (more) => withSubmit(farm({ view: "submit", id: null }), { files: kFiles, main: "bath/bath.xml", plan: kPlan, ...more });
+
+const kMarkup = "<img src=x onerror=\"document.title='stolen'\"><b>bold</b>";
+function hostile(view) {
+  const nasty = { ...data.jobs[0], id: "j-1\"><script>", name: kMarkup, error: kMarkup, warnings: [kMarkup], state: "failed" };
+  const workers = [{ ...data.workers[0], name: kMarkup, activity: kMarkup, tags: [kMarkup], job: "j\" onclick=\"x" }];
+  const state = withWorkers(withJobs(signedIn({ view, id: nasty.id }), [nasty]), workers);
+  return withSubmit({ ...state, open: openJob(nasty.id) }, { error: { message: kMarkup, diagnostics: [{ ...data.diagnostics[0], text: kMarkup, source_line: kMarkup, file: kMarkup }] } });
+}
+
+export const stories = {
+  signin: () => ({ ...initialState(), session: "out" }),
+  "signin-refused": () => withUi({ ...initialState(), session: "out" }, { signInError: "This token is not known here." }),
+  "jobs-empty": () => withWorkers(withJobs(signedIn(), []), []),
+  jobs: () => farm(),
+  "jobs-confirm": () => withUi(farm(), { confirming: "j-7f3a91c2" }),
+  "jobs-lost": () => withUi({ ...farm(), link: "lost" }, { notice: "The coordinator does not answer. Is it still running, and is this machine on its network?" }),
+  job: rendering,
+  "job-queued": () => jobPage("j-5be0d7aa", { report: null }),
+  "job-done": () => jobPage("j-91d2c3f4"),
+  "job-failed": () => jobPage("j-c6e8b510", { report: null }),
+  "job-unhealthy": () => withTiles(jobPage("j-7f3a91c2", {}, [data.unhealthy]), data.tiles),
+  "job-unknown": () => ({ ...farm({ view: "job", id: "nope" }), open: { ...openJob("nope"), problem: "There is no job \"nope\"." } }),
+  workers: () => farm({ view: "workers", id: null }),
+  "workers-empty": () => withWorkers(withJobs(signedIn({ view: "workers", id: null }), []), []),
+  submit: () => farm({ view: "submit", id: null }),
+  "submit-ready": () => submitting({}),
+  "submit-missing": () => submitting({ plan: { ...kPlan, missing: ["textures/tiles.png"] } }),
+  "submit-sending": () => submitting({ phase: "sending", step: "Sending steam.vdb", progress: 0.37 }),
+  "submit-refused": () => submitting({ phase: "refused", error: { message: "The scene was refused.", diagnostics: data.diagnostics } }),
+  "hostile-jobs": () => hostile("jobs"),
+  "hostile-job": () => hostile("job"),
+  "hostile-workers": () => hostile("workers"),
+  "hostile-submit": () => hostile("submit"),
+};

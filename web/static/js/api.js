@@ -1,0 +1,63 @@
+// The one way to the coordinator's HTTP interface. Every failure becomes an ApiError whose message is for a person.
+
+const kBase = "/api/v1";
+
+export class ApiError extends Error {
+  /** status 0: no answer at all. diagnostics: of a refused scene, [{severity, file, line, column, text, source_line, length}]. */
+  constructor(status, message, diagnostics = []) {
+    super(message);
+    this.status = status;
+    this.diagnostics = diagnostics;
+  }
+}
+
+async function call(method, path, { headers, body, signal } = {}) {
+  let response;
+  try {
+    response = await fetch(kBase + path, { method, headers, body, signal, credentials: "same-origin", cache: "no-store" });
+  } catch (cause) {
+    if (cause.name === "AbortError") throw cause;
+    throw new ApiError(0, "The coordinator does not answer. Is it still running, and is this machine on its network?");
+  }
+  if (!response.ok) throw await errorOf(response);
+  return response;
+}
+
+async function errorOf(response) {
+  const type = response.headers.get("Content-Type") ?? "";
+  if (type.includes("json")) {
+    const problem = await response.json().catch(() => ({}));
+    const message = problem.detail || problem.title;
+    const diagnostics = Array.isArray(problem.diagnostics) ? problem.diagnostics : [];
+    if (message || diagnostics.length) return new ApiError(response.status, message ?? "The scene was refused.", diagnostics);
+  }
+  return new ApiError(response.status, `The coordinator answered ${response.status} ${response.statusText}`.trim() + ".");
+}
+
+const json = (value) => ({ headers: { "Content-Type": "application/json" }, body: JSON.stringify(value) });
+const jobPath = (id) => `/jobs/${encodeURIComponent(id)}`;
+
+export const api = {
+  signIn: (token) => call("POST", "/session", { headers: { Authorization: `Bearer ${token}` } }),
+  signOut: () => call("DELETE", "/session"),
+  jobs: async () => (await (await call("GET", "/jobs")).json()).jobs,
+  job: async (id) => (await call("GET", jobPath(id))).json(),
+  tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
+  report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
+  workers: async () => (await (await call("GET", "/workers")).json()).workers,
+  setState: (id, state) => call("PATCH", jobPath(id), json({ state })),
+  image: async (id, exposure, signal) =>
+    createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?exposure=${exposure}`, { signal })).blob()),
+  missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,
+  putBlob: (digest, body) =>
+    call("PUT", `/blobs/${digest}`, { headers: { "Content-Type": "application/octet-stream" }, body }),
+  submit: async (request) => (await call("POST", "/jobs", json(request))).json(),
+};
+
+/** Addresses of files that the browser downloads by itself. */
+export const downloads = {
+  exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
+  report: (id) => `${kBase}${jobPath(id)}/report`,
+  csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,
+  log: (id) => `${kBase}${jobPath(id)}/log`,
+};

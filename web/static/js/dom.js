@@ -1,0 +1,100 @@
+// A view is a function of state that returns a tree of h(...) nodes; patch() makes the page look like it, touching only
+// what changed, so focus, scroll position and running animations survive. Text is only ever a text node: nothing here
+// parses markup.
+
+const kSvg = "http://www.w3.org/2000/svg";
+
+/**
+ * h("a", {href, class, key, onclick, style: {"--x": 1}, ".prop": value}, ...children)
+ * `onname` are listeners, `.name` are properties of the element, `style` goes through the CSSOM (the page's policy
+ * forbids style attributes), true is an empty attribute, and null, undefined and false leave an attribute out.
+ */
+export function h(tag, attributes, ...children) {
+  const { key = null, ...rest } = attributes ?? {};
+  return { tag, key, attributes: rest, children: normalise(children) };
+}
+
+function normalise(children) {
+  return children
+    .flat(Infinity)
+    .filter((child) => child !== null && child !== undefined && child !== false && child !== true)
+    .map((child) => (typeof child === "object" ? child : { tag: null, key: null, text: String(child) }));
+}
+
+const nodeOf = new WeakMap(); // element -> the h() node it shows
+
+/** Makes the children of `parent` look like `nodes`. */
+export function patch(parent, ...nodes) {
+  patchChildren(parent, normalise(nodes));
+}
+
+function patchChildren(parent, nodes) {
+  const { keyed, loose } = reusable(parent);
+  const takeLoose = (node) => {
+    const at = loose.findIndex((element) => nodeOf.get(element)?.tag === node.tag);
+    return at < 0 ? undefined : loose.splice(at, 1)[0];
+  };
+  nodes.forEach((node, i) => {
+    const old = node.key === null ? takeLoose(node) : takeKeyed(keyed, node);
+    const element = old ?? create(node, parent);
+    if (old) update(element, nodeOf.get(element), node);
+    nodeOf.set(element, node);
+    if (parent.childNodes[i] !== element) parent.insertBefore(element, parent.childNodes[i] ?? null);
+  });
+  while (parent.childNodes.length > nodes.length) parent.lastChild.remove();
+}
+
+function reusable(parent) {
+  const keyed = new Map();
+  const loose = [];
+  for (const child of parent.childNodes) {
+    const node = nodeOf.get(child);
+    if (node && node.key !== null) keyed.set(node.key, child);
+    else if (node) loose.push(child);
+  }
+  return { keyed, loose };
+}
+
+function takeKeyed(keyed, node) {
+  const element = keyed.get(node.key);
+  if (!element || nodeOf.get(element).tag !== node.tag) return undefined;
+  keyed.delete(node.key);
+  return element;
+}
+
+function create(node, parent) {
+  if (node.tag === null) return document.createTextNode(node.text);
+  const inSvg = node.tag === "svg" || (parent.namespaceURI === kSvg && parent.localName !== "foreignObject");
+  const element = inSvg ? document.createElementNS(kSvg, node.tag) : document.createElement(node.tag);
+  update(element, null, node);
+  return element;
+}
+
+function update(element, old, node) {
+  if (node.tag === null) {
+    if (old.text !== node.text) element.data = node.text;
+    return;
+  }
+  const before = old?.attributes ?? {};
+  for (const name of Object.keys(before)) if (!(name in node.attributes)) assign(element, name, null, before[name]);
+  for (const [name, value] of Object.entries(node.attributes)) {
+    if (before[name] !== value) assign(element, name, value, before[name]);
+  }
+  patchChildren(element, node.children);
+}
+
+function assign(element, name, value, before) {
+  if (name.startsWith("on")) {
+    if (before) element.removeEventListener(name.slice(2), before);
+    if (value) element.addEventListener(name.slice(2), value);
+  } else if (name.startsWith(".")) {
+    element[name.slice(1)] = value;
+  } else if (name === "style") {
+    for (const property of Object.keys(before ?? {})) if (!(property in (value ?? {}))) element.style.removeProperty(property);
+    for (const [property, text] of Object.entries(value ?? {})) element.style.setProperty(property, String(text));
+  } else if (value === null || value === undefined || value === false) {
+    element.removeAttribute(name);
+  } else {
+    element.setAttribute(name, value === true ? "" : String(value));
+  }
+}

@@ -1,0 +1,80 @@
+// <live-image>: paints what `source(exposure, signal)` gives (an ImageBitmap or canvas), again whenever `version` or
+// `exposure` changes, with at most one request under way and a pause that grows with the request's cost. A new exposure
+// shows at once, approximated by brightness, until the coordinator's own picture arrives.
+
+const kShortestPauseMs = 400;
+const kPausePerCost = 3; // a picture that took 1 s is not asked for again within 3 s
+
+class LiveImage extends HTMLElement {
+  #canvas = document.createElement("canvas");
+  #values = { source: null, version: null, exposure: 0, size: 0 };
+  #shown = null; // {version, exposure} of the picture on the canvas
+  #request = null; // AbortController of the request under way
+  #timer = 0;
+  #notBefore = 0; // performance.now()
+
+  connectedCallback() {
+    this.append(this.#canvas);
+    this.#schedule();
+  }
+
+  disconnectedCallback() {
+    clearTimeout(this.#timer);
+    this.#request?.abort();
+  }
+
+  set source(source) { this.#values.source = source; this.#schedule(); }
+  set version(version) { this.#values.version = version; this.#schedule(); }
+  set size(size) { // width * 65536 + height, one number so that equal sizes compare equal
+    this.#canvas.width = Math.floor(size / 65536);
+    this.#canvas.height = size % 65536;
+  }
+  set exposure(exposure) {
+    this.#values.exposure = exposure;
+    this.#preview();
+    this.#notBefore = Math.min(this.#notBefore, performance.now() + 120);
+    this.#schedule();
+  }
+
+  /** Stops change the linear value by 2; the eye's curve (2.2) makes that 2^(1/2.2) in what brightness() multiplies. */
+  #preview() {
+    const difference = this.#values.exposure - (this.#shown?.exposure ?? this.#values.exposure);
+    this.#canvas.style.filter = difference ? `brightness(${2 ** (difference / 2.2)})` : "";
+  }
+
+  #schedule() {
+    clearTimeout(this.#timer);
+    if (!this.isConnected || !this.#values.source || this.#request) return;
+    const { version, exposure } = this.#values;
+    if (this.#shown?.version === version && this.#shown.exposure === exposure) return;
+    this.#timer = setTimeout(() => this.#fetch(), Math.max(0, this.#notBefore - performance.now()));
+  }
+
+  async #fetch() {
+    const { source, version, exposure } = this.#values;
+    const began = performance.now();
+    this.#request = new AbortController();
+    try {
+      this.#paint(await source(exposure, this.#request.signal));
+      this.dataset.painted = String(Number(this.dataset.painted ?? 0) + 1);
+    } catch {
+      // Nothing folded yet, or a hiccup: the last picture stays, and the next change asks again. The page's own
+      // status says when the coordinator is away.
+    }
+    this.#shown = { version, exposure };
+    this.#request = null;
+    this.#preview();
+    this.#notBefore = performance.now() + Math.max(kShortestPauseMs, kPausePerCost * (performance.now() - began));
+    this.#schedule();
+  }
+
+  #paint(picture) {
+    this.#canvas.width = picture.width;
+    this.#canvas.height = picture.height;
+    this.#canvas.getContext("2d").drawImage(picture, 0, 0);
+    picture.close?.();
+    this.classList.toggle("small", picture.width * 2 <= this.clientWidth);
+  }
+}
+
+customElements.define("live-image", LiveImage);

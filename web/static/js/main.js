@@ -1,0 +1,158 @@
+// Wires the page: one state, the actions that change it, the routes, the event stream.
+import "./live_image.js";
+import { api } from "./api.js";
+import { patch } from "./dom.js";
+import { openEvents } from "./events.js";
+import { routeOf, takeToken } from "./route.js";
+import { makeJobActions } from "./job_actions.js";
+import { makeSubmitActions } from "./submit_actions.js";
+import { jobName } from "./format.js";
+import { initialState, openJob, withEvent, withJob, withJobs, withOpen, withTiles, withUi, withWorkers } from "./state.js";
+import { page } from "./views/shell.js";
+
+const kReportPauseMs = 2000;
+
+let state = initialState();
+let drawing = false;
+let closeEvents = null;
+let reportTimer = 0;
+
+function set(next) {
+  state = next;
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(draw);
+}
+
+function draw() {
+  drawing = false;
+  patch(document.getElementById("app"), ...page(state, actions));
+  const job = state.route.view === "job" ? state.jobs?.get(state.route.id) : null;
+  document.title = state.session === "out" ? "Lightshaft" : `${job ? jobName(job) : { workers: "Workers", submit: "New job" }[state.route.view] ?? "Jobs"} · Lightshaft`;
+}
+
+/** Runs a request; a lost session leads to the sign-in view, any other failure to a notice. Returns undefined then. */
+async function attempt(request) {
+  try {
+    return await request();
+  } catch (error) {
+    if (error.status === 401) signedOut();
+    else set(withUi(state, { notice: error.message }));
+    return undefined;
+  }
+}
+
+// ---- session ----
+
+async function start() {
+  const token = takeToken(window.location, window.history);
+  set({ ...state, route: routeOf(window.location.hash) });
+  if (token) await signIn(token);
+  else await enter();
+}
+
+async function signIn(token) {
+  set(withUi(state, { signingIn: true, signInError: null }));
+  try {
+    await api.signIn(token);
+    await enter();
+  } catch (error) {
+    signedOut(error.status === 401 || error.status === 403 ? "This token is not known here." : error.message);
+  }
+  set(withUi(state, { signingIn: false }));
+}
+
+async function enter() {
+  const jobs = await attempt(api.jobs);
+  if (!jobs) {
+    if (state.session === "unknown") setTimeout(enter, kReportPauseMs);
+    return;
+  }
+  set(withUi({ ...withJobs(state, jobs), session: "in" }, { signInError: null, notice: null }));
+  closeEvents ??= openEvents({ onOpen, onLost, onEvent });
+  showRoute();
+}
+
+function signedOut(message = null) {
+  closeEvents?.();
+  closeEvents = null;
+  set(withUi({ ...initialState(), route: state.route, session: "out" }, { signInError: message }));
+}
+
+// ---- events ----
+
+async function onOpen() {
+  set({ ...state, link: "live" });
+  const [jobs, workers] = await Promise.all([attempt(api.jobs), attempt(api.workers)]);
+  if (jobs) set(withJobs(state, jobs));
+  if (workers) set(withWorkers(state, workers));
+  await refreshOpen();
+}
+
+function onLost(closed) {
+  set({ ...state, link: "lost" });
+  if (closed) api.workers().catch((error) => (error.status === 401 ? signedOut() : null)); // a stream can't say why
+}
+
+function onEvent(type, data) {
+  set(withEvent(state, type, data));
+  if (type === "job" && data.id === state.open?.id && !reportTimer) {
+    reportTimer = setTimeout(refreshReport, kReportPauseMs);
+  }
+}
+
+async function refreshReport() {
+  reportTimer = 0;
+  const id = state.open?.id;
+  if (!id) return;
+  const report = await api.report(id).catch(() => null); // none before the first checkpoint
+  if (report && state.open?.id === id) set(withOpen(state, { report }));
+}
+
+async function refreshOpen() {
+  const id = state.open?.id;
+  if (!id) return;
+  try {
+    const [job, tiles] = await Promise.all([api.job(id), api.tiles(id)]);
+    if (state.open?.id !== id) return;
+    set(withTiles(withJob(state, job), tiles));
+    set(withOpen(state, { folds: state.open.folds + 1, problem: null }));
+    await refreshReport();
+  } catch (error) {
+    if (error.status === 401) signedOut();
+    else set(withOpen(state, { problem: error.message }));
+  }
+}
+
+// ---- routes ----
+
+function showRoute() {
+  const route = routeOf(window.location.hash);
+  const moved = route.view !== state.route.view || route.id !== state.route.id;
+  const open = route.view !== "job" ? null : state.open?.id === route.id ? state.open : openJob(route.id);
+  const fresh = open && open !== state.open;
+  set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null } : {}));
+  if (moved) window.scrollTo(0, 0);
+  if (fresh && state.session === "in") refreshOpen();
+}
+window.addEventListener("hashchange", () => {
+  const token = takeToken(window.location, window.history);
+  if (token) signIn(token);
+  else showRoute();
+});
+
+// ---- actions ----
+
+const seam = { get: () => state, set, attempt, api };
+const actions = {
+  signIn,
+  signOut: async () => {
+    await attempt(api.signOut);
+    signedOut();
+  },
+  dismiss: () => set(withUi(state, { notice: null })),
+  ...makeJobActions(seam),
+  ...makeSubmitActions(seam),
+};
+
+start();

@@ -1,0 +1,132 @@
+// Everything the page knows, as one value, and how it changes: pure functions (state, what happened) -> state.
+
+const kFlashes = 48; // folded tiles that still glow
+export const kPalette = 10; // worker colours in css/tokens.css
+
+export function initialState() {
+  return {
+    session: "unknown", // "in", "out"
+    link: "connecting", // "live", "lost"
+    route: { view: "jobs", id: null },
+    jobs: null, // Map id -> job JSON; null: not known yet
+    workers: null, // Map id -> worker JSON
+    colours: new Map(), // worker name -> index into the palette, in order of appearance
+    open: null, // what belongs to the one job that is shown, see openJob()
+    submit: emptySubmission(),
+    ui: { confirming: null, busy: null, notice: null, signInError: null, signingIn: false },
+  };
+}
+
+export const emptySubmission = () => ({
+  files: [], // {path, file}
+  main: null, // path of the scene
+  plan: null, // of bundle.js
+  phase: "choose", // "hashing", "sending", "refused"
+  progress: 0,
+  step: "",
+  error: null, // {message, diagnostics}
+  settings: { spp: "", target_error: "", time: "", width: "", height: "" },
+});
+
+export const openJob = (id) => ({
+  id,
+  report: null,
+  tiles: new Map(), // tile -> {rect, spp, workers} of the tiles in flight
+  flashes: [], // {key, rect, worker} of tiles folded lately
+  folds: 0, // grows with every fold: the image has changed
+  exposure: 0,
+  showTiles: true,
+  picked: null, // point of the plot under the pointer
+  problem: null, // why it can't be shown
+});
+
+export const withUi = (state, ui) => ({ ...state, ui: { ...state.ui, ...ui } });
+export const withOpen = (state, open) => (state.open ? { ...state, open: { ...state.open, ...open } } : state);
+export const withSubmit = (state, submit) => ({ ...state, submit: { ...state.submit, ...submit } });
+
+export function withJobs(state, jobs) {
+  return { ...state, jobs: new Map(jobs.map((job) => [job.id, job])) };
+}
+
+export function withWorkers(state, workers) {
+  const names = workers.map((worker) => worker.name).sort();
+  return { ...state, workers: new Map(workers.map((worker) => [worker.id, worker])), colours: coloured(state.colours, names) };
+}
+
+export function withTiles(state, tiles) {
+  if (!state.open) return state;
+  const flying = tiles.filter((tile) => tile.workers.length > 0);
+  const next = withOpen(state, { tiles: new Map(flying.map((tile) => [tile.tile, tile])) });
+  return { ...next, colours: coloured(state.colours, flying.flatMap((tile) => tile.workers)) };
+}
+
+function coloured(colours, names) {
+  const fresh = names.filter((name) => !colours.has(name));
+  if (fresh.length === 0) return colours;
+  const next = new Map(colours);
+  for (const name of fresh) if (!next.has(name)) next.set(name, next.size % kPalette);
+  return next;
+}
+
+/** An event of the stream. */
+export function withEvent(state, type, data) {
+  if (type === "job") return withJob(state, data);
+  if (type === "worker") return withWorker(state, data);
+  if (type === "tile" && state.open?.id === data.job) return withTile(state, data);
+  return state;
+}
+
+export function withJob(state, job) {
+  const jobs = new Map(state.jobs ?? []);
+  jobs.set(job.id, job);
+  const next = { ...state, jobs };
+  const over = state.open?.id === job.id && isOver(job);
+  return over ? withOpen(next, { tiles: new Map(), folds: state.open.folds + 1 }) : next;
+}
+
+function withWorker(state, worker) {
+  const workers = new Map(state.workers ?? []);
+  if (worker.state === "gone") workers.delete(worker.id);
+  else workers.set(worker.id, worker);
+  return { ...state, workers, colours: worker.name ? coloured(state.colours, [worker.name]) : state.colours };
+}
+
+function withTile(state, { tile, rect, state: what, spp, worker }) {
+  const open = state.open;
+  const tiles = new Map(open.tiles);
+  const before = tiles.get(tile);
+  const others = (before?.workers ?? []).filter((name) => name !== worker);
+  const workers = what === "leased" && worker ? [...others, worker] : worker ? others : [];
+  if (workers.length > 0) tiles.set(tile, { tile, rect, spp, workers });
+  else tiles.delete(tile);
+  const change = { tiles };
+  if (what === "folded") {
+    change.folds = open.folds + 1;
+    change.flashes = [...open.flashes, { key: open.folds, rect, worker }].slice(-kFlashes);
+  }
+  return { ...withOpen(state, change), colours: worker ? coloured(state.colours, [worker]) : state.colours };
+}
+
+// ---- what views ask ----
+
+const kOver = new Set(["done", "failed", "cancelled"]);
+export const isOver = (job) => kOver.has(job.state);
+export const colourOf = (state, worker) => state.colours.get(worker) ?? 0;
+
+/** Running first, then waiting, then what is over; the newest first within each. */
+export function jobsInOrder(state) {
+  const rank = { running: 0, paused: 1, queued: 2 };
+  return [...(state.jobs?.values() ?? [])].sort(
+    (a, b) => (rank[a.state] ?? 3) - (rank[b.state] ?? 3) || b.submitted_unix - a.submitted_unix || (a.id < b.id ? -1 : 1));
+}
+
+/** Sentences about figures that should be zero and are not. */
+export function healthComplaints(job) {
+  const health = job.health ?? {};
+  const say = (n, text) => (n > 0 ? [`${n.toLocaleString("en")} ${text}`] : []);
+  return [
+    ...say(health.nonfinite, "samples were not finite; they count as black"),
+    ...say(health.negative, "samples were negative"),
+    ...say(health.majorant_violations, "times the medium was denser than its bound, so the image may be biased"),
+  ];
+}

@@ -1,0 +1,56 @@
+// Sending a job: name every file by its SHA-256, ask which the coordinator lacks, send those, then the job.
+import { sha256 } from "./sha256.js";
+
+/** The `spec` of the contract from the form's texts; empty fields are left to the scene. Throws with a message for people. */
+export function specOf({ spp, target_error, time, width, height }) {
+  const spec = {};
+  if (spp) spec.spp = positive(spp, "Samples per pixel", true);
+  if (target_error) spec.target_error = positive(target_error, "Target error", false);
+  if (time) spec.time = positive(time, "Time limit", false);
+  if (Boolean(width) !== Boolean(height)) throw new Error("Give both width and height, or neither.");
+  if (width) spec.size = [positive(width, "Width", true), positive(height, "Height", true)];
+  return spec;
+}
+
+function positive(text, what, whole) {
+  const x = Number(text);
+  if (!(x > 0) || !Number.isFinite(x) || (whole && !Number.isInteger(x))) {
+    throw new Error(`${what} must be a positive ${whole ? "whole number" : "number"}, not “${text}”.`);
+  }
+  return x;
+}
+
+/** plan: of bundle.js. onStep({phase, step, progress}) tells how far it is, progress in 0..1 of the phase. Returns the job's id. */
+export async function submitJob(api, plan, settings, onStep) {
+  const spec = specOf(settings);
+  const files = [{ name: null, file: plan.main }, ...plan.assets];
+  const digests = await digestAll(files, onStep);
+  const missing = new Set(await api.missingBlobs([...new Set(digests)]));
+  await sendAll(api, files, digests, missing, onStep);
+  const assets = Object.fromEntries(plan.assets.map(({ name }, i) => [name, digests[i + 1]]));
+  onStep({ phase: "sending", step: "Handing in the job", progress: 1 });
+  return (await api.submit({ name: plan.main.name, scene: digests[0], assets, spec })).id;
+}
+
+async function digestAll(files, onStep) {
+  const total = files.reduce((sum, { file }) => sum + file.size, 0) || 1;
+  const digests = [];
+  let before = 0;
+  for (const { file } of files) {
+    const done = before;
+    digests.push(await sha256(file, (n) => onStep({ phase: "hashing", step: `Reading ${file.name}`, progress: (done + n) / total })));
+    before += file.size;
+  }
+  return digests;
+}
+
+async function sendAll(api, files, digests, missing, onStep) {
+  const toSend = files.filter((_, i) => missing.has(digests[i]) && digests.indexOf(digests[i]) === i);
+  const total = toSend.reduce((sum, { file }) => sum + file.size, 0) || 1;
+  let sent = 0;
+  for (const { file } of toSend) {
+    onStep({ phase: "sending", step: `Sending ${file.name}`, progress: sent / total });
+    await api.putBlob(digests[files.findIndex((entry) => entry.file === file)], file);
+    sent += file.size;
+  }
+}

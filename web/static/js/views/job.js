@@ -1,0 +1,63 @@
+// One job: its image as it fills in, how wrong that image still is, and who is at work on it.
+import { h } from "../dom.js";
+import { healthComplaints, isOver } from "../state.js";
+import { duration, jobName, moment, percent } from "../format.js";
+import { downloads } from "../api.js";
+import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
+import { imagePanel } from "./job_image.js";
+import { figures, inFlight } from "./job_figures.js";
+import { errorPlot } from "./plot.js";
+
+const kStopped = { spp: "all its samples are in", error: "the target error is reached", time: "its time was up", user: "someone stopped it" };
+
+export function jobView(state, actions) {
+  const job = state.jobs?.get(state.route.id);
+  if (state.open?.problem && !job) return notice("bad", "This job can't be shown", h("p", null, state.open.problem), h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
+  if (!job || !state.open) return h("p", { class: "waiting", key: "waiting" }, "Fetching the job …");
+  return h("article", { key: job.id, class: "job" },
+    heading(state, job, actions),
+    alerts(job),
+    h("div", { class: "columns" },
+      h("div", { class: "picture" }, imagePanel(state, job, actions), downloadLinks(job)),
+      h("div", { class: "facts" },
+        figures(job),
+        h("section", { class: "panel" }, h("h2", null, "Error against time"),
+          errorPlot({ convergence: state.open.report?.convergence, target: job.target_error ?? state.open.report?.target_error ?? null, picked: state.open.picked, onPick: actions.pick })),
+        inFlight(state, job))));
+}
+
+function heading(state, job, actions) {
+  return h("div", { class: "job-head" },
+    h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id)),
+    h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), jobActions(state, job, actions, true)),
+    progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
+    h("p", { class: "sub", "aria-live": "polite" }, sentence(job)));
+}
+
+function sentence(job) {
+  if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${kStopped[job.stopped] ?? "finished"}.`;
+  if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${duration(job.eta_seconds)} left`} · handed in ${moment(job.submitted_unix)}`;
+  if (job.state === "queued") return "Waiting for a worker that may take it.";
+  return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}.`;
+}
+
+function alerts(job) {
+  const complaints = healthComplaints(job);
+  const warnings = job.warnings ?? [];
+  return [
+    job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? "The job failed" : "Something is wrong", h("pre", null, job.error))) : null,
+    complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map((text) => h("li", { key: text }, text))))) : null,
+    warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
+  ];
+}
+
+function downloadLinks(job) {
+  const link = (href, label, hint, name) => h("a", { key: label, class: "button", href, download: name }, label, h("small", null, hint));
+  const stem = jobName(job).replace(/\.xml$/i, "");
+  const now = isOver(job) ? "" : " so far";
+  return h("nav", { class: "downloads", "aria-label": "Downloads" },
+    link(downloads.exr(job.id), "EXR", `image${now}`, `${stem}.exr`),
+    link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
+    link(downloads.csv(job.id), "Convergence", "CSV", `${stem}.convergence.csv`),
+    link(downloads.log(job.id), "Log", "text", `${stem}.log`));
+}

@@ -1,0 +1,52 @@
+// The live image, the tiles in flight over it, and the exposure slider.
+import { h } from "../dom.js";
+import { colourOf } from "../state.js";
+import { exposure as exposureText, jobName } from "../format.js";
+import { safeClass } from "./pieces.js";
+
+const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
+
+export function imagePanel(state, job, actions) {
+  const { open } = state;
+  const [width, height] = job.size ?? [16, 9];
+  return h("figure", { class: "panel image" },
+    h("div", { class: "stage", style: { "--ratio": `${width} / ${height}` } },
+      h("live-image", {
+        key: job.id, "aria-label": `${jobName(job)} as it is now`, role: "img",
+        ".size": width * 65536 + height, ".source": actions.image, ".exposure": open.exposure, ".version": open.folds,
+      }),
+      open.showTiles ? overlay(state, width, height) : null,
+      job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
+    h("figcaption", { class: "image-tools" },
+      h("label", { for: "exposure" }, "Exposure"),
+      h("input", {
+        id: "exposure", type: "range", min: -6, max: 6, step: 0.25, ".value": String(open.exposure), "aria-valuetext": exposureText(open.exposure),
+        oninput: actions.onExposure, ondblclick: actions.resetExposure,
+      }),
+      h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)),
+      h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
+}
+
+function stageText(job) {
+  if (job.state === "failed" || job.state === "cancelled") return "No sample was taken.";
+  return job.state === "queued" ? "Waiting for a worker" : "The first tiles are being rendered";
+}
+
+function overlay(state, width, height) {
+  const { tiles, flashes } = state.open;
+  return h("svg", { key: "overlay", class: "overlay", viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true" },
+    flashes.map(({ key, rect, worker }) => h("rect", {
+      key: `flash${key}`, class: `flash worker-${colourOf(state, worker)}`, x: rect[0], y: rect[1], width: rect[2] - rect[0], height: rect[3] - rect[1],
+    })),
+    [...tiles.values()].slice(0, kMarks).map((tile) => h("path", {
+      key: `tile${tile.tile}`, class: `mark-tile worker-${safeClass(colourOf(state, tile.workers.at(-1)))}`, "data-tile": tile.tile, d: corners(tile.rect),
+    })));
+}
+
+/** Four corner brackets just inside a rectangle. */
+function corners([x0, y0, x1, y1]) {
+  const inset = 0.04 * Math.min(x1 - x0, y1 - y0);
+  const arm = 0.26 * Math.min(x1 - x0, y1 - y0);
+  const [l, t, r, b] = [x0 + inset, y0 + inset, x1 - inset, y1 - inset];
+  return `M${l} ${t + arm}V${t}H${l + arm} M${r - arm} ${t}H${r}V${t + arm} M${r} ${b - arm}V${b}H${r - arm} M${l + arm} ${b}H${l}V${b - arm}`;
+}

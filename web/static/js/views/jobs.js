@@ -1,0 +1,48 @@
+// All jobs.
+import { h } from "../dom.js";
+import { jobsInOrder } from "../state.js";
+import { count, duration, figure, jobName, moment, percent, plural, spp } from "../format.js";
+import { jobActions, progressBar, statePill, stateWord } from "./pieces.js";
+
+export function jobsView(state, actions) {
+  if (state.jobs === null) return h("p", { class: "waiting", key: "waiting" }, "Fetching the jobs …");
+  const jobs = jobsInOrder(state);
+  if (jobs.length === 0) return firstSteps();
+  return h("section", { key: "jobs", class: "jobs" },
+    h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(jobs)), h("a", { class: "button primary", href: "#/submit" }, "New job")),
+    h("table", { class: "list" },
+      h("thead", null, h("tr", null, ["Scene", "State", "Progress", "Samples", "relMSE", "Time left"].map((name) => h("th", { scope: "col", key: name }, name)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
+      h("tbody", null, jobs.map((job) => row(state, job, actions)))));
+}
+
+function tally(jobs) {
+  const n = (state) => jobs.filter((job) => job.state === state).length;
+  const parts = [["running", "rendering"], ["queued", "waiting"], ["paused", "paused"], ["failed", "failed"]].map(([state, word]) => (n(state) ? `${n(state)} ${word}` : null));
+  return [plural(jobs.length, "job"), ...parts].filter(Boolean).join(" · ");
+}
+
+function row(state, job, actions) {
+  return h("tr", { key: job.id, class: `is-${job.state}`, "data-job": job.id },
+    h("td", { class: "name" },
+      h("a", { href: `#/jobs/${encodeURIComponent(job.id)}` }, jobName(job)),
+      h("small", null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
+    h("td", { "data-label": "State" }, statePill(job)),
+    h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${job.state}`), h("span", { class: "number" }, percent(job.progress))),
+    h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),
+    h("td", { class: "number", "data-label": "relMSE" }, figure(job.relmse)),
+    h("td", { class: "number", "data-label": "Time left" }, job.state === "running" ? duration(job.eta_seconds) : "–"),
+    h("td", { class: "acts" }, jobActions(state, job, actions)));
+}
+
+function firstSteps() {
+  const origin = globalThis.location?.origin ?? "http://localhost:8080";
+  return h("section", { key: "empty", class: "empty" },
+    h("h1", null, "Nothing is rendering yet"),
+    h("p", null, "Hand in a Mitsuba scene: drop it with its meshes and volumes on the page ", h("a", { href: "#/submit" }, "New job"), ", or send it from a shell:"),
+    h("pre", null,
+      `curl -H "Authorization: Bearer $(cat DATA/token)" \\\n     -H "Content-Type: application/xml" \\\n     --data-binary @scene.xml \\\n     "${origin}/api/v1/jobs?spp=64"`),
+    h("p", null, "A scene that names other files goes up with them by"),
+    h("pre", null, `lightshaft submit scene.xml --to ${origin} --wait -o image.exr`),
+    h("p", { class: "help" }, "It then appears here, and its image fills in tile by tile."),
+    h("a", { class: "button primary", href: "#/submit" }, "New job"));
+}

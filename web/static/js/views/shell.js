@@ -1,0 +1,42 @@
+// The frame around every view: name, navigation, and whether the page is live.
+import { h } from "../dom.js";
+import { signInView } from "./signin.js";
+import { jobsView } from "./jobs.js";
+import { jobView } from "./job.js";
+import { workersView } from "./workers.js";
+import { submitView } from "./submit.js";
+import { mark } from "./pieces.js";
+
+const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView };
+const kLinkWords = { connecting: "connecting …", live: "live", lost: "connection lost, trying again …" };
+
+/** The whole page as a function of state. */
+export function page(state, actions) {
+  if (state.session === "out") return [skipLink(), h("main", { id: "main", class: "alone", key: "signin" }, signInView(state, actions))];
+  return [
+    skipLink(),
+    header(state, actions),
+    h("main", { id: "main", key: "main", tabindex: -1 },
+      state.ui.notice ? h("p", { key: "notice", class: "toast", role: "alert" }, state.ui.notice, " ", h("button", { type: "button", class: "small quiet", onclick: actions.dismiss }, "Dismiss")) : null,
+      state.session === "in" ? (kViews[state.route.view] ?? jobsView)(state, actions) : h("p", { class: "waiting" }, "Asking the coordinator …")),
+  ];
+}
+
+const skipLink = () => h("a", { key: "skip", class: "skip", href: "#main", onclick: toMain }, "Skip to the content");
+
+function toMain(event) {
+  event.preventDefault(); // the fragment is the route
+  document.getElementById("main").focus();
+}
+
+function header(state, actions) {
+  const here = state.route.view === "job" ? "jobs" : state.route.view;
+  const link = (view, label) => h("a", { key: view, href: `#/${view}`, "aria-current": here === view ? "page" : null }, label);
+  return h("header", { key: "header", class: "top" },
+    h("a", { class: "brand", href: "#/jobs", "aria-label": "Lightshaft, all jobs" }, mark(), h("span", null, "Lightshaft")),
+    h("nav", { "aria-label": "Main" }, link("jobs", "Jobs"), link("workers", workersLabel(state)), link("submit", "New job")),
+    h("span", { class: `link ${state.link}`, role: "status" }, h("i", { "aria-hidden": "true" }), h("span", null, kLinkWords[state.link])),
+    h("button", { type: "button", class: "small quiet", onclick: actions.signOut }, "Sign out"));
+}
+
+const workersLabel = (state) => ["Workers", state.workers ? h("span", { class: "count" }, state.workers.size) : null];

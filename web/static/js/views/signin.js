@@ -1,0 +1,18 @@
+// Who has no session sees only this.
+import { h } from "../dom.js";
+import { mark } from "./pieces.js";
+
+export function signInView(state, actions) {
+  const submit = (event) => {
+    event.preventDefault();
+    actions.signIn(new FormData(event.currentTarget).get("token").trim());
+  };
+  return h("form", { class: "signin", onsubmit: submit },
+    h("h1", null, mark(), "Lightshaft"),
+    h("label", { for: "token" }, "Token"),
+    h("input", { id: "token", name: "token", type: "password", required: true, autofocus: true, autocomplete: "current-password", spellcheck: "false", "aria-describedby": "token-help", "aria-invalid": state.ui.signInError ? "true" : null }),
+    state.ui.signInError ? h("p", { key: "error", class: "field-error", role: "alert" }, state.ui.signInError) : null,
+    h("button", { type: "submit", class: "primary", disabled: state.ui.signingIn }, state.ui.signingIn ? "Signing in …" : "Sign in"),
+    h("p", { id: "token-help", class: "help" }, "The coordinator wrote its first token to the file ", h("code", null, "token"), " in its data folder:"),
+    h("pre", null, "cat DATA/token"));
+}

@@ -1,0 +1,73 @@
+// A new job: drop a scene with its files, choose settings, send.
+import { h } from "../dom.js";
+import { bytes, plural } from "../format.js";
+import { scenesAmong } from "../bundle.js";
+import { diagnostics, progressBar } from "./pieces.js";
+
+export function submitView(state, actions) {
+  const { submit } = state;
+  const busy = submit.phase === "hashing" || submit.phase === "sending";
+  return h("section", { key: "submit", class: "submit" },
+    h("div", { class: "heading" }, h("h1", null, "New job")),
+    dropZone(submit, actions, busy),
+    submit.files.length ? bundle(submit, actions, busy) : null,
+    submit.error ? refusal(submit.error) : null,
+    submit.files.length ? settingsForm(submit, actions, busy) : null,
+    busy ? h("div", { key: "progress", class: "panel sending", role: "status" }, progressBar(submit.progress, submit.step), h("p", null, submit.step, " …")) : null);
+}
+
+function dropZone(submit, actions, busy) {
+  return h("div", { key: "drop", class: submit.files.length ? "drop slim" : "drop", ondragover: actions.onDragOver, ondragleave: actions.onDragLeave, ondrop: actions.onDrop },
+    submit.files.length ? null : h("p", { key: "lead", class: "lead" }, "Drop a scene here, with its meshes, textures and volumes"),
+    h("div", { class: "choices" },
+      chooser("files", submit.files.length ? "Add files" : "Choose files", { multiple: true }, actions, busy),
+      chooser("folder", "Choose a folder", { webkitdirectory: true }, actions, busy)),
+    submit.files.length ? null : h("p", { key: "help", class: "help" }, "Mitsuba XML. Only the files that the scene names are sent, and none that the farm has already."));
+}
+
+// The input lies over its button, unseen, so that keyboard and screen reader meet a real file input.
+const chooser = (id, label, attributes, actions, disabled) =>
+  h("label", { class: "button chooser", for: id }, label, h("input", { id, type: "file", class: "over", disabled, onchange: actions.onFiles, ...attributes }));
+
+function bundle(submit, actions, busy) {
+  const scenes = scenesAmong(submit.files);
+  const { plan } = submit;
+  return h("section", { key: "bundle", class: "panel bundle" },
+    scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, "There is no .xml scene among these files. Add it.") : null,
+    scenes.length > 1
+      ? h("p", null, h("label", { for: "main-scene" }, "Scene "), h("select", { id: "main-scene", disabled: busy, onchange: actions.onMain }, scenes.map((path) => h("option", { key: path, value: path, ".selected": path === submit.main }, path))))
+      : null,
+    plan ? [h("h2", { key: "h" }, plan.main.name), planned(plan)] : null,
+    h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over"));
+}
+
+function planned(plan) {
+  const total = plan.assets.reduce((sum, { file }) => sum + file.size, plan.main.size);
+  return [
+    h("p", { key: "sum", class: "sub" }, plan.assets.length ? `with ${plural(plan.assets.length, "file")}, ${bytes(total)} in all` : `on its own, ${bytes(total)}`),
+    h("ul", { key: "files", class: "files" },
+      plan.assets.map(({ name, file }) => h("li", { key: `a${name}` }, h("code", null, name), h("span", { class: "number dim" }, bytes(file.size)))),
+      plan.missing.map((name) => h("li", { key: `m${name}`, class: "missing" }, h("code", null, name), h("span", null, "missing: add this file"))),
+      plan.unused.map((path) => h("li", { key: `u${path}`, class: "unused" }, h("code", null, path), h("span", null, "not named by the scene, stays here")))),
+  ];
+}
+
+function settingsForm(submit, actions, busy) {
+  const ready = submit.plan && submit.plan.missing.length === 0 && !busy;
+  const field = (name, label, hint, attributes = {}) => h("div", { key: name, class: "field" },
+    h("label", { for: `set-${name}` }, label),
+    h("input", { id: `set-${name}`, name, inputmode: "decimal", autocomplete: "off", placeholder: hint, disabled: busy, ".value": submit.settings[name], oninput: actions.onSetting, ...attributes }));
+  return h("form", { key: "settings", class: "panel settings", onsubmit: actions.onSubmit },
+    field("spp", "Samples per pixel", "as the scene says"),
+    field("target_error", "Stop at relMSE", "no target"),
+    field("time", "Stop after seconds", "no limit"),
+    field("width", "Width", "as the scene says"),
+    field("height", "Height", "as the scene says"),
+    h("button", { key: "go", type: "submit", class: "primary", disabled: !ready }, "Render"));
+}
+
+function refusal({ message, diagnostics: list }) {
+  return h("section", { key: "refused", class: "notice bad", role: "alert" },
+    h("h2", null, list.length ? "The scene was refused" : "This did not work"),
+    list.length ? diagnostics(list) : h("pre", null, message));
+}
