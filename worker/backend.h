@@ -11,6 +11,7 @@
 #include "common/base/error.h"
 #include "common/image/partial.h"
 #include "common/protocol/messages.h"
+#include "worker/render/render.h"
 
 namespace ls::worker {
 
@@ -39,6 +40,21 @@ class RenderBackend {
                                                          const std::atomic<bool>& stop) = 0;
   virtual void forget(const JobId& job) = 0;
   virtual std::uint64_t rss_bytes() const = 0;
+  // Nothing more will be asked: calls that are still blocked should come back soon. May be called more than once.
+  virtual void shutdown() {}
+};
+
+// A backend that renders in this very process and can say where it is.
+class LocalBackend : public RenderBackend {
+ public:
+  // `where` may be null. Its stores are relaxed; whoever reads it may be another process.
+  virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
+                                                                const std::atomic<bool>& stop,
+                                                                render::Breadcrumb* where) = 0;
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) final {
+    return render_marked(job, unit, stop, nullptr);
+  }
 };
 
 }  // namespace ls::worker

@@ -1,0 +1,377 @@
+#include "proto/convert.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "common/base/overloaded.h"
+#include "proto/convert_check.h"
+
+// Unwraps a Result inside a function that returns one: on an error, returns it.
+#define LS_TRY(name, expression)                              \
+  auto name##_or = (expression);                              \
+  if (!name##_or) return tl::unexpected<Error>(name##_or.error()); \
+  auto& name = *name##_or
+
+namespace ls::wire {
+namespace {
+
+Result<void> bounded(int count, std::size_t limit, const char* field) {
+  if (static_cast<std::size_t>(count) > limit)
+    return wrong(field, fmt::format("has {} entries; at most {} are allowed", count, limit));
+  return {};
+}
+
+// ---- parts ----------------------------------------------------------------------------------------------------------
+
+void put(const UnitKey& key, pb::UnitKey* out) {
+  out->set_job(key.job.value);
+  out->set_tile(key.tile);
+  out->set_round(key.round);
+}
+
+Result<UnitKey> key_from(const pb::UnitKey& in) {
+  LS_TRY(job, id_from(in.job(), "unit.job"));
+  return UnitKey{JobId{job}, in.tile(), in.round()};
+}
+
+void put(const Error& error, pb::Problem* out) {
+  out->set_code(std::string(to_string(error.code)));
+  out->set_message(cut(error.message, limits::kTextBytes));
+}
+
+Result<Error> problem_from(const pb::Problem& in) {
+  LS_TRY(text, text_from(in.message(), limits::kTextBytes, "problem.message"));
+  for (const Errc code : {Errc::invalid_argument, Errc::not_found, Errc::already_exists, Errc::failed_precondition,
+                          Errc::resource_exhausted, Errc::permission_denied, Errc::unauthenticated, Errc::unavailable})
+    if (in.code() == to_string(code)) return Error{code, text};
+  return Error{Errc::internal, text};
+}
+
+Result<LeaseUnit> lease_unit_from(const pb::LeaseUnit& in) {
+  LS_TRY(rect, rect_from(in.rect(), "units.rect"));
+  LS_TRY(samples, range_from(in.s0(), in.s1(), "units.s0,s1"));
+  return LeaseUnit{in.tile(), in.round(), rect, samples};
+}
+
+void put(const JobBrief& brief, pb::JobBrief* out) {
+  out->set_job(brief.job.value);
+  out->set_scene(digest_bytes(brief.scene));
+  out->set_settings(canonical_json(brief.settings));
+  for (const BlobRef& asset : brief.assets) {
+    pb::Blob* blob = out->add_assets();
+    blob->set_digest(digest_bytes(asset.digest));
+    blob->set_bytes(asset.bytes);
+    blob->set_name(cut(asset.name, limits::kNameBytes));
+  }
+}
+
+Result<JobBrief> brief_from(const pb::JobBrief& in) {
+  JobBrief brief;
+  LS_TRY(job, id_from(in.job(), "brief.job"));
+  LS_TRY(scene, digest_from(in.scene(), "brief.scene"));
+  if (in.settings().size() > limits::kSettingsBytes) return wrong("brief.settings", "is too long");
+  LS_TRY(settings, parse_render_settings(in.settings()));
+  if (auto ok = bounded(in.assets_size(), limits::kAssetsPerJob, "brief.assets"); !ok)
+    return tl::unexpected<Error>(ok.error());
+  for (const pb::Blob& blob : in.assets()) {
+    LS_TRY(digest, digest_from(blob.digest(), "brief.assets.digest"));
+    LS_TRY(name, text_from(blob.name(), limits::kNameBytes, "brief.assets.name"));
+    brief.assets.push_back({digest, blob.bytes(), name});
+  }
+  brief.job = JobId{job};
+  brief.scene = scene;
+  brief.settings = settings;
+  brief.settings_digest = digest_of(settings);
+  return brief;
+}
+
+// ---- worker -> coordinator ------------------------------------------------------------------------------------------
+
+void put(const WorkerHello& hello, pb::FromWorker& out) {
+  pb::Hello* h = out.mutable_hello();
+  h->set_protocol(hello.protocol);
+  h->set_name(cut(hello.name, limits::kNameBytes));
+  h->set_build(cut(hello.build, limits::kNameBytes));
+  h->set_numeric_class(digest_bytes(hello.numeric_class));
+  h->set_threads(hello.threads);
+  h->set_memory_bytes(hello.memory_bytes);
+  for (const std::string& tag : hello.tags) h->add_tags(cut(tag, limits::kNameBytes));
+  for (const Digest& blob : hello.blobs_held) h->add_blobs_held(digest_bytes(blob));
+  h->set_join_token(hello.join_token);
+  h->set_previous_id(hello.previous_id.value);
+}
+
+Result<FromWorker> hello_from(const pb::Hello& in) {
+  WorkerHello hello;
+  LS_TRY(name, text_from(in.name(), limits::kNameBytes, "hello.name"));
+  if (name.empty()) return wrong("hello.name", "is missing");
+  LS_TRY(build, text_from(in.build(), limits::kNameBytes, "hello.build"));
+  LS_TRY(numeric_class, digest_from(in.numeric_class(), "hello.numeric_class"));
+  if (in.threads() < 1 || in.threads() > limits::kThreads)
+    return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
+  if (in.join_token().size() > limits::kTokenBytes) return wrong("hello.join_token", "is too long");
+  if (auto ok = bounded(in.tags_size(), limits::kTags, "hello.tags"); !ok) return tl::unexpected<Error>(ok.error());
+  if (auto ok = bounded(in.blobs_held_size(), limits::kBlobsHeld, "hello.blobs_held"); !ok)
+    return tl::unexpected<Error>(ok.error());
+  for (const std::string& t : in.tags()) {
+    LS_TRY(tag, text_from(t, limits::kNameBytes, "hello.tags"));
+    hello.tags.push_back(tag);
+  }
+  for (const std::string& b : in.blobs_held()) {
+    LS_TRY(blob, digest_from(b, "hello.blobs_held"));
+    hello.blobs_held.push_back(blob);
+  }
+  if (!in.previous_id().empty()) {
+    LS_TRY(previous, id_from(in.previous_id(), "hello.previous_id"));
+    hello.previous_id = WorkerId{previous};
+  }
+  hello.protocol = in.protocol();
+  hello.name = name;
+  hello.build = build;
+  hello.numeric_class = numeric_class;
+  hello.threads = in.threads();
+  hello.memory_bytes = in.memory_bytes();
+  hello.join_token = in.join_token();
+  return hello;
+}
+
+void put(const WorkerProgress& progress, pb::FromWorker& out) {
+  pb::Progress* p = out.mutable_progress();
+  for (const WorkerProgress::Entry& entry : progress.leases) {
+    pb::Progress::Entry* e = p->add_leases();
+    e->set_lease(entry.lease.value);
+    e->set_units_done(entry.units_done);
+  }
+  p->set_activity(cut(progress.activity, limits::kNameBytes));
+  p->set_cpu_seconds_total(progress.cpu_seconds_total);
+  p->set_rss_bytes(progress.rss_bytes);
+  p->set_load_seconds(progress.load_seconds);
+}
+
+Result<FromWorker> progress_from(const pb::Progress& in) {
+  WorkerProgress progress;
+  if (auto ok = bounded(in.leases_size(), limits::kLeasesPerWorker, "progress.leases"); !ok)
+    return tl::unexpected<Error>(ok.error());
+  for (const pb::Progress::Entry& e : in.leases()) {
+    LS_TRY(lease, id_from(e.lease(), "progress.leases.lease"));
+    progress.leases.push_back({LeaseId{lease}, e.units_done()});
+  }
+  LS_TRY(activity, text_from(in.activity(), limits::kNameBytes, "progress.activity"));
+  LS_TRY(cpu, seconds_from(in.cpu_seconds_total(), "progress.cpu_seconds_total"));
+  LS_TRY(load, seconds_from(in.load_seconds(), "progress.load_seconds"));
+  progress.activity = activity;
+  progress.cpu_seconds_total = cpu;
+  progress.rss_bytes = in.rss_bytes();
+  progress.load_seconds = load;
+  return progress;
+}
+
+void put(const UnitResult& result, pb::FromWorker& out) {
+  pb::UnitResult* r = out.mutable_result();
+  put(result.unit, r->mutable_unit());
+  r->set_lease(result.lease.value);
+  r->set_exr(result.exr.data(), result.exr.size());
+  r->set_digest(digest_bytes(result.digest));
+  r->set_cpu_seconds(result.cpu_seconds);
+  r->set_nonfinite(result.health.nonfinite);
+  r->set_negative(result.health.negative);
+  r->set_majorant_violations(result.health.majorant_violations);
+}
+
+Result<FromWorker> result_from(const pb::UnitResult& in) {
+  LS_TRY(unit, key_from(in.unit()));
+  LS_TRY(lease, id_from(in.lease(), "result.lease"));
+  LS_TRY(digest, digest_from(in.digest(), "result.digest"));
+  LS_TRY(cpu, seconds_from(in.cpu_seconds(), "result.cpu_seconds"));
+  if (in.exr().empty() || in.exr().size() > limits::kPartialBytes)
+    return wrong("result.exr", fmt::format("has {} bytes; 1 to {} are allowed", in.exr().size(), limits::kPartialBytes));
+  const auto* bytes = reinterpret_cast<const std::byte*>(in.exr().data());
+  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu,
+                    {in.nonfinite(), in.negative(), in.majorant_violations()}};
+}
+
+void put(const UnitFailure& failure, pb::FromWorker& out) {
+  pb::UnitFailure* f = out.mutable_failure();
+  put(failure.unit, f->mutable_unit());
+  f->set_lease(failure.lease.value);
+  f->set_scene_at_fault(failure.scene_at_fault);
+  f->set_reason(cut(failure.reason, limits::kTextBytes));
+  if (failure.signal) f->set_signal(*failure.signal);
+  if (failure.pixel) {
+    f->set_pixel_x(failure.pixel->first);
+    f->set_pixel_y(failure.pixel->second);
+  }
+  if (failure.sample) f->set_sample(*failure.sample);
+}
+
+Result<FromWorker> failure_from(const pb::UnitFailure& in) {
+  UnitFailure failure;
+  LS_TRY(unit, key_from(in.unit()));
+  LS_TRY(lease, id_from(in.lease(), "failure.lease"));
+  LS_TRY(reason, text_from(in.reason(), limits::kTextBytes, "failure.reason"));
+  failure.unit = unit;
+  failure.lease = LeaseId{lease};
+  failure.scene_at_fault = in.scene_at_fault();
+  failure.reason = reason;
+  if (in.has_signal()) failure.signal = in.signal();
+  if (in.has_pixel_x() && in.has_pixel_y()) failure.pixel = {in.pixel_x(), in.pixel_y()};
+  if (in.has_sample()) failure.sample = in.sample();
+  return failure;
+}
+
+void put(const LeaseReturned& returned, pb::FromWorker& out) {
+  out.mutable_returned()->set_lease(returned.lease.value);
+  for (const UnitKey& key : returned.unrendered) put(key, out.mutable_returned()->add_units());
+}
+
+Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
+  LeaseReturned returned;
+  LS_TRY(lease, id_from(in.lease(), "returned.lease"));
+  returned.lease = LeaseId{lease};
+  if (auto ok = bounded(in.units_size(), limits::kUnitsPerLease, "returned.units"); !ok)
+    return tl::unexpected<Error>(ok.error());
+  for (const pb::UnitKey& k : in.units()) {
+    LS_TRY(key, key_from(k));
+    returned.unrendered.push_back(key);
+  }
+  return returned;
+}
+
+void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
+
+// ---- coordinator -> worker ------------------------------------------------------------------------------------------
+
+void put(const Welcome& welcome, pb::ToWorker& out) {
+  out.mutable_welcome()->set_worker(welcome.worker.value);
+  out.mutable_welcome()->set_epoch(welcome.epoch);
+}
+
+void put(const Refused& refused, pb::ToWorker& out) {
+  put(refused.error, out.mutable_refused()->mutable_problem());
+  out.mutable_refused()->set_retry(refused.retry);
+}
+
+void put(const AssignLease& assign, pb::ToWorker& out) {
+  pb::AssignLease* a = out.mutable_assign();
+  a->set_lease(assign.lease.id.value);
+  a->set_job(assign.lease.job.value);
+  for (const LeaseUnit& unit : assign.lease.units) {
+    pb::LeaseUnit* u = a->add_units();
+    u->set_tile(unit.tile);
+    u->set_round(unit.round);
+    u->mutable_rect()->set_x0(unit.rect.x0);
+    u->mutable_rect()->set_y0(unit.rect.y0);
+    u->mutable_rect()->set_x1(unit.rect.x1);
+    u->mutable_rect()->set_y1(unit.rect.y1);
+    u->set_s0(unit.samples.s0);
+    u->set_s1(unit.samples.s1);
+  }
+  if (assign.brief) put(*assign.brief, a->mutable_brief());
+}
+
+Result<ToWorker> assign_from(const pb::AssignLease& in) {
+  AssignLease assign;
+  LS_TRY(lease, id_from(in.lease(), "assign.lease"));
+  LS_TRY(job, id_from(in.job(), "assign.job"));
+  if (auto ok = bounded(in.units_size(), limits::kUnitsPerLease, "assign.units"); !ok)
+    return tl::unexpected<Error>(ok.error());
+  assign.lease = {LeaseId{lease}, JobId{job}, {}};
+  for (const pb::LeaseUnit& u : in.units()) {
+    LS_TRY(unit, lease_unit_from(u));
+    assign.lease.units.push_back(unit);
+  }
+  if (in.has_brief()) {
+    LS_TRY(brief, brief_from(in.brief()));
+    if (brief.job != assign.lease.job) return wrong("assign.brief", "is of another job");
+    assign.brief = brief;
+  }
+  return assign;
+}
+
+void put(const ResultAck& ack, pb::ToWorker& out) {
+  put(ack.unit, out.mutable_ack()->mutable_unit());
+  if (ack.refused) put(*ack.refused, out.mutable_ack()->mutable_refused());
+}
+
+Result<ToWorker> ack_from(const pb::ResultAck& in) {
+  ResultAck ack;
+  LS_TRY(unit, key_from(in.unit()));
+  ack.unit = unit;
+  if (in.has_refused()) {
+    LS_TRY(problem, problem_from(in.refused()));
+    ack.refused = problem;
+  }
+  return ack;
+}
+
+void put(const CancelJob& cancel, pb::ToWorker& out) { out.mutable_cancel_job()->set_job(cancel.job.value); }
+void put(const CancelLease& cancel, pb::ToWorker& out) { out.mutable_cancel_lease()->set_lease(cancel.lease.value); }
+void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
+
+}  // namespace
+
+pb::FromWorker to_wire(const FromWorker& message) {
+  pb::FromWorker out;
+  std::visit([&out](const auto& m) { put(m, out); }, message);
+  return out;
+}
+
+pb::ToWorker to_wire(const ToWorker& message) {
+  pb::ToWorker out;
+  std::visit([&out](const auto& m) { put(m, out); }, message);
+  return out;
+}
+
+Result<FromWorker> from_wire(const pb::FromWorker& in) {
+  switch (in.message_case()) {
+    case pb::FromWorker::kHello: return hello_from(in.hello());
+    case pb::FromWorker::kProgress: return progress_from(in.progress());
+    case pb::FromWorker::kResult: return result_from(in.result());
+    case pb::FromWorker::kFailure: return failure_from(in.failure());
+    case pb::FromWorker::kReturned: return returned_from(in.returned());
+    case pb::FromWorker::kDraining: return WorkerDraining{};
+    case pb::FromWorker::MESSAGE_NOT_SET: break;
+  }
+  return wrong("message", "is empty or of a kind that this version does not know");
+}
+
+Result<ToWorker> from_wire(const pb::ToWorker& in) {
+  switch (in.message_case()) {
+    case pb::ToWorker::kWelcome: {
+      LS_TRY(worker, id_from(in.welcome().worker(), "welcome.worker"));
+      return Welcome{WorkerId{worker}, in.welcome().epoch()};
+    }
+    case pb::ToWorker::kRefused: {
+      LS_TRY(problem, problem_from(in.refused().problem()));
+      return Refused{problem, in.refused().retry()};
+    }
+    case pb::ToWorker::kAssign: return assign_from(in.assign());
+    case pb::ToWorker::kAck: return ack_from(in.ack());
+    case pb::ToWorker::kCancelJob: {
+      LS_TRY(job, id_from(in.cancel_job().job(), "cancel_job.job"));
+      return CancelJob{JobId{job}};
+    }
+    case pb::ToWorker::kCancelLease: {
+      LS_TRY(lease, id_from(in.cancel_lease().lease(), "cancel_lease.lease"));
+      return CancelLease{LeaseId{lease}};
+    }
+    case pb::ToWorker::kDrain: return DrainNow{};
+    case pb::ToWorker::MESSAGE_NOT_SET: break;
+  }
+  return wrong("message", "is empty or of a kind that this version does not know");
+}
+
+std::string digest_bytes(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
+}
+
+Result<Digest> digest_from(const std::string& bytes, const char* field) {
+  Digest digest;
+  if (bytes.size() != digest.bytes.size())
+    return wrong(field, fmt::format("has {} bytes; a SHA-256 has 32", bytes.size()));
+  std::copy(bytes.begin(), bytes.end(), digest.bytes.begin());
+  return digest;
+}
+
+}  // namespace ls::wire

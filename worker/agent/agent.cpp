@@ -1,0 +1,267 @@
+// The control thread: connection, messages, timers, drain.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/log.h"
+#include "common/base/overloaded.h"
+#include "common/protocol/limits.h"
+#include "worker/agent/agent_impl.h"
+
+namespace ls::worker {
+namespace {
+constexpr Duration kWelcomeLimit = std::chrono::seconds(30);  // from connect to Welcome
+// A connection that lived this long was a good one: the next back-off starts small again.
+constexpr Duration kGoodConnection = std::chrono::seconds(5);
+constexpr Duration kLongestWait = std::chrono::seconds(1);
+constexpr int kProgressWhenIdle = 5;  // periods
+constexpr std::size_t kJobsRemembered = 64;
+}  // namespace
+
+Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFiles& f, const Clock& c)
+    : options(std::move(o)),
+      link(l),
+      backend(b),
+      files(f),
+      clock(c),
+      backoff(options.backoff_first, options.backoff_most, options.backoff_seed) {}
+
+Result<void> Agent::Impl::run() {
+  connection_timer = clock.now();
+  threads.emplace_back([this](std::stop_token token) { load_loop(token); });
+  for (int i = 0; i < options.threads; ++i) slots.push_back(std::make_unique<RenderSlot>());
+  for (auto& slot : slots)
+    threads.emplace_back([this, &slot](std::stop_token token) { render_loop(*slot, token); });
+  while (!ended) {
+    std::deque<Arrival> arrivals = inbox->wait(until_next_timer());
+    for (Arrival& arrival : arrivals) handle(arrival);
+    if (stop_requested) break;
+    if (drain_requested) begin_drain();
+    if (connection == Connection::opening && clock.now() >= connection_timer) {
+      link.close();
+      connection_ended({Errc::unavailable, "the coordinator did not answer the hello"});
+    }
+    if (connection == Connection::down && clock.now() >= connection_timer && !ended) open_connection();
+    for (FromWorker& message : due_messages()) link.send(std::move(message));
+    if (!ended) ended = verdict();
+  }
+  end_threads();
+  return ended.value_or(Result<void>{});
+}
+
+void Agent::Impl::end_threads() {
+  {
+    const std::lock_guard lock(mutex);
+    for (auto& slot : slots) slot->stop = true;
+  }
+  for (std::jthread& thread : threads) thread.request_stop();
+  work.notify_all();
+  link.close();
+  backend.shutdown();
+  threads.clear();
+}
+
+void Agent::Impl::handle(Arrival& arrival) {
+  if (arrival.connection != connection_count || connection == Connection::down) return;
+  std::visit(overloaded{[this](ToWorker& message) { handle_message(message); },
+                        [this](ConnectionLost& lost) { connection_ended(lost.why); }},
+             arrival.what);
+}
+
+void Agent::Impl::handle_message(ToWorker& message) {
+  std::visit(
+      overloaded{
+          [this](Welcome& welcome) {
+            const std::lock_guard lock(mutex);
+            connection = Connection::up;
+            up_since = clock.now();
+            next_progress = up_since;
+            id = welcome.worker;
+            if (draining) outgoing.push_front(WorkerDraining{});
+            log_info(fmt::format("worker={}", id.value), "joined the coordinator");
+          },
+          [this](Refused& refused) {
+            link.close();
+            if (!refused.retry) ended = tl::unexpected<Error>(refused.error);
+            connection_ended(refused.error);
+          },
+          [this](AssignLease& assign) { accept_lease(assign); },
+          [this](ResultAck& ack) {
+            if (ack.refused)
+              log_warn(fmt::format("job={} tile={} round={}", ack.unit.job.value, ack.unit.tile, ack.unit.round),
+                       "result refused: " + ack.refused->message);
+            const std::lock_guard lock(mutex);
+            outbox.acknowledge(ack.unit);
+            book.acknowledged(ack.unit, ack.refused.has_value());
+          },
+          [this](CancelJob& c) { cancel(c.job); },
+          [this](CancelLease& c) {
+            const std::lock_guard lock(mutex);
+            book.drop_lease(c.lease);
+            stop_dropped_units();
+          },
+          [this](DrainNow&) { drain_requested = true; },
+      },
+      message);
+  work.notify_all();
+}
+
+void Agent::Impl::connection_ended(const Error& why) {
+  const std::lock_guard lock(mutex);
+  const TimePoint now = clock.now();
+  if (connection == Connection::up && now - up_since >= kGoodConnection) backoff.reset();
+  connection = Connection::down;
+  outbox.connection_lost();
+  const Duration pause = backoff.next();
+  connection_timer = now + pause;
+  if (!ended && !(draining && outbox.empty()))
+    log_warn(fmt::format("worker={}", id.value),
+             fmt::format("no connection to the coordinator ({}); trying again in {:.1f} s", why.message, seconds(pause)));
+}
+
+void Agent::Impl::open_connection() {
+  WorkerHello hello = options.hello;
+  hello.threads = options.threads;
+  hello.numeric_class = backend.numeric_class();
+  hello.blobs_held = files.held(limits::kBlobsHeld);
+  hello.previous_id = id;
+  {
+    const std::lock_guard lock(mutex);
+    connection = Connection::opening;
+  }
+  connection_timer = clock.now() + kWelcomeLimit;
+  const auto connected = link.connect(hello, std::make_shared<InboxObserver>(inbox, ++connection_count));
+  if (!connected) connection_ended(connected.error());
+}
+
+void Agent::Impl::accept_lease(AssignLease& assign) {
+  const std::lock_guard lock(mutex);
+  const JobId& id = assign.lease.job;
+  if (assign.brief) {
+    const auto it = jobs.find(id);
+    if (it != jobs.end() && it->second.brief != *assign.brief) {  // another coordinator's data: same name, other job
+      book.drop_job(id);
+      outbox.drop_job(id);
+      stop_dropped_units();
+      jobs.erase(it);
+      backend.forget(id);
+    }
+    Job& job = jobs.try_emplace(id, Job{.brief = *assign.brief}).first->second;
+    job.cancelled = false;
+    job.last_use = ++uses;
+  }
+  const auto job = jobs.find(id);
+  if (draining || job == jobs.end() || book.lease_count() >= limits::kLeasesPerWorker) {
+    LeaseReturned returned{assign.lease.id, {}};
+    for (const LeaseUnit& unit : assign.lease.units) returned.unrendered.push_back({id, unit.tile, unit.round});
+    outgoing.push_back(std::move(returned));
+    return;
+  }
+  job->second.cancelled = false;
+  book.add(assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); });
+  // Briefs are small, but a worker may live for years.
+  while (jobs.size() > kJobsRemembered) {
+    auto oldest = jobs.end();
+    for (auto it = jobs.begin(); it != jobs.end(); ++it)
+      if (it->second.state == Job::State::idle && !book.holds(it->first) &&
+          (oldest == jobs.end() || it->second.last_use < oldest->second.last_use))
+        oldest = it;
+    if (oldest == jobs.end()) break;
+    jobs.erase(oldest);
+  }
+}
+
+void Agent::Impl::cancel(const JobId& job) {
+  const std::lock_guard lock(mutex);
+  book.drop_job(job);
+  outbox.drop_job(job);
+  stop_dropped_units();
+  if (const auto it = jobs.find(job); it != jobs.end()) it->second.cancelled = true;
+}
+
+void Agent::Impl::stop_dropped_units() {
+  for (auto& slot : slots)
+    if (slot->unit && !book.is_running(*slot->unit)) slot->stop = true;
+}
+
+void Agent::Impl::begin_drain() {
+  const std::lock_guard lock(mutex);
+  if (draining) return;
+  draining = true;
+  drain_deadline = clock.now() + options.drain_limit;
+  outgoing.push_back(WorkerDraining{});
+  for (LeaseReturned& returned : book.return_waiting()) outgoing.push_back(std::move(returned));
+  work.notify_all();
+  log_info(fmt::format("worker={}", id.value), "draining: finishing the units in hand");
+}
+
+std::vector<FromWorker> Agent::Impl::due_messages() {
+  const std::lock_guard lock(mutex);
+  if (connection != Connection::up) return {};
+  std::vector<FromWorker> messages = outbox.take_unsent();
+  for (FromWorker& message : outgoing) messages.push_back(std::move(message));
+  outgoing.clear();
+  const TimePoint now = clock.now();
+  if (now >= next_progress) {
+    WorkerProgress p = progress();
+    next_progress = now + options.progress_period * (p.leases.empty() ? kProgressWhenIdle : 1);
+    messages.push_back(std::move(p));
+  }
+  return messages;
+}
+
+WorkerProgress Agent::Impl::progress() const {
+  WorkerProgress p;
+  p.leases = book.progress();
+  p.activity = draining ? "draining" : book.running() > 0 ? "rendering" : !loading.empty() ? "loading " + loading : "idle";
+  p.cpu_seconds_total = cpu_seconds;
+  p.rss_bytes = backend.rss_bytes();
+  p.load_seconds = load_seconds;
+  return p;
+}
+
+std::optional<Result<void>> Agent::Impl::verdict() {
+  const std::lock_guard lock(mutex);
+  if (!draining) return std::nullopt;
+  const bool rendering = std::any_of(slots.begin(), slots.end(), [](const auto& slot) { return slot->unit.has_value(); });
+  if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up)) return Result<void>{};
+  if (clock.now() < drain_deadline) return std::nullopt;
+  return fail(Errc::unavailable,
+              fmt::format("gave up draining after {:.0f} s: {} finished units could not be handed in; they will be "
+                          "rendered again elsewhere",
+                          seconds(options.drain_limit), outbox.size()));
+}
+
+Duration Agent::Impl::until_next_timer() const {
+  const TimePoint now = clock.now();
+  TimePoint next = now + kLongestWait;
+  if (connection == Connection::up) {
+    const std::lock_guard lock(mutex);
+    const bool working = book.lease_count() > 0;
+    next = std::min(next, working ? std::min(next_progress, now + options.progress_period) : next_progress);
+  } else {
+    next = std::min(next, connection_timer);
+  }
+  if (draining) next = std::min(next, drain_deadline);
+  return std::max(next - now, Duration::zero());
+}
+
+Agent::Agent(AgentOptions options, CoordinatorLink& link, RenderBackend& backend, BlobFiles& files, const Clock& clock)
+    : impl_(std::make_unique<Impl>(std::move(options), link, backend, files, clock)) {}
+Agent::~Agent() = default;
+
+Result<void> Agent::run() { return impl_->run(); }
+
+void Agent::drain() {
+  impl_->drain_requested = true;
+  impl_->inbox->nudge();
+}
+
+void Agent::stop() {
+  impl_->stop_requested = true;
+  impl_->inbox->nudge();
+}
+
+void Agent::wake() { impl_->inbox->nudge(); }
+
+}  // namespace ls::worker

@@ -1,0 +1,119 @@
+// The loader thread: makes jobs ready ahead of need. Blobs first, then the world; both without the lock.
+#include <fmt/format.h>
+
+#include "common/base/log.h"
+#include "worker/agent/agent_impl.h"
+
+namespace ls::worker {
+namespace {
+// The world being rendered and the next one: so that a thread never waits between two jobs, and memory stays bounded.
+constexpr std::size_t kWorldsKept = 2;
+constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
+}  // namespace
+
+void Agent::Impl::load_loop(std::stop_token token) {
+  std::unique_lock lock(mutex);
+  while (!token.stop_requested()) {
+    const std::optional<JobId> next = next_to_load();
+    if (next && make_room()) {
+      Job& job = jobs.at(*next);
+      job.state = Job::State::loading;
+      const JobBrief brief = job.brief;
+      lock.unlock();
+      load(brief);
+      lock.lock();
+    } else {
+      // A cut transfer is tried again after a pause; otherwise there is a notification.
+      work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
+    }
+  }
+}
+
+std::optional<JobId> Agent::Impl::next_to_load() {
+  for (const JobId& id : book.wanted()) {
+    const auto it = jobs.find(id);
+    if (it != jobs.end() && it->second.state == Job::State::idle && clock.now() >= it->second.retry_at) return id;
+  }
+  return std::nullopt;
+}
+
+bool Agent::Impl::make_room() {
+  std::size_t kept = 0;
+  auto idlest = jobs.end();
+  for (auto it = jobs.begin(); it != jobs.end(); ++it) {
+    if (it->second.state != Job::State::ready) continue;
+    ++kept;
+    if (!book.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use)) idlest = it;
+  }
+  if (kept < kWorldsKept) return true;
+  if (idlest == jobs.end()) return false;
+  idlest->second.state = Job::State::idle;
+  idlest->second.files.clear();
+  idlest->second.local.reset();
+  backend.forget(idlest->first);
+  return true;
+}
+
+void Agent::Impl::load(const JobBrief& brief) {
+  const JobId& id = brief.job;
+  auto local = std::make_shared<LocalJob>();
+  std::vector<std::shared_ptr<const BlobFile>> pins;
+  std::vector<BlobRef> blobs = {{brief.scene, 0, "the scene"}};
+  blobs.insert(blobs.end(), brief.assets.begin(), brief.assets.end());
+  for (const BlobRef& blob : blobs) {
+    {
+      const std::lock_guard lock(mutex);
+      loading = blob.name;
+    }
+    auto file = files.acquire(blob);
+    if (!file && file.error().code == Errc::unavailable) return postpone(id, file.error());
+    if (!file)
+      return loading_failed(id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
+    if (blob.digest == brief.scene) local->scene = (*file)->path();
+    local->assets[blob.digest] = (*file)->path();
+    pins.push_back(std::move(*file));
+  }
+  local->brief = brief;
+  const TimePoint start = clock.now();
+  auto prepared = backend.prepare(*local);
+  if (!prepared) return loading_failed(id, std::move(prepared.error()));
+  const std::lock_guard lock(mutex);
+  loading.clear();
+  load_seconds = seconds(clock.now() - start);
+  const auto it = jobs.find(id);
+  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // replaced meanwhile
+  it->second.state = Job::State::ready;
+  it->second.local = std::move(local);
+  it->second.files = std::move(pins);
+  it->second.last_use = ++uses;
+  work.notify_all();
+}
+
+// One unit is reported, the others go back: so that a job which this worker can't load costs one attempt, not hundreds.
+void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
+  const std::lock_guard lock(mutex);
+  loading.clear();
+  if (const auto it = jobs.find(id); it != jobs.end()) it->second.state = Job::State::idle;
+  backend.forget(id);
+  log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + failure.reason);
+  if (const auto first = book.take([&](const JobId& job) { return job == id; })) {
+    failure.unit = first->key;
+    failure.lease = first->lease;
+    book.finish(first->key);
+    outbox.add(std::move(failure));
+  }
+  for (LeaseReturned& returned : book.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  inbox->nudge();
+}
+
+void Agent::Impl::postpone(const JobId& id, const Error& why) {
+  const std::lock_guard lock(mutex);
+  loading.clear();
+  const auto it = jobs.find(id);
+  if (it == jobs.end()) return;
+  it->second.state = Job::State::idle;
+  it->second.retry_at = clock.now() + kTransferRetry;
+  log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
+}
+
+}  // namespace ls::worker

@@ -1,0 +1,91 @@
+// The render threads: one unit at a time, each from the front of the lease book.
+#include <fmt/format.h>
+
+#include "common/protocol/limits.h"
+#include "worker/agent/agent_impl.h"
+
+namespace ls::worker {
+namespace {
+
+constexpr std::int64_t kBytesPerPixel = kPartialChannels * 4;
+constexpr std::int64_t kExrOverhead = 16 << 10;  // header and line offsets
+
+// A result that would not fit into a message is refused before it costs anything.
+std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
+  const std::int64_t bytes = unit.rect.pixels() * kBytesPerPixel + kExrOverhead;
+  if (bytes <= static_cast<std::int64_t>(limits::kPartialBytes)) return std::nullopt;
+  return UnitFailure{.scene_at_fault = true,
+                     .reason = fmt::format("a tile of {} x {} pixels makes a result of {} bytes, more than the {} that "
+                                           "one message takes; choose a smaller tile",
+                                           unit.rect.width(), unit.rect.height(), bytes, limits::kPartialBytes)};
+}
+
+tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job, const LeaseBook::Held& held,
+                                             const std::atomic<bool>& stop) {
+  if (auto failure = too_large(held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
+  auto rendered = backend.render(job, held.unit, stop);
+  if (!rendered) return tl::unexpected<UnitFailure>(std::move(rendered.error()));
+  auto exr = encode_partial(rendered->partial, job.brief.settings.size);
+  if (!exr) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "cannot encode the result: " + exr.error().message});
+  UnitResult result;
+  result.unit = held.key;
+  result.exr = std::move(*exr);
+  result.digest = unit_digest(rendered->partial);
+  result.cpu_seconds = rendered->cpu_seconds;
+  result.health = rendered->health;
+  return result;
+}
+
+}  // namespace
+
+void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
+  std::shared_ptr<const LocalJob> job;
+  while (const auto held = next_unit(slot, token, job)) {
+    finished(slot, held->key, render(backend, *job, *held, slot.stop));
+    job.reset();
+  }
+}
+
+// Blocks until there is something to do; nothing at the end.
+std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
+                                                      std::shared_ptr<const LocalJob>& job) {
+  std::unique_lock lock(mutex);
+  std::optional<LeaseBook::Held> held;
+  const auto ready = [this](const JobId& id) {
+    const auto it = jobs.find(id);
+    return it != jobs.end() && it->second.state == Job::State::ready;
+  };
+  const auto found = [&] {
+    if (!draining && outbox.bytes() < options.outbox_bytes) held = book.take(ready);
+    return held.has_value();
+  };
+  if (!work.wait(lock, token, found)) return std::nullopt;
+  Job& current = jobs.at(held->key.job);
+  current.last_use = ++uses;
+  job = current.local;
+  slot.unit = held->key;
+  slot.stop = false;
+  return held;
+}
+
+void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome) {
+  {
+    const std::lock_guard lock(mutex);
+    slot.unit.reset();
+    if (outcome) cpu_seconds += outcome->cpu_seconds;
+    // A unit that was told to stop is no longer ours, whatever came of it.
+    const auto lease = slot.stop ? std::nullopt : book.finish(key);
+    if (lease && outcome) {
+      outcome->lease = *lease;
+      outbox.add(std::move(*outcome));
+    } else if (lease) {
+      outcome.error().unit = key;
+      outcome.error().lease = *lease;
+      outbox.add(std::move(outcome.error()));
+    }
+    work.notify_all();
+  }
+  inbox->nudge();
+}
+
+}  // namespace ls::worker

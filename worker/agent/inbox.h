@@ -1,0 +1,64 @@
+// What wakes the agent's control thread: messages of the current connection, its loss, or a nudge from another thread. Shared
+// with the link's observer, so that a late callback never finds a dead agent.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "common/base/clock.h"
+#include "worker/link.h"
+
+namespace ls::worker {
+
+struct ConnectionLost {
+  Error why;
+};
+struct Arrival {
+  std::uint64_t connection = 0;  // counted by the agent; arrivals of older ones are stale
+  std::variant<ToWorker, ConnectionLost> what;
+};
+
+class Inbox {
+ public:
+  void push(Arrival arrival) {
+    const std::lock_guard lock(mutex_);
+    arrivals_.push_back(std::move(arrival));
+    changed_.notify_one();
+  }
+  void nudge() {
+    const std::lock_guard lock(mutex_);
+    nudged_ = true;
+    changed_.notify_one();
+  }
+  // Everything that has arrived; waits for something to happen, at most this long.
+  std::deque<Arrival> wait(Duration at_most) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });
+    nudged_ = false;
+    return std::exchange(arrivals_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Arrival> arrivals_;
+  bool nudged_ = false;
+};
+
+class InboxObserver final : public LinkObserver {
+ public:
+  InboxObserver(std::shared_ptr<Inbox> inbox, std::uint64_t connection)
+      : inbox_(std::move(inbox)), connection_(connection) {}
+  void received(ToWorker message) override { inbox_->push({connection_, std::move(message)}); }
+  void lost(Error why) override { inbox_->push({connection_, ConnectionLost{std::move(why)}}); }
+
+ private:
+  std::shared_ptr<Inbox> inbox_;
+  const std::uint64_t connection_;
+};
+
+}  // namespace ls::worker
