@@ -1,5 +1,6 @@
-// The fake renderer's pixels: sums that are a pure function of (seed, pixel, sample, channel) by integer arithmetic, so that
-// they are the same on every machine. Noise around a smooth picture: errors, folding and stopping behave as with a real one.
+// The fake renderer's pixels: sums that are a pure function of (seed, pixel, sample, channel) by integer
+// arithmetic, so that they are the same on every machine. Noise around a smooth picture: errors, folding and
+// stopping behave as with a real one.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +21,13 @@ constexpr std::uint64_t mix64(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// One sample: uniform in [0, 2 m), a multiple of 2^-24, so that float and double hold it exactly. m is the pixel's mean, 1/4 to 1.
+// One sample: uniform in [0, 2 m), a multiple of 2^-24, so that float and double hold it exactly. m is the
+// pixel's mean, 1/4 to 1.
 constexpr double fake_sample(std::uint64_t seed, int x, int y, std::uint64_t sample, int channel) {
-  const std::uint64_t pixel = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) |
-                              static_cast<std::uint32_t>(x);
-  const std::uint64_t h = mix64(mix64(mix64(seed) ^ pixel) ^ (sample * 4 + static_cast<std::uint64_t>(channel)));
+  const std::uint64_t pixel =
+      (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) | static_cast<std::uint32_t>(x);
+  const std::uint64_t h =
+      mix64(mix64(mix64(seed) ^ pixel) ^ (sample * 4 + static_cast<std::uint64_t>(channel)));
   const std::uint64_t wave = static_cast<std::uint64_t>((x * 3 + y * 5 + channel * 64) & 255);
   const std::uint64_t twice_mean = 128 + (wave < 128 ? wave : 255 - wave) * 3;  // in 1/256
   return static_cast<double>((h >> 40) * twice_mean >> 8) * 0x1p-24;

@@ -1,0 +1,124 @@
+#include "common/image/final_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "common/image/exr_file.h"
+
+namespace ls {
+namespace {
+
+constexpr float kLargestHalf = 65504;
+
+// -0 + 0 is +0 when rounding to nearest; everything else is unchanged.
+float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
+
+struct Planes {
+  std::size_t width;
+  std::vector<float> rgb[3], standard_error[3];
+  std::vector<std::uint32_t> spp;
+};
+
+Planes gather(const Film& film) {
+  const FrameSize frame = film.grid().frame;
+  const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  Planes out{static_cast<std::size_t>(frame.width), {}, {}, std::vector<std::uint32_t>(pixels)};
+  for (int c = 0; c < 3; ++c) out.rgb[c].resize(pixels), out.standard_error[c].resize(pixels);
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    const TilePixels tile = film.pixels(t);
+    // A UINT layer ends at 2^32 - 1; job limits stay below it.
+    const auto spp = static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(tile.spp, std::numeric_limits<std::uint32_t>::max()));
+    std::size_t from = 0;
+    for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
+      for (int x = tile.rect.x0; x < tile.rect.x1; ++x, from += 3) {
+        const std::size_t to = static_cast<std::size_t>(y) * out.width + static_cast<std::size_t>(x);
+        for (std::size_t c = 0; c < 3; ++c) {
+          out.rgb[c][to] = pixel_value(tile.mean[from + c]);
+          out.standard_error[c][to] = static_cast<float>(tile.standard_error[from + c]);
+        }
+        out.spp[to] = spp;
+      }
+    }
+  }
+  return out;
+}
+
+std::uint64_t clamp_to_half(std::vector<float>& plane) {
+  std::uint64_t clamped = 0;
+  for (float& v : plane) {
+    if (std::abs(v) <= kLargestHalf) continue;
+    v = std::copysign(kLargestHalf, v);
+    ++clamped;
+  }
+  return clamped;
+}
+
+std::string tile_digests(const Film& film) {
+  std::string out;
+  out.reserve(std::size_t{65} * film.grid().count());
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (t) out += ' ';
+    out += film.tile_digest(t).hex();
+  }
+  return out;
+}
+
+}  // namespace
+
+Digest pixels_sha256(const Film& film) {
+  static_assert(std::endian::native == std::endian::little);
+  const TileGrid& grid = film.grid();
+  const auto width = static_cast<std::size_t>(grid.frame.width);
+  Sha256 hash;
+  std::vector<float> band;
+  for (int row = 0; row < grid.rows(); ++row) {
+    const auto first = static_cast<TileIndex>(row) * static_cast<TileIndex>(grid.columns());
+    const PixelRect band_rect = grid.rect(first);
+    band.assign(width * static_cast<std::size_t>(band_rect.height()) * 3, 0.0f);
+    for (TileIndex t = first; t < first + static_cast<TileIndex>(grid.columns()); ++t) {
+      const TilePixels tile = film.pixels(t);
+      std::size_t from = 0;
+      for (int y = 0; y < tile.rect.height(); ++y) {
+        float* to = &band[(static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0)) * 3];
+        for (int i = 0; i < 3 * tile.rect.width(); ++i) *to++ = pixel_value(tile.mean[from++]);
+      }
+    }
+    hash.update(std::as_bytes(std::span(band)));
+  }
+  return hash.finish();
+}
+
+Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output) {
+  Planes planes = gather(film);
+  FinalImage out;
+  ExrPicture picture{film.grid().frame, {}, {}};
+  constexpr const char* kRgb[3] = {"R", "G", "B"};
+  for (int c = 0; c < 3; ++c) {
+    const std::string layer = fmt::format("stderr.{}", kRgb[c]);
+    if (!float_output) out.clamped += clamp_to_half(planes.rgb[c]);
+    if (float_output) picture.channels[kRgb[c]] = ExrFloat{std::move(planes.rgb[c])};
+    if (!float_output) picture.channels[kRgb[c]] = ExrHalf{std::move(planes.rgb[c])};
+    picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
+  }
+  picture.channels["spp"] = ExrUint{std::move(planes.spp)};
+  picture.strings = {{"lightshaft:scene", from.scene.hex()},
+                     {"lightshaft:job", from.settings_json},
+                     {"lightshaft:build", from.build},
+                     {"lightshaft:class", from.numeric_class.hex()},
+                     {"lightshaft:seed", fmt::format("{}", from.seed)},
+                     {"lightshaft:relmse", fmt::format("{:.9g}", image_error(film.error()).relmse)},
+                     {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
+                     {"lightshaft:tiles", tile_digests(film)}};
+  auto exr = write_exr(picture);
+  if (!exr) return tl::unexpected(exr.error());
+  out.exr = std::move(*exr);
+  return out;
+}
+
+}  // namespace ls

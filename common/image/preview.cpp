@@ -1,0 +1,76 @@
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/image/final_image.h"
+
+namespace ls {
+namespace {
+
+constexpr double kMaxStops = 60;
+constexpr std::array<png_byte, 3> kNaN = {255, 0, 255};
+constexpr int kChecker = 8;  // pixels
+constexpr std::array<png_byte, 3> kEmpty[2] = {{24, 24, 27}, {31, 31, 35}};
+
+// kSteps[i]: the linear value at which the sRGB code i + 1 begins (IEC 61966-2-1, rounded to nearest).
+std::array<double, 255> srgb_steps() {
+  std::array<double, 255> out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double v = (static_cast<double>(i) + 0.5) / 255;
+    out[i] = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  }
+  return out;
+}
+
+void draw_tile(const Film& film, TileIndex index, double scale, png_byte* image) {
+  static const std::array<double, 255> kSteps = srgb_steps();
+  const TilePixels tile = film.pixels(index);
+  const auto width = static_cast<std::size_t>(film.grid().frame.width);
+  std::size_t from = 0;
+  for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
+    png_byte* to = image + (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0)) * 3;
+    for (int x = tile.rect.x0; x < tile.rect.x1; ++x, to += 3, from += 3) {
+      const double* v = &tile.mean[from];
+      if (tile.spp == 0) {
+        std::copy_n(kEmpty[(x / kChecker + y / kChecker) % 2].begin(), 3, to);
+      } else if (std::isnan(v[0] + v[1] + v[2])) {
+        std::copy_n(kNaN.begin(), 3, to);
+      } else {
+        for (int c = 0; c < 3; ++c)
+          to[c] = static_cast<png_byte>(std::upper_bound(kSteps.begin(), kSteps.end(), v[c] * scale) -
+                                        kSteps.begin());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops) {
+  if (!(std::abs(exposure_stops) <= kMaxStops))
+    return fail(Errc::invalid_argument, fmt::format("exposure: {} stops; from -{} to {} are possible",
+                                                    exposure_stops, kMaxStops, kMaxStops));
+  const FrameSize frame = film.grid().frame;
+  std::vector<png_byte> pixels(static_cast<std::size_t>(frame.width) *
+                               static_cast<std::size_t>(frame.height) * 3);
+  for (TileIndex t = 0; t < film.grid().count(); ++t)
+    draw_tile(film, t, std::exp2(exposure_stops), pixels.data());
+
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(frame.width);
+  image.height = static_cast<png_uint_32>(frame.height);
+  image.format = PNG_FORMAT_RGB;
+  image.flags = PNG_IMAGE_FLAG_FAST;
+  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::vector<std::byte> png(bytes);
+  if (!png_image_write_to_memory(&image, png.data(), &bytes, 0, pixels.data(), 0, nullptr))
+    return fail(Errc::internal, fmt::format("writing a PNG: {}", image.message));
+  png.resize(bytes);
+  return png;
+}
+
+}  // namespace ls
