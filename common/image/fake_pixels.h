@@ -1,53 +1,59 @@
-// The fake renderer's pixels: sums that are a pure function of (seed, pixel, sample, channel) by integer
-// arithmetic, so that they are the same on every machine. Noise around a smooth picture: errors, folding and
-// stopping behave as with a real one.
+// Pixels of the fake renderer: a pure function of the unit, for tests of everything around the renderer. A sample is
+// hash(scene, settings, pixel, sample) / 256 with an integer numerator below 256 plus a gradient of the pixel, so that
+// float sums of up to 2^15 samples are exact: sums over [a,b) and [b,c) of one half add up to those over [a,c), bit for
+// bit, and a test may compare any two groupings.
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <cstdint>
-#include <vector>
+#include <cstring>
 
-#include "common/image/frame.h"
 #include "common/image/partial.h"
-#include "common/image/rounds.h"
 
 namespace ls {
 
-// splitmix64's finaliser (Steele, Lea, Flood 2014): a bijection of 64-bit integers that mixes well.
-constexpr std::uint64_t mix64(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+inline std::uint64_t fake_mix(std::uint64_t x) {  // the finaliser of splitmix64
+  x ^= x >> 30;
+  x *= 0xbf58476d1ce4e5b9ull;
+  x ^= x >> 27;
+  x *= 0x94d049bb133111ebull;
   return x ^ (x >> 31);
 }
 
-// One sample: uniform in [0, 2 m), a multiple of 2^-24, so that float and double hold it exactly. m is the
-// pixel's mean, 1/4 to 1.
-constexpr double fake_sample(std::uint64_t seed, int x, int y, std::uint64_t sample, int channel) {
-  const std::uint64_t pixel =
-      (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) | static_cast<std::uint32_t>(x);
-  const std::uint64_t h =
-      mix64(mix64(mix64(seed) ^ pixel) ^ (sample * 4 + static_cast<std::uint64_t>(channel)));
-  const std::uint64_t wave = static_cast<std::uint64_t>((x * 3 + y * 5 + channel * 64) & 255);
-  const std::uint64_t twice_mean = 128 + (wave < 128 ? wave : 255 - wave) * 3;  // in 1/256
-  return static_cast<double>((h >> 40) * twice_mean >> 8) * 0x1p-24;
+// All that names a unit's pixels but its place: the first 8 bytes of both digests.
+inline std::uint64_t fake_seed(const UnitHeader& header) {
+  std::uint64_t scene = 0, settings = 0;
+  std::memcpy(&scene, header.scene.bytes.data(), sizeof scene);
+  std::memcpy(&settings, header.settings.bytes.data(), sizeof settings);
+  return fake_mix(scene + 0x9e3779b97f4a7c15ull) ^ fake_mix(settings);
 }
 
-// The six planes of a Partial.
-inline std::vector<float> fake_sums(std::uint64_t seed, PixelRect rect, SampleRange samples) {
-  const auto plane = static_cast<std::size_t>(rect.pixels());
-  std::vector<float> sums(plane * kPartialChannels);
+// One sample: R, G, B in [0, 2), multiples of 1/256.
+inline std::array<float, 3> fake_sample(std::uint64_t seed, int x, int y, std::uint64_t sample) {
+  const auto place = static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32 | static_cast<std::uint32_t>(x);
+  const std::uint64_t h = fake_mix(fake_mix(seed ^ fake_mix(place)) + sample);
+  std::array<float, 3> rgb{};
+  for (int c = 0; c < 3; ++c) {
+    const auto noise = static_cast<std::uint32_t>(h >> (8 * c)) & 255u;
+    const std::uint32_t gradient = static_cast<std::uint32_t>(c == 0 ? x : c == 1 ? y : x + y) & 255u;
+    rgb[static_cast<std::size_t>(c)] = static_cast<float>(noise + gradient) / 256.f;
+  }
+  return rgb;
+}
+
+inline Partial fake_partial(const UnitHeader& header) {
+  Partial partial{header, {}};
+  const auto pixels = static_cast<std::size_t>(header.tile.pixels());
+  partial.sums.assign(pixels * kPartialChannels, 0.f);
+  const std::uint64_t seed = fake_seed(header);
   std::size_t i = 0;
-  for (int y = rect.y0; y < rect.y1; ++y)
-    for (int x = rect.x0; x < rect.x1; ++x, ++i)
-      for (int half = 0; half < 2; ++half)
-        for (int channel = 0; channel < 3; ++channel) {
-          double sum = 0;
-          for (std::uint64_t s = samples.s0 + static_cast<std::uint64_t>(half); s < samples.s1; s += 2)
-            sum += fake_sample(seed, x, y, s, channel);
-          sums[static_cast<std::size_t>(half * 3 + channel) * plane + i] = static_cast<float>(sum);
-        }
-  return sums;
+  for (int y = header.tile.y0; y < header.tile.y1; ++y)
+    for (int x = header.tile.x0; x < header.tile.x1; ++x, ++i)
+      for (std::uint64_t s = header.samples.s0; s < header.samples.s1; ++s) {
+        const auto rgb = fake_sample(seed, x, y, s);
+        for (std::size_t c = 0; c < 3; ++c) partial.sums[((s & 1) * 3 + c) * pixels + i] += rgb[c];
+      }
+  return partial;
 }
 
 }  // namespace ls
