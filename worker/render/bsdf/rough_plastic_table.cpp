@@ -12,7 +12,8 @@ namespace ls::render {
 namespace {
 
 struct Quadrature {
-  std::vector<double> x, w;  // on [0, 1]
+  std::vector<double> x, w;             // on [0, 1]
+  std::vector<double> gauss, cos, sin;  // at the nodes: the inverse of the error function of 2 x - 1; of pi x
 };
 
 // Gauss-Legendre: roots of P_n by Newton's method from Tricomi's estimate.
@@ -28,6 +29,9 @@ Quadrature gauss_legendre(int n) {
     }
     q.x.push_back(.5 * (1 - x));
     q.w.push_back(1 / ((1 - x * x) * dp * dp));
+    q.gauss.push_back(beckmann::erf_inverse(2 * q.x.back() - 1));
+    q.cos.push_back(std::cos(M_PI * q.x.back()));
+    q.sin.push_back(std::sin(M_PI * q.x.back()));
   }
   return q;
 }
@@ -40,17 +44,26 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// F(i.m) G1(o) for the reflection o of i = (sin, 0, cos) about m.
-double reflected(Microfacet type, double alpha, double eta, double sin, double cos, double mx, double my, double mz) {
+// How much of what comes from i = (sin, 0, cos) a microfacet with normal m sends on: reflected with weight F, or refracted
+// with 1 - F, times the masking of the new direction.
+enum class Way { reflected, refracted };
+double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx, double my, double mz) {
   const double im = sin * mx + cos * mz;
-  const double oz = 2 * im * mz - cos;
-  if (!(im > 0) || !(oz > 0)) return 0;
-  const double ox = 2 * im * mx - sin, oy = 2 * im * my;
-  return fresnel_dielectric(im, eta).reflectance * masking(type, alpha, ox, oy, oz);
+  if (!(im > 0)) return 0;
+  const DielectricFresnel f = fresnel_dielectric(im, eta);
+  const bool up = way == Way::reflected;
+  const double along_m = up ? 2 * im : im * f.eta_ti + f.cos_t, along_i = up ? 1 : f.eta_ti;
+  const double ox = along_m * mx - along_i * sin, oy = along_m * my, oz = along_m * mz - along_i * cos;
+  const double share = up ? f.reflectance : 1 - f.reflectance;
+  if (share <= 0 || !((up ? oz : -oz) > 0)) return 0;
+  return share * masking(type, alpha, ox, oy, std::abs(oz));
 }
 
-double rough_reflectance(Microfacet type, double alpha, double eta, double mu, const Quadrature& q) {
-  if (alpha < kSpecularAlpha) return fresnel_dielectric(mu, eta).reflectance;
+double rough_share(Way way, Microfacet type, double alpha, double eta, double mu, const Quadrature& q) {
+  if (alpha < kSpecularAlpha) {
+    const double R = fresnel_dielectric(mu, eta).reflectance;
+    return way == Way::reflected ? R : 1 - R;
+  }
   const double sin = std::sqrt(1 - mu * mu), l = std::hypot(alpha * sin, mu);
   const double is = alpha * sin / l, ic = mu / l;  // the viewer, stretched to roughness 1
   double sum = 0;
@@ -59,13 +72,13 @@ double rough_reflectance(Microfacet type, double alpha, double eta, double mu, c
     const double slope = type == Microfacet::beckmann ? beckmann::visible_slope(ic, is, q.x[a]) : 0;
     const double cap = (1 - q.x[a]) * (1 + ic) - ic, r = safe_sqrt((1 - cap) * (1 + cap));
     for (std::size_t b = 0; b < q.x.size(); ++b) {
-      if (type == Microfacet::beckmann) {  // the two halves across the viewer are alike
-        x = -alpha * slope, y = alpha * beckmann::erf_inverse(q.x[b]), z = 1;
-      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); both halves alike
-        x = alpha * (r * std::cos(M_PI * q.x[b]) + is), y = alpha * r * std::sin(M_PI * q.x[b]), z = cap + ic;
+      if (type == Microfacet::beckmann) {
+        x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
+      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are alike
+        x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);
-      row += q.w[b] * reflected(type, alpha, eta, sin, mu, x * n, y * n, z * n);
+      row += q.w[b] * sent_on(way, type, alpha, eta, sin, mu, x * n, y * n, z * n);
     }
     sum += q.w[a] * row;
   }
@@ -81,8 +94,8 @@ RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double
   for (int i = 0; i < kPlasticNodes; ++i) {
     const double mu = std::max(1e-6, i / (kPlasticNodes - 1.));
     t.transmittance[i] =
-        static_cast<float>(1 - rough_reflectance(type, alpha, eta, mu, eta > 1 ? kOutside : kInside));
-    internal += mu * rough_reflectance(type, alpha, 1 / eta, mu, eta > 1 ? kInside : kOutside);
+        static_cast<float>(rough_share(Way::refracted, type, alpha, eta, mu, eta > 1 ? kOutside : kInside));
+    internal += mu * rough_share(Way::reflected, type, alpha, 1 / eta, mu, eta > 1 ? kInside : kOutside);
   }
   t.internal_reflectance = static_cast<float>(2 * internal / kPlasticNodes);
   return t;

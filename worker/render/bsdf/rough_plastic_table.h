@@ -23,7 +23,7 @@ struct RoughPlasticTable {
 
 // The nodes, the linear interpolation between them and the internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a
 // plain mean, not a quadrature: it lies about 0.009 below the integral) are the dialect's definition of the material.
-// The rough reflectances at the nodes are integrals over visible normals, done here by Gauss-Legendre in double.
+// At the nodes: integrals over visible normals of (1 - F) G1(refracted) and F G1(reflected), by Gauss-Legendre in double.
 // alpha < kSpecularAlpha: a smooth coat. eta: inside over outside.
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);
 

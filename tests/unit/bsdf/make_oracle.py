@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""Writes oracle_values.inc: f |cos wi| of each material as Mitsuba 3 evaluates it, at fixed directions.
+
+Needs the `mitsuba` package (3.9.1 made the committed table) in an environment of its own:
+    python3 tests/unit/bsdf/make_oracle.py > tests/unit/bsdf/oracle_values.inc
+The material names are the keys of the table in mitsuba_values_test.cpp.
+"""
+import math
+import random
+
+import mitsuba as mi
+
+mi.set_variant("scalar_rgb")
+
+
+def rgb(r, g, b):
+    return {"type": "rgb", "value": [r, g, b]}
+
+
+GOLD = {"eta": rgb(0.14, 0.37, 1.44), "k": rgb(3.98, 2.38, 1.60)}
+MATERIALS = {
+    "diffuse": {"type": "diffuse", "reflectance": rgb(0.2, 0.5, 0.9)},
+    "twosided": {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": rgb(0.2, 0.5, 0.9)}},
+}
+for dist in ("beckmann", "ggx"):
+    for a in (0.02, 0.1, 0.5, 1.0):
+        MATERIALS[f"conductor_{dist}_{a}"] = dict(GOLD, type="roughconductor", distribution=dist, alpha=a)
+    MATERIALS[f"conductor_{dist}_aniso"] = dict(GOLD, type="roughconductor", distribution=dist, alpha_u=0.3, alpha_v=0.05,
+                                               specular_reflectance=rgb(0.9, 0.8, 0.7))
+    for a in (0.05, 0.1, 0.3, 0.7):
+        MATERIALS[f"plastic_{dist}_{a}"] = {"type": "roughplastic", "distribution": dist, "alpha": a,
+                                            "int_ior": 1.49, "ext_ior": 1.000277,
+                                            "diffuse_reflectance": rgb(0.1, 0.27, 0.9)}
+    MATERIALS[f"plastic_{dist}_nonlinear"] = {"type": "roughplastic", "distribution": dist, "alpha": 0.2,
+                                              "int_ior": 1.9, "ext_ior": 1.0, "nonlinear": True,
+                                              "diffuse_reflectance": rgb(0.1, 0.27, 0.9),
+                                              "specular_reflectance": rgb(1, 0.5, 0.25)}
+
+
+def direction(cos_theta, phi):
+    s = math.sqrt(max(0.0, 1 - cos_theta * cos_theta))
+    return [s * math.cos(phi), s * math.sin(phi), cos_theta]
+
+
+def pairs(name, material):
+    rng = random.Random(name)
+    for k, mu in enumerate((0.99, 0.8, 0.5, 0.2, 0.05)):
+        wo = direction(mu, rng.uniform(0, 2 * math.pi))
+        for spread in (0.05, 0.3, 1.0):
+            mirror = [-wo[0], -wo[1], wo[2]]
+            wi = [m + spread * rng.gauss(0, 1) for m in mirror]
+            wi[2] = abs(wi[2])
+            n = math.sqrt(sum(x * x for x in wi))
+            yield wo, [x / n for x in wi]
+    if name == "twosided":
+        yield [0.6, 0, -0.8], [0, 0.6, -0.8]
+
+
+print("// Made by make_oracle.py with Mitsuba", mi.__version__ + ". {material, wo, wi, f |cos wi|}")
+for name, spec in MATERIALS.items():
+    bsdf = mi.load_dict(spec)
+    for wo, wi in pairs(name, spec):
+        si = mi.SurfaceInteraction3f()
+        si.wi = wo
+        si.uv = [0.5, 0.5]
+        si.t = 1
+        v = bsdf.eval(mi.BSDFContext(), si, wi)
+        numbers = ", ".join("{" + ", ".join(f"{float(x):.8g}" for x in t) + "}" for t in (wo, wi, v))
+        print(f'{{"{name}", {numbers}}},')
