@@ -20,7 +20,8 @@ struct Send {
   ToWorker message;
 };
 
-// These units are no longer lent under this lease and wait for another worker (unless another lease holds them too).
+// These units are no longer lent under this lease and wait for another worker (unless another lease holds
+// them too).
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -37,8 +38,8 @@ struct RecordUnit {
   WorkerId worker;
 };
 
-// Fold this unit's accepted partial into the film, then raise UnitFolded. Rounds of a tile come in order, each once; no
-// round beyond a target's stop is ever asked for.
+// Fold this unit's accepted partial into the film, then raise UnitFolded. Rounds of a tile come in order,
+// each once; no round beyond a target's stop is ever asked for.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
@@ -55,7 +56,8 @@ struct DropUnwanted {
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A running job fails.
+// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A running job
+// fails.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -77,7 +79,8 @@ struct Checkpoint {
   RoundIndex round = 0;
   std::uint64_t spp = 0;
 };
-// With an extension the cut round `round` is rendered again: its folded tail is to be replaced, its partials are void.
+// With an extension the cut round `round` is rendered again: its folded tail is to be replaced, its partials
+// are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
@@ -87,7 +90,8 @@ struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
 };
-// For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to `failed`.
+// For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to
+// `failed`.
 struct JobFailed {
   JobId job;
   std::string error;
@@ -110,8 +114,8 @@ struct WorkerForgotten {
   WorkerId worker;
 };
 
-using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
-                            JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed, WorkerStateChanged,
-                            WorkerBlocked, WorkerForgotten>;
+using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch,
+                            JobPinned, JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed,
+                            WorkerStateChanged, WorkerBlocked, WorkerForgotten>;
 
 }  // namespace ls::coordinator

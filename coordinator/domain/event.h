@@ -28,7 +28,8 @@ struct JobPlan {
   std::vector<std::string> tags;       // a worker must carry all of them
 };
 
-// ---- jobs -----------------------------------------------------------------------------------------------------------
+// ---- jobs
+// -----------------------------------------------------------------------------------------------------------
 struct JobSubmitted {
   JobPlan plan;
 };
@@ -44,12 +45,14 @@ struct JobRestored {
   };
   JobPlan plan;
   JobState state = JobState::queued;
-  std::optional<StopReason> stopped;           // of a job that is done
-  std::optional<Digest> numeric_class;         // it was pinned to
-  std::vector<Unit> accepted;                  // durable results, in any order
-  std::vector<RoundIndex> folded;              // rounds in the restored film, by tile; empty: nothing is folded yet
-  std::vector<std::vector<double>> rel_error;  // [round][tile] of what is folded, as UnitFolded said; only with a target
-  double elapsed_seconds = 0;                  // since its first ray, before the restart
+  std::optional<StopReason> stopped;    // of a job that is done
+  std::optional<Digest> numeric_class;  // it was pinned to
+  std::vector<Unit> accepted;           // durable results, in any order
+  std::vector<RoundIndex> folded;       // rounds in the restored film (with tails), by tile; empty: none.
+                                        // A job that is done must have them
+  std::vector<std::vector<double>>
+      rel_error;               // [round][tile] of what is folded, as UnitFolded said; only with a target
+  double elapsed_seconds = 0;  // since its first ray, before the restart
 };
 
 struct JobCancelled {
@@ -69,7 +72,8 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
-// To this new total, of a running, paused or done job. A target error or time already reached no longer applies.
+// To this new total, of a running, paused or done job. A target error or time already reached no longer
+// applies.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -79,8 +83,9 @@ struct JobForgotten {
   JobId job;
 };
 
-// ---- workers --------------------------------------------------------------------------------------------------------
-// A stream has been registered. An older stream of the same worker counts as lost.
+// ---- workers
+// -------------------------------------------------------------------------------------------------------- A
+// stream has been registered. An older stream of the same worker counts as lost.
 struct WorkerJoined {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -106,7 +111,8 @@ struct LeaseCameBack {
   LeaseReturned returned;
 };
 
-// ---- units ----------------------------------------------------------------------------------------------------------
+// ---- units
+// ----------------------------------------------------------------------------------------------------------
 // A verified and durable result. Raised once per arrival; the farm sorts out duplicates.
 struct UnitAccepted {
   UnitKey unit;
@@ -118,9 +124,12 @@ struct UnitAccepted {
 // The assembler did what Fold asked for.
 struct UnitFolded {
   UnitKey unit;
-  // Sum over pixels and channels of the tile of squared error / (reference^2 + 0.01) with all rounds up to this one.
+  SampleRange samples;  // as Fold named them
+  // Sum over pixels and channels of the tile's relative squared error, with all rounds up to this one:
+  // TileError::relative.squares of common/image/error_estimate.h.
   double rel_error_sum = 0;
 };
+// What the worker said, or the service itself of a result that is not what it claims to be.
 struct UnitFailed {
   WorkerId worker;
   UnitFailure failure;
@@ -129,8 +138,8 @@ struct UnitFailed {
 // Raised regularly (about once a second): deadlines, speculation, forgiveness, time budgets.
 struct Tick {};
 
-using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
-                           JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains, LeaseProgress,
-                           LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped,
+                           JobPriority, JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains,
+                           LeaseProgress, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -1,13 +1,15 @@
-// The farm: one state machine that decides who renders what, what is folded when, and when a job ends. A function of
-// events and time: no I/O, no threads, no clock, no log. Not thread-safe; the service holds one mutex around it.
+// The farm: one state machine that decides who renders what, what is folded when, and when a job ends. A
+// function of events and time: no I/O, no threads, no clock, no log. Not thread-safe; the service holds one
+// mutex around it.
 //
 //   effects = farm.handle(event, now)      now never goes back
 //
-// A result's way: worker -> service asks wanted(unit) -> verifies the partial, makes it durable -> UnitAccepted ->
-// {RecordUnit, Fold...} -> the assembler folds -> UnitFolded -> {Checkpoint, JobFinished...}.
+// A result's way: worker -> service asks wanted(unit) -> verifies the partial, makes it durable ->
+// UnitAccepted -> {RecordUnit, Fold...} -> the assembler folds -> UnitFolded -> {Checkpoint, JobFinished...}.
 // Several results of one unit may be under way at once: the first UnitAccepted wins.
 //
-// The cost of handle() does not grow with the number of tiles or units, except once per round (checkpoint) and per job.
+// The cost of handle() does not grow with the number of tiles or units, except once per round (checkpoint)
+// and per job.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +35,7 @@ struct Wanted {
     no          // acknowledge and drop
   };
   Verdict verdict = Verdict::no;
-  SampleRange samples;                  // the range that is wanted of this unit now
+  SampleRange samples;  // the range that is wanted of this unit now
   PixelRect rect;
   std::optional<Digest> numeric_class;  // that the job is pinned to; nothing: any, it will be the first
   std::string why;                      // with `no`
@@ -42,16 +44,17 @@ struct Wanted {
 struct JobFigures {
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
-  std::uint64_t spp = 0;            // asked, or the limit
-  std::uint64_t units_total = 0;    // planned, as far as known: a reached target shrinks it
-  std::uint64_t units_done = 0;     // accepted
-  std::uint64_t units_leased = 0;   // distinct units out at workers
-  std::uint64_t units_queued = 0;   // total = done + leased + queued
+  std::uint64_t spp = 0;           // asked, or the limit
+  std::uint64_t units_total = 0;   // planned, as far as known: a reached target shrinks it
+  std::uint64_t units_done = 0;    // accepted
+  std::uint64_t units_leased = 0;  // distinct units out at workers
+  std::uint64_t units_queued = 0;  // total = done + leased + queued
   std::uint64_t units_folded = 0;
-  RoundIndex rounds_complete = 0;   // folded over all tiles
+  RoundIndex rounds_complete = 0;  // folded over all tiles
   int priority = 0;
-  double core_seconds_left = 0;     // predicted for what is not done, from measured cost; 0: nothing measured yet
-  double seconds_per_sample = 0;    // mean CPU seconds per pixel sample; 0: nothing measured yet
+  double core_seconds_left =
+      0;  // predicted for what is not done, from measured cost; 0: nothing measured yet
+  double seconds_per_sample = 0;  // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
 };
@@ -92,8 +95,8 @@ class Farm {
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;
   std::vector<WorkerId> tile_workers(const JobId& id, TileIndex tile) const;  // scans the leases
-  // Why a job that could run has no worker: names workers of another class, without its tags, blocked or sick. Empty
-  // while someone may take it.
+  // Why a job that could run has no worker: names workers of another class, without its tags, blocked or
+  // sick. Empty while someone may take it.
   std::string why_waiting(const JobId& id) const;
   int threads_connected() const;
 

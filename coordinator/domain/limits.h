@@ -11,26 +11,29 @@ namespace ls::coordinator {
 using namespace std::chrono_literals;
 
 // ---- jobs ----
-inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;   // of a job that only names a target error or a time
+inline constexpr std::uint64_t kMaxSppWithoutLimit =
+    65536;  // of a job that only names a target error or a time
 inline constexpr std::uint64_t kMaxUnitsPerJob = 1ull << 26;  // 40 bytes each once accepted
 inline constexpr std::uint32_t kMaxTiles = 1u << 22;
 
 // ---- leases ----
-inline constexpr double kLeaseSeconds = 2.0;            // that a lease should keep all threads of a worker busy
-inline constexpr std::uint32_t kMaxLeaseUnits = 1024;   // keeps an assignment well below 1 MiB
-inline constexpr std::uint32_t kLeasesPerWorker = 3;    // one being rendered, two ahead
+inline constexpr double kLeaseSeconds = 2.0;  // that a lease should keep all threads of a worker busy
+inline constexpr std::uint32_t kMaxLeaseUnits = 1024;     // keeps an assignment well below 1 MiB
+inline constexpr std::uint32_t kLeasesPerWorker = 3;      // one being rendered, two ahead
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // at a job's tail leases are single units
-inline constexpr double kDeadlineFactor = 3.0;          // of the predicted duration
+inline constexpr double kDeadlineFactor = 3.0;            // of the predicted duration
 inline constexpr Duration kDeadlineSlack = 10s;
-inline constexpr Duration kLoadSlack = 120s;            // more, until a worker has finished a unit of the job
-inline constexpr Duration kNoGrowthLimit = 600s;        // progress without a finished unit renews no longer than this
-inline constexpr double kSpeculateAfter = 1.5;          // of the predicted duration: then idle workers may copy units
+inline constexpr Duration kLoadSlack = 120s;  // more, until a worker has finished a unit of the job
+inline constexpr Duration kNoGrowthLimit =
+    600s;                                       // progress without a finished unit renews no longer than this
+inline constexpr double kSpeculateAfter = 1.5;  // of the predicted duration: then idle workers may copy units
 inline constexpr Duration kSpeculateSlack = 1s;
-inline constexpr std::uint32_t kSpeculationScan = 64;   // oldest leases looked at for one idle worker
+inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked at for one idle worker
 
 // ---- rounds leased ahead of what is folded over all tiles ----
-inline constexpr RoundIndex kRoundsAhead = 64;        // bounds what waits to be folded
-inline constexpr RoundIndex kRoundsAheadOfStop = 2;   // with a target: beyond the last round that is surely wanted
+inline constexpr RoundIndex kRoundsAhead = 64;  // bounds what waits to be folded
+inline constexpr RoundIndex kRoundsAheadOfStop =
+    2;  // with a target: beyond the last round that is surely wanted
 
 // ---- failures ----
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;   // a unit may fail on so many distinct workers...
@@ -38,8 +41,8 @@ inline constexpr std::uint32_t kUnitFailureAttempts = 2;  // ...and at least so 
 inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;
 inline constexpr std::uint32_t kSickJobs = 2;
 inline constexpr Duration kForgiveAfter = 1800s;
-inline constexpr Duration kForgetWorkerAfter = 3600s;     // lost for so long
-inline constexpr std::uint32_t kMaxNamedWorkers = 8;      // in a message
+inline constexpr Duration kForgetWorkerAfter = 3600s;  // lost for so long
+inline constexpr std::uint32_t kMaxNamedWorkers = 8;   // in a message
 
 // ---- stopping ----
 inline constexpr std::uint64_t kMinSppBeforeStop = 64;

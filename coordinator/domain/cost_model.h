@@ -1,0 +1,42 @@
+// What a sample costs, measured from the CPU seconds that results report: per tile, and the job's running
+// mean for tiles not measured yet. Decides the size of leases and their deadlines, never a pixel.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "common/image/frame.h"
+
+namespace ls::coordinator {
+
+class CostModel {
+ public:
+  explicit CostModel(TileIndex tiles) : tile_cost_(tiles, 0.0f) {}
+
+  // Absurd figures (negative, not finite, more than a day) are passed over.
+  void measured(TileIndex tile, std::uint64_t pixel_samples, double cpu_seconds) {
+    if (!(cpu_seconds >= 0 && cpu_seconds <= kMaxSeconds) || pixel_samples == 0) return;
+    const double n = static_cast<double>(pixel_samples);
+    seconds_ = seconds_ * kMemory + cpu_seconds;
+    samples_ = samples_ * kMemory + n;
+    tile_cost_[tile] = static_cast<float>(cpu_seconds / n);
+  }
+  bool known() const { return samples_ > 0; }
+  double per_sample() const { return known() ? seconds_ / samples_ : 0; }
+  // Predicted CPU seconds; 0 when nothing has been measured.
+  double predict(TileIndex tile, std::uint64_t pixel_samples) const {
+    if (!known()) return 0;
+    const double cost = tile_cost_[tile] > 0 ? tile_cost_[tile] : per_sample();
+    return std::max(kLeastSeconds, cost * static_cast<double>(pixel_samples));
+  }
+
+ private:
+  static constexpr double kMaxSeconds = 86400;
+  static constexpr double kLeastSeconds = 1e-4;     // the turn-around of any unit
+  static constexpr double kMemory = 1 - 1.0 / 256;  // the mean follows the last few hundred results
+  double seconds_ = 0, samples_ = 0;
+  std::vector<float> tile_cost_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,58 @@
+// Failures of units at workers (DESIGN 8): when a unit has failed often enough that the job must, and when a
+// worker has. Lost workers, expired deadlines and returned leases are infrastructure and never come here.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/protocol/messages.h"
+#include "coordinator/domain/limits.h"
+#include "coordinator/domain/unit_table.h"
+
+namespace ls::coordinator {
+
+struct FailedAttempt {
+  WorkerIndex worker = kNoWorker;
+  std::string worker_name;
+  UnitFailure failure;
+};
+
+// Units of one job that have failed and are not accepted yet.
+class UnitFailures {
+ public:
+  void add(UnitCode code, FailedAttempt attempt);
+  void accepted(UnitCode code) { units_.erase(code); }
+  bool failed_on(UnitCode code, WorkerIndex worker) const;
+  // On min(kUnitFailureWorkers, workers_known) distinct workers and in at least kUnitFailureAttempts
+  // attempts.
+  bool exhausted(UnitCode code, std::size_t workers_known) const;
+  const std::vector<FailedAttempt>& attempts(UnitCode code) const;
+  bool any() const { return !units_.empty(); }
+
+ private:
+  std::map<UnitCode, std::vector<FailedAttempt>> units_;  // attempts per unit are bounded by exhausted()
+};
+
+// One worker's failures in one job.
+struct WorkerFailures {
+  std::uint32_t count = 0;
+  TimePoint last{};
+  bool blocked = false;
+
+  void add(TimePoint now) {
+    if (count > 0 && now - last >= kForgiveAfter) *this = {};
+    ++count;
+    last = now;
+    blocked = count >= kWorkerFailuresPerJob;
+  }
+  bool blocked_at(TimePoint now) const { return blocked && now - last < kForgiveAfter; }
+};
+
+// The sentence for the job's owner: unit, pixel, signal, what each worker said, how to replay it.
+std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
+                             const std::vector<FailedAttempt>& attempts);
+
+}  // namespace ls::coordinator

@@ -1,0 +1,227 @@
+// Jobs: from submission to their end.
+#include <algorithm>
+#include <set>
+
+#include "coordinator/domain/farm_state.h"
+
+namespace ls::coordinator {
+
+Job* Farm::State::find(const JobId& id) const {
+  const auto it = by_id.find(id);
+  return it == by_id.end() ? nullptr : it->second;
+}
+
+Job& Farm::State::add(JobPlan plan) {
+  auto job = std::make_unique<Job>(++last_job, std::move(plan));
+  Job& added = *job;
+  by_id[added.plan.brief.job] = &added;
+  jobs.emplace(added.seq, std::move(job));
+  added.move_window(workers.threads());
+  return added;
+}
+
+void Farm::State::set_state(Job& job, JobState to) {
+  if (job.state == to) return;
+  effects.emplace_back(JobStateChanged{job.plan.brief.job, job.state, to});
+  job.state = to;
+}
+
+void Farm::State::refresh(Job& job) {
+  const std::pair key{-static_cast<std::int64_t>(job.plan.priority), job.seq};
+  if (job.leasable() && !job.queue.empty(job.units)) {
+    if (ready.emplace(key, &job).second) work_appeared = true;
+  } else {
+    ready.erase(key);
+  }
+}
+
+void Farm::State::on(const JobSubmitted& event) {
+  if (find(event.plan.brief.job) != nullptr || !check_plan(event.plan)) return;
+  refresh(add(event.plan));
+}
+
+namespace {
+
+// Where a job that is done ended: rounds 0..r-1 of all tiles and round r of the first few. Nothing if
+// `folded` has another shape.
+std::optional<UnitCode> end_of(const std::vector<RoundIndex>& folded) {
+  if (folded.empty()) return std::nullopt;
+  const auto [least, most] = std::minmax_element(folded.begin(), folded.end());
+  const auto first = std::find(folded.begin(), folded.end(), *least);
+  if (*least == *most) return unit_code(*least, 0);
+  if (*most != *least + 1 || !std::all_of(first, folded.end(), [&](RoundIndex r) { return r == *least; }))
+    return std::nullopt;
+  return unit_code(*least, static_cast<TileIndex>(first - folded.begin()));
+}
+
+}  // namespace
+
+void Farm::State::on(const JobRestored& event) {
+  if (find(event.plan.brief.job) != nullptr || !check_plan(event.plan)) return;
+  Job& job = add(event.plan);
+  job.state = event.state;
+  job.numeric_class = event.numeric_class;
+  if (event.elapsed_seconds > 0) job.first_ray = now - from_seconds(event.elapsed_seconds);
+  if (job.state == JobState::failed || job.state == JobState::cancelled) return;
+
+  const bool with_film = event.folded.size() == job.units.tiles();
+  if (job.state == JobState::done && with_film) {
+    job.stopping = event.stopped;
+    if (const auto end = end_of(event.folded)) job.cut_off(*end, event.stopped.value_or(StopReason::spp));
+  }
+  const UnitCode end = job.queue.end();
+  for (const JobRestored::Unit& unit : event.accepted) {
+    const UnitCode code = unit_code(unit.round, unit.tile);
+    if (unit.tile >= job.units.tiles() || code >= end || unit.samples != job.range(code)) continue;
+    if (!job.units.accepted(code)) job.units.accept(code, {unit.digest, workers.index_of(unit.worker)});
+  }
+  for (TileIndex t = 0; with_film && t < job.units.tiles(); ++t) {
+    const RoundIndex rounds = std::min(event.folded[t], round_of(end) + (t < tile_of(end) ? 1 : 0));
+    for (RoundIndex k = 0; k < rounds; ++k) {
+      if (!job.units.accepted(unit_code(k, t)))
+        job.units.accept(unit_code(k, t), {Digest{}, workers.index_of({})});
+      if (k < event.rel_error.size() && t < event.rel_error[k].size()) {
+        job.units.restore_error(k, t, event.rel_error[k][t]);
+      }
+    }
+    job.units.restore_folded(t, rounds);
+  }
+  job.move_window(workers.threads());
+  if (job.state == JobState::done) {
+    if (job.complete()) return;
+    job.stopping.reset();
+    set_state(job, JobState::running);
+  }
+  decide_stop(job);
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  finish_if_complete(job);
+  refresh(job);
+}
+
+void Farm::State::on(const JobCancelled& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->ended()) return;
+  set_state(*job, JobState::cancelled);
+  end(*job);
+}
+
+void Farm::State::on(const JobPaused& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !job->leasable()) return;
+  set_state(*job, JobState::paused);
+  refresh(*job);
+}
+
+void Farm::State::on(const JobResumed& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->state != JobState::paused) return;
+  set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
+  refresh(*job);
+}
+
+void Farm::State::on(const JobStopped& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->ended()) return;
+  freeze(*job, StopReason::user);
+  if (job->state == JobState::paused)
+    set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
+  refresh(*job);
+}
+
+void Farm::State::on(const JobPriority& event) {
+  Job* job = find(event.job);
+  if (job == nullptr) return;
+  ready.erase({-static_cast<std::int64_t>(job->plan.priority), job->seq});
+  job->plan.priority = event.priority;
+  refresh(*job);
+}
+
+void Farm::State::on(const JobExtended& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->state == JobState::failed || job->state == JobState::cancelled) return;
+  const bool cut_short = job->stopping && *job->stopping != StopReason::spp;
+  const UnitCode old_end = job->queue.end();
+  const std::uint64_t now_spp = cut_short ? cut_range(round_of(old_end) - 1, job->spp).s1 : job->spp;
+  const RoundIndex last = tile_of(old_end) > 0 ? round_of(old_end) : round_of(old_end) - 1;
+  const std::uint64_t new_spp = even_spp(event.spp);
+  JobPlan plan = job->plan;
+  plan.spp = new_spp;
+  if (new_spp <= now_spp || !check_plan(plan)) return;
+
+  if (cut_range(last, job->spp) != cut_range(last, new_spp)) {
+    const UnitCode from = unit_code(last, 0);
+    for (const LeaseSeq seq : leases_of(*job)) {
+      const LeaseRecord& lease = *leases.find(seq);
+      const bool concerned =
+          std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode u) { return u >= from; });
+      if (concerned) free_lease(seq, "round is rendered again in full", true);
+    }
+    job->queue.rewind(from);
+    job->units.reopen(last);
+    effects.emplace_back(ReopenRound{event.job, last});
+  }
+  if (job->stopping == StopReason::error) plan.target_error.reset();
+  if (job->stopping == StopReason::time) plan.time.reset();
+  job->plan = std::move(plan);
+  job->spp = new_spp;
+  job->stopping.reset();
+  job->queue.set_end(unit_code(round_count(new_spp), 0));
+  if (job->state == JobState::done) set_state(*job, JobState::running);
+  job->move_window(workers.threads());
+  decide_stop(*job);
+  for (TileIndex t = 0; t < job->units.tiles(); ++t) issue_folds(*job, t);
+  finish_if_complete(*job);
+  refresh(*job);
+}
+
+void Farm::State::on(const JobForgotten& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !job->ended()) return;
+  for (const auto& [index, worker] : workers.all()) {
+    worker->briefed.erase(job->seq);
+    worker->warmed_up.erase(job->seq);
+    worker->failures.erase(job->seq);
+  }
+  by_id.erase(event.job);
+  jobs.erase(job->seq);
+}
+
+void Farm::State::freeze(Job& job, StopReason reason) {
+  job.queue.skip_accepted(job.units);
+  const UnitCode begun = std::max(job.queue.cursor(), job.units.end_of_accepted());
+  job.cut_off(std::max(begun, unit_code(1, 0)), reason);
+  finish_if_complete(job);
+  refresh(job);
+}
+
+void Farm::State::finish_if_complete(Job& job) {
+  if (job.ended() || !job.complete()) return;
+  if (!job.stopping) job.stopping = StopReason::spp;
+  set_state(job, JobState::done);
+  effects.emplace_back(JobFinished{job.plan.brief.job, *job.stopping});
+  refresh(job);
+}
+
+void Farm::State::fail(Job& job, std::string error, std::optional<UnitFailure> failure) {
+  set_state(job, JobState::failed);
+  effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error), std::move(failure)});
+  // A job that fails for everyone says nothing against the workers that tried it.
+  for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
+  end(job);
+}
+
+void Farm::State::end(Job& job) {
+  std::set<WorkerIndex> told;
+  for (const LeaseSeq seq : leases_of(job)) {
+    Worker& worker = *leases.find(seq)->worker;
+    free_lease(seq, "job ended", false);
+    if (!worker.connected || !told.insert(worker.index).second) continue;
+    effects.emplace_back(Send{worker.id, CancelJob{job.plan.brief.job}});
+    worker.briefed.erase(job.seq);
+    worker.warmed_up.erase(job.seq);
+  }
+  job.units.forget_results();
+  refresh(job);
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,115 @@
+// The inside of the farm. Handlers are grouped by subject: farm_jobs, farm_workers, farm_units, farm_leases,
+// schedule.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "coordinator/domain/farm.h"
+#include "coordinator/domain/lease_book.h"
+
+namespace ls::coordinator {
+
+struct Farm::State {
+  explicit State(Options options) : leases(std::move(options.lease_prefix)) {}
+
+  LeaseBook leases;
+  WorkerBook workers;
+  std::map<JobSeq, std::unique_ptr<Job>> jobs;
+  std::unordered_map<JobId, Job*> by_id;
+  JobSeq last_job = 0;
+  std::map<std::pair<std::int64_t, JobSeq>, Job*> ready;  // jobs with a unit to lease, by (-priority, order)
+
+  // Of the event in hand.
+  TimePoint now{};
+  std::vector<Effect> effects;
+  bool work_appeared = false;     // units have come (back) that any worker may want
+  std::set<WorkerIndex> touched;  // workers that may want more
+
+  // ---- farm_jobs.cpp ----
+  void on(const JobSubmitted& event);
+  void on(const JobRestored& event);
+  void on(const JobCancelled& event);
+  void on(const JobPaused& event);
+  void on(const JobResumed& event);
+  void on(const JobStopped& event);
+  void on(const JobPriority& event);
+  void on(const JobExtended& event);
+  void on(const JobForgotten& event);
+  Job* find(const JobId& id) const;
+  Job& add(JobPlan plan);
+  void set_state(Job& job, JobState to);
+  void refresh(Job& job);  // is it in `ready` as it should be? After any change of its queue, state or window
+  void freeze(Job& job, StopReason reason);
+  void finish_if_complete(Job& job);
+  void fail(Job& job, std::string error, std::optional<UnitFailure> failure);
+  void end(Job& job);  // takes back what is leased of a job that has ended
+
+  // ---- farm_workers.cpp ----
+  void on(const WorkerJoined& event);
+  void on(const WorkerLost& event);
+  void on(const WorkerDrains& event);
+  void on(const LeaseProgress& event);
+  void on(const LeaseCameBack& event);
+  void on(const Tick& event);
+  void lose(Worker& worker, std::string_view why);
+  void touch(Worker& worker);
+  void grown(Worker& worker);  // it has finished something
+  void expire_leases();
+  void forgive_and_forget();
+
+  // ---- farm_units.cpp ----
+  void on(const UnitAccepted& event);
+  void on(const UnitFolded& event);
+  void on(const UnitFailed& event);
+  void compare(Job& job, UnitCode code, const UnitAccepted& event);
+  void issue_folds(Job& job, TileIndex tile);
+  void checkpoint(Job& job, RoundIndex round);
+  void decide_stop(Job& job);
+  void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
+
+  // ---- farm_leases.cpp ----
+  void grant(Job& job, Worker& worker, std::vector<UnitCode> units);
+  // The unit leaves the lease; nothing is queued. True if no other lease holds it.
+  bool detach(LeaseRecord& lease, UnitCode code);
+  // All leases give the unit up because its result is there (from `by`).
+  void settle_unit(Job& job, UnitCode code, const Worker* by);
+  // Units of the lease (those for which `which` is true) wait again; an empty lease ends.
+  template <class Which>
+  void free_units(LeaseRecord& lease, std::string_view why, bool tell_worker, Which&& which);
+  void free_lease(LeaseSeq seq, std::string_view why, bool tell_worker);
+  void close(LeaseRecord& lease, bool tell_worker);
+  std::vector<LeaseSeq> leases_of(const Job& job) const;
+  void renew(LeaseRecord& lease);
+
+  // ---- schedule.cpp ----
+  void dispatch();
+  void serve(const std::vector<Worker*>& candidates, bool only_uncovered);
+  bool assign(Worker& worker);
+  bool lease_from(Job& job, Worker& worker);
+  bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
+  void copy_overdue(Worker& worker);  // speculation at the tail
+};
+
+template <class Which>
+void Farm::State::free_units(LeaseRecord& lease, std::string_view why, bool tell_worker, Which&& which) {
+  Job& job = *lease.job;
+  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, std::string(why)};
+  for (const UnitCode code : lease.units) {
+    const auto it = job.out.find(code);
+    if (it == job.out.end() || !it->second.has(lease.seq) || !which(code)) continue;
+    freed.units.push_back(job.key(code));
+    if (!detach(lease, code)) continue;
+    job.queue.put_back(code);
+    work_appeared = true;
+  }
+  if (!freed.units.empty()) effects.emplace_back(std::move(freed));
+  if (lease.remaining == 0) close(lease, tell_worker);
+  refresh(job);
+}
+
+}  // namespace ls::coordinator

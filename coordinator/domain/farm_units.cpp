@@ -1,0 +1,171 @@
+// Results and failures of units, folding, and the decision that a job is done.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/domain/farm_state.h"
+
+namespace ls::coordinator {
+
+void Farm::State::on(const UnitAccepted& event) {
+  const auto unwanted = [&](std::string why) {
+    effects.emplace_back(DropUnwanted{event.unit, event.worker, std::move(why)});
+  };
+  Worker* worker = workers.find(event.worker);
+  if (worker != nullptr && worker->connected) grown(*worker);
+  Job* found = find(event.unit.job);
+  if (found == nullptr) return unwanted("no such job");
+  Job& job = *found;
+  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (job.state == JobState::failed || job.state == JobState::cancelled) return unwanted("the job has ended");
+  if (event.unit.tile >= job.units.tiles() || code >= job.queue.end())
+    return unwanted("not a unit of this job");
+  if (event.samples != job.range(code)) return unwanted("another sample range is wanted");
+  if (worker != nullptr && job.numeric_class && *job.numeric_class != worker->numeric_class) {
+    return unwanted("another numeric class");
+  }
+  if (job.units.accepted(code)) return compare(job, code, event);
+
+  if (worker != nullptr && !job.numeric_class) {
+    job.numeric_class = worker->numeric_class;
+    effects.emplace_back(JobPinned{event.unit.job, worker->numeric_class});
+  }
+  if (job.state == JobState::queued) set_state(job, JobState::running);
+  if (!job.first_ray) job.first_ray = now - from_seconds(std::clamp(event.cpu_seconds, 0.0, 3600.0));
+  effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
+  settle_unit(job, code, worker);
+  job.units.accept(code, {event.digest, workers.index_of(event.worker)});
+  job.failures.accepted(code);
+  job.cost.measured(event.unit.tile, job.pixel_samples(code), event.cpu_seconds);
+  if (worker != nullptr) {
+    ++worker->units_done;
+    if (worker->connected) worker->warmed_up.insert(job.seq);
+  }
+  issue_folds(job, event.unit.tile);
+  refresh(job);
+}
+
+void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
+  const UnitTable::Result& first = *job.units.find(code);
+  if (first.digest == event.digest || first.digest == Digest{}) {
+    effects.emplace_back(DropDuplicate{event.unit, event.worker});
+    return;
+  }
+  const WorkerId first_worker = workers.name_of(first.worker);
+  const Digest first_digest = first.digest;
+  effects.emplace_back(DigestMismatch{event.unit, first_digest, event.digest, first_worker, event.worker});
+  if (job.ended()) return;
+  fail(job,
+       fmt::format(
+           "two workers rendered tile {} round {} to different bits though they are of one numeric class: {} "
+           "to "
+           "{}, {} to {}. One of them has bad memory or is not what it says; find out which with `lightshaft "
+           "verify`, take it off the farm and submit the job again",
+           event.unit.tile, event.unit.round, first_worker.value, first_digest.hex(), event.worker.value,
+           event.digest.hex()),
+       std::nullopt);
+}
+
+void Farm::State::issue_folds(Job& job, TileIndex tile) {
+  while (const auto round = job.units.issue_fold(tile, job.last_foldable(), job.queue.end())) {
+    const UnitCode code = unit_code(*round, tile);
+    effects.emplace_back(Fold{job.key(code), job.range(code)});
+  }
+}
+
+void Farm::State::on(const UnitFolded& event) {
+  Job* job = find(event.unit.job);
+  if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
+  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (event.samples != job->range(code)) return;  // of a cut round that has been reopened since
+  const RoundIndex before = job->units.rounds_complete();
+  if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
+  for (RoundIndex r = before; r < job->units.rounds_complete(); ++r) checkpoint(*job, r);
+  finish_if_complete(*job);
+  if (job->units.rounds_complete() != before) refresh(*job);
+}
+
+void Farm::State::checkpoint(Job& job, RoundIndex round) {
+  effects.emplace_back(Checkpoint{job.plan.brief.job, round, cut_range(round, job.spp).s1});
+  decide_stop(job);
+  job.move_window(workers.threads());
+  if (!job.plan.target_error) return;
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+}
+
+void Farm::State::decide_stop(Job& job) {
+  const RoundIndex complete = job.units.rounds_complete();
+  const UnitCode end = unit_code(complete + 1, 0);
+  if (!job.plan.target_error || complete == 0 || end >= job.queue.end()) return;
+  const double channels = 3.0 * static_cast<double>(job.plan.grid.frame.width) * job.plan.grid.frame.height;
+  const double relmse = job.units.error_sum(complete - 1) / channels;
+  if (!stop_after(complete, relmse, *job.plan.target_error, job.spp)) return;
+  job.cut_off(end, StopReason::error);
+  for (const LeaseSeq seq : leases_of(job)) {
+    free_units(*leases.find(seq), "beyond the last round", true, [&](UnitCode code) { return code >= end; });
+  }
+}
+
+void Farm::State::on(const UnitFailed& event) {
+  Worker* worker = workers.find(event.worker);
+  Job* job = find(event.failure.unit.job);
+  if (worker == nullptr || job == nullptr || job->ended()) return;
+  grown(*worker);
+  const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
+  if (event.failure.unit.tile >= job->units.tiles() || code >= job->queue.end()) return;
+  if (event.failure.scene_at_fault) {
+    return fail(
+        *job,
+        fmt::format("the scene cannot be rendered: {} (found by {})", event.failure.reason, worker->name),
+        event.failure);
+  }
+  if (job->units.accepted(code)) return;
+  if (const auto it = job->out.find(code); it != job->out.end()) {
+    for (const LeaseSeq seq : Holders(it->second).lease) {
+      LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
+      if (lease != nullptr && lease->worker == worker) {
+        free_units(*lease, "failed", false, [&](UnitCode unit) { return unit == code; });
+        break;
+      }
+    }
+  }
+  count_failure(*job, code, *worker, event.failure);
+}
+
+void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure) {
+  job.failures.add(code, {worker.index, worker.name, failure});
+  WorkerFailures& record = worker.failures[job.seq];
+  const bool was_blocked = record.blocked_at(now);
+  record.add(now);
+  work_appeared = true;  // who may take what has changed
+  std::size_t known = 0, willing = 0;
+  for (const auto& [index, other] : workers.all()) {
+    if (!other->connected || !fits(job, *other)) continue;
+    ++known;
+    if (!other->blocked(job.seq, now)) ++willing;
+  }
+  const auto report = [&](const std::string& head) {
+    const PixelRect rect = job.plan.grid.rect(tile_of(code));
+    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code)), failure);
+  };
+  if (job.failures.exhausted(code, known)) return report("");
+  if (known > 0 && willing == 0) {
+    return report(
+        fmt::format("no worker is left that may try: each has failed {} units of this job; the last: ",
+                    kWorkerFailuresPerJob));
+  }
+  if (was_blocked || !record.blocked_at(now)) return;
+  effects.emplace_back(
+      WorkerBlocked{worker.id, job.plan.brief.job,
+                    fmt::format("failed {} of its units: {}", record.count, failure.reason)});
+  const auto blocks = std::count_if(worker.failures.begin(), worker.failures.end(),
+                                    [&](const auto& entry) { return entry.second.blocked_at(now); });
+  if (blocks < kSickJobs || worker.sick_since) return;
+  worker.sick_since = now;
+  workers.settle(worker);
+  effects.emplace_back(WorkerStateChanged{
+      worker.id, worker.state(),
+      fmt::format("failed in {} jobs that others render; last: {}", blocks, failure.reason)});
+}
+
+}  // namespace ls::coordinator

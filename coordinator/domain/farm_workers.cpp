@@ -1,0 +1,147 @@
+// Workers: joining, reporting, leaving, and the passing of time.
+#include <algorithm>
+
+#include "coordinator/domain/farm_state.h"
+
+namespace ls::coordinator {
+namespace {
+constexpr int kMaxThreads = 4096;
+}
+
+void Farm::State::touch(Worker& worker) {
+  workers.settle(worker);
+  touched.insert(worker.index);
+}
+
+void Farm::State::on(const WorkerJoined& event) {
+  Worker& worker = workers.get(event.worker);
+  if (worker.connected) {
+    if (event.epoch <= worker.epoch) return;  // an older stream's greeting, overtaken
+    lose(worker, "replaced by a newer stream");
+  }
+  worker.epoch = event.epoch;
+  worker.name = event.name.empty() ? event.worker.value : event.name;
+  worker.numeric_class = event.numeric_class;
+  worker.threads = std::clamp(event.threads, 1, kMaxThreads);
+  worker.tags = event.tags;
+  std::sort(worker.tags.begin(), worker.tags.end());
+  worker.draining = false;
+  worker.pause = Pause::none;
+  worker.briefed.clear();
+  worker.warmed_up.clear();
+  workers.connected(worker, true);
+  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), "joined"});
+  for (const auto& [seq, job] : jobs) {
+    if (!job->leasable() || !job->plan.target_error) continue;
+    job->move_window(workers.threads());
+    refresh(*job);
+  }
+  touch(worker);
+}
+
+void Farm::State::on(const WorkerLost& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected || worker->epoch != event.epoch) return;
+  lose(*worker, "worker lost");
+}
+
+void Farm::State::lose(Worker& worker, std::string_view why) {
+  workers.connected(worker, false);
+  worker.lost_at = now;
+  while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
+  workers.settle(worker);
+  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(why)});
+  work_appeared = true;  // units kept from others because this worker could take them
+}
+
+void Farm::State::on(const WorkerDrains& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected || worker->draining) return;
+  worker->draining = true;
+  workers.settle(*worker);
+  effects.emplace_back(WorkerStateChanged{worker->id, worker->state(), "drains"});
+  work_appeared = true;
+}
+
+void Farm::State::grown(Worker& worker) {
+  worker.grown_at = now;
+  if (worker.pause == Pause::silent || worker.pause == Pause::stuck) worker.pause = Pause::none;
+  touch(worker);
+}
+
+void Farm::State::on(const LeaseProgress& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected) return;
+  if (worker->pause == Pause::silent || (worker->pause == Pause::stuck && event.leases.empty())) {
+    worker->pause = Pause::none;
+    touch(*worker);
+  }
+  for (const WorkerProgress::Entry& entry : event.leases) {
+    LeaseRecord* lease = leases.find(entry.lease);
+    if (lease == nullptr || lease->worker != worker) continue;
+    if (entry.units_done > lease->reported) {
+      lease->reported = entry.units_done;
+      grown(*worker);
+    }
+    if (now - worker->grown_at < kNoGrowthLimit) renew(*lease);
+  }
+}
+
+void Farm::State::on(const LeaseCameBack& event) {
+  Worker* worker = workers.find(event.worker);
+  LeaseRecord* lease = leases.find(event.returned.lease);
+  if (worker == nullptr || lease == nullptr || lease->worker != worker) return;
+  if (!worker->draining) worker->pause = Pause::returned;
+  std::set<UnitCode> back;
+  for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
+  workers.settle(*worker);
+  free_units(*lease, "returned", false, [&](UnitCode code) { return back.contains(code); });
+}
+
+void Farm::State::on(const Tick&) {
+  expire_leases();
+  forgive_and_forget();
+  for (const auto& [seq, job] : jobs) {
+    if (job->ended() || job->stopping) continue;
+    const auto limit = job->time_limit();
+    if (limit && now >= *limit) freeze(*job, StopReason::time);
+  }
+  work_appeared = true;
+  for (const WorkerIndex index : workers.hungry()) {
+    if (!workers.at(index).covered()) touched.insert(index);  // may copy what is overdue
+  }
+}
+
+void Farm::State::expire_leases() {
+  while (LeaseRecord* lease = leases.expired(now)) {
+    Worker& worker = *lease->worker;
+    worker.pause = now - worker.grown_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
+    workers.settle(worker);
+    // The worker is not told: if it wakes up and finishes before the others, its results are welcome.
+    free_lease(lease->seq, "deadline passed", false);
+  }
+}
+
+void Farm::State::forgive_and_forget() {
+  std::vector<Worker*> gone;
+  for (const auto& [index, worker] : workers.all()) {
+    if (worker->pause == Pause::returned) {
+      worker->pause = Pause::none;
+      touch(*worker);
+    }
+    if (worker->sick_since && now - *worker->sick_since >= kForgiveAfter) {
+      worker->sick_since.reset();
+      worker->failures.clear();
+      effects.emplace_back(WorkerStateChanged{worker->id, worker->state(), "its failures are long ago"});
+      touch(*worker);
+    }
+    if (!worker->connected && now - worker->lost_at >= kForgetWorkerAfter) gone.push_back(worker.get());
+  }
+  for (Worker* worker : gone) {
+    effects.emplace_back(WorkerForgotten{worker->id});
+    touched.erase(worker->index);
+    workers.forget(*worker);
+  }
+}
+
+}  // namespace ls::coordinator

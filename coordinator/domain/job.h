@@ -1,0 +1,74 @@
+// A job as the farm keeps it. Its planned units are at every moment done (accepted), leased or queued.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <unordered_map>
+
+#include "coordinator/domain/cost_model.h"
+#include "coordinator/domain/event.h"
+#include "coordinator/domain/failure_budget.h"
+#include "coordinator/domain/stop_rule.h"
+#include "coordinator/domain/unit_queue.h"
+#include "coordinator/domain/unit_table.h"
+
+namespace ls::coordinator {
+
+using JobSeq = std::uint64_t;    // order of submission
+using LeaseSeq = std::uint64_t;  // order of leasing; 0: none
+
+// The leases that hold a unit: one, or two when an idle worker renders a copy.
+struct Holders {
+  std::array<LeaseSeq, 2> lease{};
+  bool full() const { return lease[0] != 0 && lease[1] != 0; }
+  bool empty() const { return lease[0] == 0 && lease[1] == 0; }
+  bool has(LeaseSeq seq) const { return lease[0] == seq || lease[1] == seq; }
+  void add(LeaseSeq seq) { (lease[0] == 0 ? lease[0] : lease[1]) = seq; }
+  void remove(LeaseSeq seq) {
+    for (LeaseSeq& l : lease) l = l == seq ? 0 : l;
+  }
+};
+
+struct Job {
+  Job(JobSeq number, JobPlan asked);
+
+  JobSeq seq;
+  JobPlan plan;
+  std::uint64_t spp;  // the plan's, or the limit; even
+  JobState state = JobState::queued;
+  std::optional<StopReason>
+      stopping;  // decided, while what is leased or unfolded is awaited; final once done
+  std::optional<Digest> numeric_class;
+  std::optional<TimePoint> first_ray;
+
+  UnitTable units;
+  UnitQueue queue;
+  std::unordered_map<UnitCode, Holders> out;  // leased units
+  CostModel cost;
+  UnitFailures failures;
+
+  bool ended() const {
+    return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+  }
+  bool leasable() const { return state == JobState::queued || state == JobState::running; }
+  bool complete() const { return units.folded_count() == queue.planned(); }
+
+  SampleRange range(UnitCode code) const { return cut_range(round_of(code), spp); }
+  UnitKey key(UnitCode code) const { return {plan.brief.job, tile_of(code), round_of(code)}; }
+  std::uint64_t pixel_samples(UnitCode code) const {
+    return static_cast<std::uint64_t>(plan.grid.rect(tile_of(code)).pixels()) * range(code).count();
+  }
+  double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
+  std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
+
+  RoundIndex last_foldable() const {
+    return plan.target_error ? fold_limit(units.rounds_complete()) : std::numeric_limits<RoundIndex>::max();
+  }
+  // How far ahead of what is folded rounds may be leased, for a farm of so many threads.
+  void move_window(int farm_threads);
+  // Ends the job before `end`, or earlier if it ends earlier already. Acceptances beyond are forgotten.
+  void cut_off(UnitCode end, StopReason reason);
+  std::optional<TimePoint> time_limit() const;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,120 @@
+// Who gets what next. Previews first (the order of unit codes), higher priorities first, idle workers before
+// those that already have something to do, and small pieces at a job's tail.
+#include <algorithm>
+
+#include "coordinator/domain/farm_state.h"
+
+namespace ls::coordinator {
+namespace {
+
+struct LeaseSize {
+  std::uint64_t units = 1;
+  double seconds = 0;  // CPU; ends the lease once reached
+};
+
+// Guided self-scheduling: a thread's share is half of an even split of what waits, so that all end at about
+// one time.
+LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads) {
+  const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
+  const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
+  const std::uint64_t share = std::max<std::uint64_t>(1, (job.queued() * threads + halves - 1) / halves);
+  const std::uint64_t most =
+      job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
+  return {std::min(share, most), kLeaseSeconds * worker.threads};
+}
+
+// A job with a time budget leases nothing beyond it, and nothing ahead that would only be begun beyond it.
+// Every tile gets its first round.
+bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
+  const auto limit = job.time_limit();
+  if (!limit || round_of(code) == 0) return false;
+  if (now >= *limit) return true;
+  return worker.covered() && now + from_seconds(worker.seconds_out / worker.threads) >= *limit;
+}
+
+}  // namespace
+
+void Farm::State::dispatch() {
+  std::vector<Worker*> candidates;
+  for (const WorkerIndex index : work_appeared ? workers.hungry() : touched) {
+    if (workers.hungry().contains(index)) candidates.push_back(&workers.at(index));
+  }
+  serve(candidates, true);
+  serve(candidates, false);
+  for (const WorkerIndex index : touched) {
+    if (workers.hungry().contains(index)) copy_overdue(workers.at(index));
+  }
+}
+
+void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered) {
+  bool served = true;
+  while (served && !ready.empty()) {
+    served = false;
+    for (Worker* worker : candidates) {
+      if (ready.empty()) return;
+      if (!worker->wants_more() || (only_uncovered && worker->covered())) continue;
+      served |= assign(*worker);
+    }
+  }
+}
+
+bool Farm::State::assign(Worker& worker) {
+  for (const auto& [order, job] : ready) {
+    if (may_serve(*job, worker, now) && lease_from(*job, worker)) return true;  // `ready` may have changed
+  }
+  return false;
+}
+
+bool Farm::State::lease_from(Job& job, Worker& worker) {
+  const auto excluded = [&](UnitCode code) {
+    return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
+  };
+  const LeaseSize size = lease_size(job, worker, workers.threads());
+  std::vector<UnitCode> units;
+  double cost = 0;
+  while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
+    const auto code = job.queue.front(job.units, excluded);
+    if (!code || out_of_time(job, worker, *code, now)) break;
+    job.queue.pop(*code);
+    units.push_back(*code);
+    cost += job.predict(*code);
+  }
+  if (units.empty()) return false;
+  if (!job.numeric_class) {
+    job.numeric_class = worker.numeric_class;
+    effects.emplace_back(JobPinned{job.plan.brief.job, worker.numeric_class});
+  }
+  if (job.state == JobState::queued) set_state(job, JobState::running);
+  grant(job, worker, std::move(units));
+  refresh(job);
+  return true;
+}
+
+bool Farm::State::others_may_take(const Job& job, UnitCode code, const Worker& but) const {
+  return std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
+    const Worker& other = *entry.second;
+    return other.index != but.index && may_serve(job, other, now) &&
+           !job.failures.failed_on(code, other.index);
+  });
+}
+
+void Farm::State::copy_overdue(Worker& worker) {
+  std::uint32_t looked_at = 0;
+  for (auto& [seq, lease] : leases.all()) {
+    if (!worker.available() || worker.covered() || ++looked_at > kSpeculationScan) return;
+    Job& job = *lease.job;
+    const Duration due = from_seconds(kSpeculateAfter * seconds(lease.predicted)) + kSpeculateSlack;
+    if (lease.worker == &worker || now < lease.issued + due) continue;
+    if (!job.leasable() || !may_serve(job, worker, now)) continue;
+    std::vector<UnitCode> units;
+    for (const UnitCode code : lease.units) {
+      if (worker.units_out + units.size() >= static_cast<std::uint32_t>(worker.threads)) break;
+      const auto it = job.out.find(code);
+      if (it == job.out.end() || !it->second.has(seq) || it->second.full()) continue;
+      if (!job.failures.failed_on(code, worker.index)) units.push_back(code);
+    }
+    if (!units.empty()) grant(job, worker, std::move(units));
+  }
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,118 @@
+#include "coordinator/domain/unit_table.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "common/base/check.h"
+
+namespace ls::coordinator {
+
+UnitTable::Round& UnitTable::round(RoundIndex index) {
+  if (index >= rounds_.size()) rounds_.resize(index + 1);
+  return rounds_[index];
+}
+
+const UnitTable::Result* UnitTable::find(UnitCode code) const {
+  const RoundIndex r = round_of(code);
+  if (r >= rounds_.size() || rounds_[r].results.empty()) return nullptr;
+  const Result& result = rounds_[r].results[tile_of(code)];
+  return result.worker == kNoWorker ? nullptr : &result;
+}
+
+void UnitTable::accept(UnitCode code, const Result& result) {
+  CHECK(!accepted(code) && result.worker != kNoWorker, "unit {:#x} accepted twice", code);
+  Round& r = round(round_of(code));
+  if (r.results.empty()) r.results.resize(tiles_);
+  r.results[tile_of(code)] = result;
+  ++r.accepted;
+  ++accepted_count_;
+}
+
+UnitCode UnitTable::end_of_accepted() const {
+  for (std::size_t k = rounds_.size(); k-- > 0;) {
+    if (rounds_[k].accepted == 0) continue;
+    TileIndex t = tiles_;
+    while (rounds_[k].results[t - 1].worker == kNoWorker) --t;
+    const RoundIndex round = static_cast<RoundIndex>(k);
+    return t == tiles_ ? unit_code(round + 1, 0) : unit_code(round, t);
+  }
+  return 0;
+}
+
+void UnitTable::truncate(UnitCode end) {
+  const RoundIndex first = round_of(end);
+  for (RoundIndex k = first; k < rounds_.size(); ++k) {
+    Round& r = rounds_[k];
+    if (r.results.empty()) continue;
+    for (TileIndex t = k == first ? tile_of(end) : 0; t < tiles_; ++t) {
+      if (r.results[t].worker == kNoWorker) continue;
+      CHECK(issued_[t] <= k, "tile {} round {} is cut off though its fold was asked for", t, k);
+      r.results[t] = {};
+      --r.accepted;
+      --accepted_count_;
+    }
+    if (r.accepted == 0) r.results = {};
+  }
+}
+
+void UnitTable::reopen(RoundIndex index) {
+  if (index >= rounds_.size()) return;
+  CHECK(index + 1 == rounds_.size(), "round {} is reopened though {} rounds are known", index,
+        rounds_.size());
+  accepted_count_ -= rounds_[index].accepted;
+  folded_count_ -= rounds_[index].folded;
+  rounds_.pop_back();
+  for (TileIndex t = 0; t < tiles_; ++t) {
+    issued_[t] = std::min(issued_[t], index);
+    folded_[t] = std::min(folded_[t], index);
+  }
+  rounds_complete_ = std::min(rounds_complete_, index);
+}
+
+void UnitTable::forget_results() {
+  for (Round& r : rounds_) r.results = {}, r.errors = {};
+}
+
+std::optional<RoundIndex> UnitTable::issue_fold(TileIndex tile, RoundIndex limit, UnitCode end) {
+  const RoundIndex next = issued_[tile];
+  const UnitCode code = unit_code(next, tile);
+  if (next > limit || code >= end || !accepted(code)) return std::nullopt;
+  ++issued_[tile];
+  return next;
+}
+
+bool UnitTable::fold(TileIndex tile, RoundIndex index, double rel_error_sum) {
+  if (tile >= tiles_ || folded_[tile] != index || index >= issued_[tile]) return false;
+  restore_error(index, tile, rel_error_sum);
+  ++folded_[tile];
+  ++folded_count_;
+  ++rounds_[index].folded;
+  settle_complete();
+  return true;
+}
+
+void UnitTable::restore_folded(TileIndex tile, RoundIndex rounds) {
+  for (RoundIndex k = folded_[tile]; k < rounds; ++k) ++round(k).folded, ++folded_count_;
+  folded_[tile] = issued_[tile] = std::max(folded_[tile], rounds);
+  settle_complete();
+}
+
+void UnitTable::restore_error(RoundIndex index, TileIndex tile, double rel_error_sum) {
+  Round& r = round(index);
+  if (r.errors.empty()) r.errors.assign(tiles_, std::numeric_limits<double>::quiet_NaN());
+  r.errors[tile] = rel_error_sum;
+}
+
+double UnitTable::error_sum(RoundIndex index) const {
+  if (index >= rounds_.size() || rounds_[index].errors.empty())
+    return std::numeric_limits<double>::quiet_NaN();
+  double sum = 0;
+  for (const double e : rounds_[index].errors) sum += e;
+  return sum;
+}
+
+void UnitTable::settle_complete() {
+  while (rounds_complete_ < rounds_.size() && rounds_[rounds_complete_].folded == tiles_) ++rounds_complete_;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,77 @@
+// What is known of the units of one job: accepted results (digest and worker, 36 bytes a unit, stored round
+// by round as rounds begin) and how far each tile is folded.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+
+namespace ls::coordinator {
+
+// (round, tile) in one number; its order is the order of rendering: every tile's round 0, then every tile's
+// round 1...
+using UnitCode = std::uint64_t;
+constexpr UnitCode unit_code(RoundIndex round, TileIndex tile) { return UnitCode{round} << 32 | tile; }
+constexpr RoundIndex round_of(UnitCode code) { return static_cast<RoundIndex>(code >> 32); }
+constexpr TileIndex tile_of(UnitCode code) { return static_cast<TileIndex>(code); }
+
+using WorkerIndex = std::uint32_t;
+inline constexpr WorkerIndex kNoWorker = ~WorkerIndex{0};
+
+class UnitTable {
+ public:
+  struct Result {
+    Digest digest;  // all zero: unknown (folded before a restart that lost the record)
+    WorkerIndex worker = kNoWorker;
+  };
+
+  explicit UnitTable(TileIndex tiles) : tiles_(tiles), issued_(tiles), folded_(tiles) {}
+
+  TileIndex tiles() const { return tiles_; }
+
+  // ---- accepted results ----
+  const Result* find(UnitCode code) const;  // null: not accepted
+  bool accepted(UnitCode code) const { return find(code) != nullptr; }
+  void accept(UnitCode code, const Result& result);  // not accepted before
+  std::uint64_t accepted_count() const { return accepted_count_; }
+  UnitCode end_of_accepted() const;  // the code after the last accepted one; 0 if there is none
+  void truncate(UnitCode end);       // forgets acceptances from `end` on; nothing of them may be folded
+  void reopen(RoundIndex round);     // forgets round `round`, accepted or folded; no later one may be known
+  void forget_results();             // of a job that failed: frees the memory, keeps the fold counts
+
+  // ---- folding ----
+  // The tile's next round if it is accepted, below `end` and at most `limit`; it counts as issued from now
+  // on.
+  std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, UnitCode end);
+  // False if this is not the issued round that is next to be folded.
+  bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
+  void restore_folded(TileIndex tile, RoundIndex rounds);
+  void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);
+  RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
+  std::uint64_t folded_count() const { return folded_count_; }
+  RoundIndex rounds_complete() const { return rounds_complete_; }  // folded over all tiles
+  // Sum over all tiles in tile order: the same bits whatever the order of arrival. NaN if some tile's is
+  // unknown.
+  double error_sum(RoundIndex round) const;
+
+ private:
+  struct Round {
+    std::vector<Result> results;
+    std::vector<double> errors;
+    TileIndex accepted = 0, folded = 0;
+  };
+  Round& round(RoundIndex index);
+  void settle_complete();
+
+  TileIndex tiles_;
+  std::vector<Round> rounds_;
+  std::vector<RoundIndex> issued_, folded_;
+  std::uint64_t accepted_count_ = 0, folded_count_ = 0;
+  RoundIndex rounds_complete_ = 0;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,98 @@
+// The workers that are known: who is there, what they hold, how they have behaved.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include "coordinator/domain/event.h"
+#include "coordinator/domain/failure_budget.h"
+#include "coordinator/domain/job.h"
+
+namespace ls::coordinator {
+
+// Why a connected worker gets nothing for the moment.
+enum class Pause {
+  none,
+  silent,   // a deadline passed without a word; until it reports
+  stuck,    // it reports, but finishes nothing; until it does, or is idle
+  returned  // it gave a lease back; until the next tick
+};
+
+struct Worker {
+  WorkerIndex index = kNoWorker;
+  WorkerId id;
+  std::string name;
+  std::uint64_t epoch = 0;
+  Digest numeric_class;
+  int threads = 1;
+  std::vector<std::string> tags;  // sorted
+  bool connected = false;
+  bool draining = false;
+  Pause pause = Pause::none;
+  std::optional<TimePoint> sick_since;
+  TimePoint lost_at{};
+  TimePoint grown_at{};  // last time it finished something, or began after having had nothing
+
+  std::set<LeaseSeq> leases;
+  std::uint32_t units_out = 0;
+  double seconds_out = 0;  // predicted CPU seconds of units_out
+  std::uint64_t units_done = 0;
+  std::set<JobSeq> briefed;    // jobs this stream has had the brief of
+  std::set<JobSeq> warmed_up;  // jobs it has finished a unit of on this stream: the world is loaded
+  std::map<JobSeq, WorkerFailures> failures;
+
+  bool covered() const { return units_out >= static_cast<std::uint32_t>(threads); }
+  bool blocked(JobSeq job, TimePoint now) const {
+    const auto it = failures.find(job);
+    return it != failures.end() && it->second.blocked_at(now);
+  }
+  // Two units a thread at least, and three leases or what lasts three leases' time.
+  bool wants_more() const {
+    if (leases.size() >= kMaxLeasesPerWorker) return false;
+    if (units_out < 2 * static_cast<std::uint32_t>(threads)) return true;
+    return leases.size() < kLeasesPerWorker && seconds_out < kLeasesPerWorker * kLeaseSeconds * threads;
+  }
+  bool available() const { return connected && !draining && pause == Pause::none && !sick_since; }
+  WorkerState state() const {
+    if (!connected) return WorkerState::lost;
+    if (draining) return WorkerState::draining;
+    return sick_since ? WorkerState::sick : WorkerState::connected;
+  }
+};
+
+class WorkerBook {
+ public:
+  // The worker of this id, made when unknown. Indices stay a worker's own over its absences.
+  Worker& get(const WorkerId& id);
+  Worker* find(const WorkerId& id);
+  const Worker* find(const WorkerId& id) const;
+  const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
+  WorkerIndex index_of(const WorkerId& id);  // for workers that are only named in a record
+  void forget(Worker& worker);
+
+  // Brings the list of those that want work up to date; call it after any change to a worker.
+  void settle(Worker& worker);
+  const std::set<WorkerIndex>& hungry() const { return hungry_; }
+  Worker& at(WorkerIndex index) { return *workers_.at(index); }
+
+  const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
+  int threads() const { return threads_; }  // of connected workers
+  void connected(Worker& worker, bool yes);
+
+ private:
+  std::vector<WorkerId> ids_;
+  std::unordered_map<WorkerId, WorkerIndex> index_;
+  std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
+  std::set<WorkerIndex> hungry_;
+  int threads_ = 0;
+};
+
+// Of the job's numeric class, with its tags; leaves aside what the worker is doing.
+bool fits(const Job& job, const Worker& worker);
+// And may take units of it now.
+bool may_serve(const Job& job, const Worker& worker, TimePoint now);
+
+}  // namespace ls::coordinator
