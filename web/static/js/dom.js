@@ -80,7 +80,8 @@ function update(element, old, node) {
   for (const [name, value] of Object.entries(node.attributes)) {
     if (before[name] !== value) assign(element, name, value, before[name]);
   }
-  patchChildren(element, node.children);
+  // An element that was never given children (a custom element) looks after its own.
+  if (node.children.length > 0 || old?.children.length > 0) patchChildren(element, node.children);
 }
 
 function assign(element, name, value, before) {

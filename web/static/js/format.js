@@ -1,22 +1,22 @@
 // Figures as people read them.
 
-const kAbsent = "–";
+export const kAbsent = "–";
 const kSuperscript = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
 const known = (x) => typeof x === "number" && Number.isFinite(x);
 export const superscript = (n) => [...String(n)].map((c) => kSuperscript[c]).join("");
 
-/** Two or three significant digits: 0.0213, 3.20 × 10⁻⁵. */
+/** Three significant digits: 0.0213, 3.20 × 10⁻⁵. */
 export function figure(x, digits = 3) {
   if (!known(x)) return kAbsent;
   if (x === 0) return "0";
   const exponent = Math.floor(Math.log10(Math.abs(x)));
-  if (exponent >= -3 && exponent < 5) return Number(x.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits });
+  if (exponent >= -3 && exponent < 5) return x.toLocaleString("en", { minimumSignificantDigits: digits, maximumSignificantDigits: digits });
   const [mantissa, power] = x.toExponential(digits - 1).split("e");
   return `${mantissa} × 10${superscript(Number(power))}`;
 }
 
-export const interval = (ci) => (Array.isArray(ci) && known(ci[0]) && known(ci[1]) ? `${figure(ci[0])} to ${figure(ci[1])}` : null);
+export const interval = (ci) => (Array.isArray(ci) && known(ci[0]) && known(ci[1]) ? `${figure(ci[0])} – ${figure(ci[1])}` : null);
 
 /** 0.4 s, 12 s, 4.2 min, 1 h 12 min, 3 d 4 h. */
 export function duration(seconds) {
@@ -42,7 +42,8 @@ export function bytes(n) {
 }
 
 export const count = (n) => (known(n) ? Math.round(n).toLocaleString("en") : kAbsent);
-export const percent = (x) => (known(x) ? `${x > 0 && x < 0.995 ? Math.min(99, Math.max(1, Math.round(x * 100))) : Math.round(x * 100)} %` : kAbsent);
+/** 0 % and 100 % are kept for nothing and everything. */
+export const percent = (x) => (known(x) ? `${x > 0 && x < 1 ? Math.min(99, Math.max(1, Math.round(x * 100))) : Math.round(x * 100)} %` : kAbsent);
 export const plural = (n, one, many = `${one}s`) => `${count(n)} ${n === 1 ? one : many}`;
 export const spp = (x) => (known(x) ? (x < 100 && x % 1 ? x.toFixed(1) : count(x)) : kAbsent);
 export const exposure = (ev) => `${ev > 0 ? "+" : ev < 0 ? "−" : ""}${Math.abs(ev).toFixed(1)} EV`;

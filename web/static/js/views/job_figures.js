@@ -10,7 +10,7 @@ export function figures(job) {
   const ci = interval(job.relmse_ci95);
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
-    fact("relMSE", figure(job.relmse), ci ? `95 %: ${ci}` : "not known yet", "key"),
+    fact("relMSE", figure(job.relmse), ci ? [ci, h("i", { key: "ci" }, "95 % interval")] : "not known yet", "key"),
     fact("Samples per pixel", spp(job.spp_done), `of ${count(job.spp)}`, "key"),
     isOver(job) ? fact("Took", duration(job.elapsed_seconds), "wall clock", "key") : fact("Time left", duration(job.eta_seconds), `${duration(job.elapsed_seconds)} so far`, "key"),
     fact("RMSE", figure(job.rmse)),

@@ -1,7 +1,7 @@
 // All jobs.
 import { h } from "../dom.js";
 import { jobsInOrder } from "../state.js";
-import { count, duration, figure, jobName, moment, percent, plural, spp } from "../format.js";
+import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
 import { jobActions, progressBar, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
@@ -29,10 +29,12 @@ function row(state, job, actions) {
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${job.state}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),
-    h("td", { class: "number", "data-label": "relMSE" }, figure(job.relmse)),
-    h("td", { class: "number", "data-label": "Time left" }, job.state === "running" ? duration(job.eta_seconds) : "–"),
+    figureCell("relMSE", figure(job.relmse)),
+    figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null)),
     h("td", { class: "acts" }, jobActions(state, job, actions)));
 }
+
+const figureCell = (label, text) => h("td", { class: text === kAbsent ? "number absent" : "number", "data-label": label }, text);
 
 function firstSteps() {
   const origin = globalThis.location?.origin ?? "http://localhost:8080";

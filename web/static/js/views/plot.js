@@ -93,7 +93,7 @@ function reading(point) {
   const ci = interval(point.relmse_ci95);
   return [
     h("span", { key: "t" }, h("b", null, duration(point.seconds)), " after the first ray"),
-    h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), ci ? ` (${ci})` : null),
+    h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), ci ? ` (95 %: ${ci})` : null),
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 

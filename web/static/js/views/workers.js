@@ -29,7 +29,7 @@ function card(state, worker) {
   const job = state.jobs?.get(worker.job);
   return h("li", { key: worker.id, class: `panel worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
     h("h2", null, workerMark(colourOf(state, worker.name), worker.name), worker.state === "connected" ? null : h("span", { class: "pill" }, worker.state)),
-    h("p", { class: "doing" }, worker.activity || "idle", job || worker.job ? [" · ", h("a", { key: "job", href: `#/jobs/${encodeURIComponent(worker.job)}` }, job ? jobName(job) : worker.job)] : null),
+    h("p", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", job || worker.job ? [" · ", h("a", { key: "job", href: `#/jobs/${encodeURIComponent(worker.job)}` }, job ? jobName(job) : worker.job)] : null),
     h("dl", null,
       pair("Threads", count(worker.threads)),
       pair("Units done", count(worker.units_done)),

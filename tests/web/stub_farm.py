@@ -1,0 +1,219 @@
+"""A coordinator's HTTP side in Python: serves web/static under the real policy, and answers as a test tells it to.
+
+A test double for the views only; what the real coordinator does is tested with the real one.
+"""
+import hashlib
+import json
+import pathlib
+import queue
+import struct
+import threading
+import zlib
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+STATIC = pathlib.Path(__file__).resolve().parents[2] / "web" / "static"
+TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".png": "image/png"}
+POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+TOKEN = "let-there-be-light"
+
+
+def job(id="j-1", name="steam.xml", state="running", **more):
+    return {"id": id, "name": name, "state": state, "stopped": "", "progress": 0.25, "spp": 64, "spp_done": 16, "rmse": 0.05, "relmse": 0.01,
+            "relmse_ci95": [0.009, 0.011], "target_error": None, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
+            "priority": 0, "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
+            "health": {"nonfinite": 0, "negative": 0, "majorant_violations": 0}, **more}
+
+
+def worker(id="w-1", name="lab-01", **more):
+    return {"id": id, "name": name, "build": "test", "numeric_class": "9c41f0aa", "threads": 2, "tags": [], "state": "connected",
+            "activity": "rendering", "job": "j-1", "units_done": 5, "cpu_seconds": 12, "rss_bytes": 1 << 20, "last_seen_seconds": 0.1, **more}
+
+
+def png(width, height, rgb):
+    """A picture of one colour."""
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    rows = (b"\0" + bytes(rgb) * width) * height
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+class StubFarm:
+    """State that requests read and change; `with StubFarm() as farm: ... farm.url`."""
+
+    def __init__(self):
+        self.lock = threading.Lock()
+        self.jobs = {}
+        self.workers = {}
+        self.tiles = []
+        self.report = {"convergence": []}
+        self.image = png(64, 48, (200, 120, 40))
+        self.blobs = {}
+        self.submitted = []
+        self.refusal = None  # problem details for the next POST /jobs
+        self.requests = []  # (method, path)
+        self.signed_in = False  # of the one browser that a test has
+        self._streams = []
+        self._event_id = 0
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
+        self._server.daemon_threads = True
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc):
+        self.drop_streams()
+        self._server.shutdown()
+        self._server.server_close()
+
+    def emit(self, type, data):
+        with self.lock:
+            self._event_id += 1
+            text = f"id: {self._event_id}\nevent: {type}\ndata: {json.dumps(data)}\n\n"
+            for stream in self._streams:
+                stream.put(text.encode())
+
+    def change(self, id, **more):
+        """Changes a job and tells the stream."""
+        with self.lock:
+            self.jobs[id] = {**self.jobs[id], **more}
+        self.emit("job", self.jobs[id])
+
+    def drop_streams(self):
+        with self.lock:
+            for stream in self._streams:
+                stream.put(None)
+
+    def open_stream(self):
+        with self.lock:
+            stream = queue.Queue()
+            self._streams.append(stream)
+            return stream
+
+    def close_stream(self, stream):
+        with self.lock:
+            self._streams.remove(stream)
+
+    def asked(self, method, path):
+        with self.lock:
+            return sum(1 for m, p in self.requests if m == method and p.split("?")[0] == path)
+
+
+def _handler(farm):
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def log_message(self, *args):
+            pass
+
+        def _send(self, status, body=b"", type="application/json", headers=()):
+            data = body if isinstance(body, bytes) else json.dumps(body).encode()
+            self.send_response(status)
+            self.send_header("Content-Type", type)
+            self.send_header("Content-Length", str(len(data)))
+            self.send_header("Content-Security-Policy", POLICY)
+            for name, value in headers:
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(data)
+
+        def _problem(self, status, detail, **more):
+            self._send(status, {"type": "about:blank", "title": "refused", "status": status, "detail": detail, **more}, "application/problem+json")
+
+        def _body(self):
+            return self.rfile.read(int(self.headers.get("Content-Length") or 0))
+
+        def _dispatch(self):
+            path = self.path.split("?")[0]
+            with farm.lock:
+                farm.requests.append((self.command, self.path))
+            body = self._body()
+            if not path.startswith("/api/v1/"):
+                return self._static(path)
+            parts = path[len("/api/v1/"):].split("/")
+            if parts == ["session"]:
+                return self._session()
+            if not farm.signed_in:
+                return self._problem(401, "No valid token or session came with this request.")
+            answer = getattr(self, f"_{self.command.lower()}_{parts[0]}", None)
+            return answer(parts[1:], body) if answer else self._problem(404, f"There is nothing at {path}.")
+
+        do_GET = do_POST = do_PUT = do_PATCH = do_DELETE = _dispatch
+
+        def _static(self, path):
+            file = STATIC / (path.lstrip("/") or "index.html")
+            if STATIC not in file.resolve().parents or not file.is_file():
+                return self._problem(404, f"There is nothing at {path}.")
+            return self._send(200, file.read_bytes(), TYPES[file.suffix])
+
+        def _session(self):
+            if self.command == "DELETE":
+                farm.signed_in = False
+                return self._send(204)
+            if self.headers.get("Authorization") != f"Bearer {TOKEN}":
+                return self._problem(401, "This token is not known.")
+            farm.signed_in = True
+            return self._send(204, headers=[("Set-Cookie", "session=1; HttpOnly; SameSite=Strict; Path=/")])
+
+        def _get_jobs(self, parts, body):
+            if not parts:
+                return self._send(200, {"jobs": list(farm.jobs.values())})
+            if parts[0] not in farm.jobs:
+                return self._problem(404, f"There is no job \"{parts[0]}\".")
+            what = parts[1] if len(parts) > 1 else None
+            if what is None:
+                return self._send(200, farm.jobs[parts[0]])
+            if what == "tiles":
+                return self._send(200, {"tiles": farm.tiles})
+            if what == "report":
+                return self._send(200, farm.report)
+            if what == "image.png":
+                return self._send(200, farm.image, "image/png")
+            return self._problem(404, "nothing here")
+
+        def _patch_jobs(self, parts, body):
+            wanted = json.loads(body)["state"]
+            farm.change(parts[0], state=wanted)
+            return self._send(200, farm.jobs[parts[0]])
+
+        def _post_jobs(self, parts, body):
+            if farm.refusal:
+                refusal, farm.refusal = farm.refusal, None
+                return self._send(400, refusal, "application/problem+json")
+            request = json.loads(body)
+            farm.submitted.append(request)
+            farm.jobs["j-new"] = job("j-new", request["name"], "queued", progress=0, units_done=0)
+            return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
+
+        def _get_workers(self, parts, body):
+            return self._send(200, {"workers": list(farm.workers.values())})
+
+        def _post_blobs(self, parts, body):
+            return self._send(200, {"missing": [digest for digest in json.loads(body)["digests"] if digest not in farm.blobs]})
+
+        def _put_blobs(self, parts, body):
+            if hashlib.sha256(body).hexdigest() != parts[0]:
+                return self._problem(400, "These bytes have another SHA-256 than their name says.")
+            farm.blobs[parts[0]] = body
+            return self._send(201)
+
+        def _get_events(self, parts, body):
+            stream = farm.open_stream()
+            self.send_response(200)
+            self.send_header("Content-Type", "text/event-stream")
+            self.send_header("Connection", "close")
+            self.end_headers()
+            self.close_connection = True
+            try:
+                self.wfile.write(b"retry: 100\n\n")
+                while (text := stream.get()) is not None:
+                    self.wfile.write(text)
+            except OSError:
+                pass
+            finally:
+                farm.close_stream(stream)
+
+    return Handler
