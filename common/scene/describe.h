@@ -1,0 +1,151 @@
+// The one table of the scene language: for every type of scene.h its name, and for every field its name,
+// unit, range, default (the value in a default-constructed struct, or Field::fallback for textures) and
+// meaning. Reading of parameters, canonical JSON, hashing, docs/scene-format.md and the random tests all
+// visit it:
+//
+//   describe(visitor, value)  calls  visitor.field(Field{...}, value.member)  for each member.
+//
+// To add a type: its struct and variant row in scene.h, its kInfo and describe() here, and its row in the
+// reader's table; what is missing does not compile.
+#pragma once
+
+#include <concepts>
+#include <limits>
+#include <string_view>
+#include <type_traits>
+
+#include "common/scene/limits.h"
+#include "common/scene/scene.h"
+
+namespace ls::scene {
+
+struct Range {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool open_min = false, open_max = false;
+  bool contains(double x) const { return (open_min ? x > min : x >= min) && (open_max ? x < max : x <= max); }
+};
+inline constexpr Range kAny{};
+inline constexpr Range kNonNegative{.min = 0};
+inline constexpr Range kPositive{.min = 0, .open_min = true};
+inline constexpr Range kUnit{.min = 0, .max = 1};
+
+struct Field {
+  std::string_view name;
+  std::string_view doc;
+  std::string_view unit = "";
+  Range range = kAny;      // of a number, or of each component of a colour
+  Rgb fallback{1, 1, 1};   // colour of a texture or volume that is not given
+  bool derived = false;    // follows from something else in the file; not a parameter of its own
+  bool named_ior = false;  // names of materials ("water") are welcome too
+  bool required = false;
+};
+
+struct TypeInfo {
+  std::string_view kind;     // the element: bsdf, shape, ...
+  std::string_view name;     // the plugin, and "type" in JSON
+  std::string_view plugins;  // the dialect's plugins that become this type, if they are called otherwise
+  std::string_view doc;
+};
+
+template <class T>
+struct InfoOf;  // no definition: a type without a row in the table does not compile
+template <class T>
+inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
+
+#define LS_TYPE(type, ...)                        \
+  template <>                                     \
+  struct InfoOf<type> {                           \
+    static constexpr TypeInfo value{__VA_ARGS__}; \
+  };
+
+LS_TYPE(ConstantTexture, "texture", "constant", "uniform, srgb",
+        "one colour; also written as a plain <rgb>, <float> or <spectrum>")
+LS_TYPE(BitmapTexture, "texture", "bitmap", "", "an image: PNG, JPEG, EXR or HDR")
+LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")
+LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
+LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
+LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
+        "rough metal; `alpha` sets both alpha_u and alpha_v")
+LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water, ...")
+LS_TYPE(RoughPlasticBsdf, "bsdf", "roughplastic", "", "diffuse base under a rough dielectric coat")
+LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light passes unchanged")
+LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
+        "gives each side of a surface a bsdf; one nested bsdf serves both")
+LS_TYPE(ConstVolume, "volume", "constvolume", "",
+        "the same value everywhere; also written as a plain <rgb> or <float>")
+LS_TYPE(GridVolume, "volume", "gridvolume", "", "values on a grid, from a file")
+LS_TYPE(IsotropicPhase, "phase", "isotropic", "",
+        "scatters equally into all directions; what a medium has if none is given")
+LS_TYPE(HgPhase, "phase", "hg", "", "Henyey-Greenstein")
+LS_TYPE(HomogeneousMedium, "medium", "homogeneous", "", "the same everywhere")
+LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by volumes")
+LS_TYPE(RectangleShape, "shape", "rectangle", "", "[-1, 1]^2 in the plane z = 0, normal +z")
+LS_TYPE(CubeShape, "shape", "cube", "", "[-1, 1]^3, normals outwards")
+LS_TYPE(SphereShape, "shape", "sphere", "",
+        "centre and radius act before to_world; to_world may not stretch it")
+LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
+LS_TYPE(MeshShape, "shape", "mesh", "obj, ply", "triangles from a file")
+LS_TYPE(AreaEmitter, "emitter", "area", "", "light from the front of the shape that it stands in")
+LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from everywhere around")
+LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
+        "parallel light from far away; a `to_world` instead of `direction` turns +z")
+LS_TYPE(PointEmitter, "emitter", "point", "",
+        "light from a point; a `to_world` instead of `position` moves the origin")
+LS_TYPE(SpotEmitter, "emitter", "spot", "",
+        "light from a point into a cone around the +z of to_world, falling off linearly in the angle")
+LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
+LS_TYPE(TentFilter, "rfilter", "tent", "", "triangle")
+LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
+LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
+        "looks along +z of to_world, +y up, +x to the left")
+LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
+LS_TYPE(IntegratorSettings, "integrator", "volpath",
+        "volpath, volpath_simple, volpathmis; path, direct, ptracer", "how light is followed")
+#undef LS_TYPE
+
+template <class T, class U>
+concept Of = std::same_as<std::remove_const_t<T>, U>;
+
+// ---- names of enumerators
+// -------------------------------------------------------------------------------------------
+template <class E>
+struct Named {
+  std::string_view name;
+  E value;
+};
+template <class E>
+struct NamesOf;
+template <>
+struct NamesOf<TextureFilter> {
+  static constexpr Named<TextureFilter> all[] = {{"nearest", TextureFilter::nearest},
+                                                 {"bilinear", TextureFilter::bilinear}};
+};
+template <>
+struct NamesOf<Wrap> {
+  static constexpr Named<Wrap> all[] = {
+      {"repeat", Wrap::repeat}, {"mirror", Wrap::mirror}, {"clamp", Wrap::clamp}};
+};
+template <>
+struct NamesOf<Microfacet> {
+  static constexpr Named<Microfacet> all[] = {{"beckmann", Microfacet::beckmann}, {"ggx", Microfacet::ggx}};
+};
+template <>
+struct NamesOf<VolumeFilter> {
+  static constexpr Named<VolumeFilter> all[] = {{"nearest", VolumeFilter::nearest},
+                                                {"trilinear", VolumeFilter::trilinear}};
+};
+template <>
+struct NamesOf<MeshFormat> {
+  static constexpr Named<MeshFormat> all[] = {{"obj", MeshFormat::obj}, {"ply", MeshFormat::ply}};
+};
+template <>
+struct NamesOf<FovAxis> {
+  static constexpr Named<FovAxis> all[] = {{"x", FovAxis::x},
+                                           {"y", FovAxis::y},
+                                           {"diagonal", FovAxis::diagonal},
+                                           {"smaller", FovAxis::smaller},
+                                           {"larger", FovAxis::larger}};
+};
+
+}  // namespace ls::scene

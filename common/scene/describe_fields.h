@@ -1,0 +1,339 @@
+// The describe() overloads of the table; see describe.h.
+#pragma once
+
+#include "common/scene/describe.h"
+
+namespace ls::scene {
+
+// ---- textures
+// -------------------------------------------------------------------------------------------------------
+template <class V, Of<ConstantTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "value", .doc = "the colour"}, t.value);
+}
+template <class V, Of<BitmapTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "filename", .doc = "the image", .required = true}, t.file);
+  v.field({.name = "filter_type", .doc = "between texels"}, t.filter);
+  v.field({.name = "wrap_mode", .doc = "outside [0, 1]"}, t.wrap);
+  v.field({.name = "raw", .doc = "values are not colours: no sRGB decoding of 8-bit files"}, t.raw);
+  v.field({.name = "to_uv",
+           .doc = "moves (u, v) before the look-up: of a 4 x 4 matrix its x and y rows and its translation"},
+          t.to_uv);
+}
+template <class V, Of<CheckerboardTexture> T>
+void describe(V& v, T& t) {
+  v.field(
+      {.name = "color0", .doc = "first colour or texture", .range = kNonNegative, .fallback = {.4, .4, .4}},
+      t.color0);
+  v.field(
+      {.name = "color1", .doc = "second colour or texture", .range = kNonNegative, .fallback = {.2, .2, .2}},
+      t.color1);
+  v.field({.name = "to_uv", .doc = "moves (u, v) before the look-up"}, t.to_uv);
+}
+
+// ---- surfaces
+// -------------------------------------------------------------------------------------------------------
+template <class V, Of<DiffuseBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "reflectance", .doc = "share of light sent back", .range = kUnit, .fallback = {.5, .5, .5}},
+      b.reflectance);
+}
+template <class V, Of<ConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<RoughConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = {.min = 0, .max = 1, .open_min = true},
+           .fallback = {.1, .1, .1}},
+          b.alpha_u);
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = {.min = 0, .max = 1, .open_min = true},
+           .fallback = {.1, .1, .1}},
+          b.alpha_v);
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<DielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<RoughPlasticBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha", .doc = "roughness", .range = {.min = 0, .max = 1, .open_min = true}}, b.alpha);
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<NullBsdf> T>
+void describe(V&, T&) {}
+template <class V, Of<TwoSidedBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "front", .doc = "the first nested bsdf", .derived = true}, b.front);
+  v.field({.name = "back", .doc = "the second nested bsdf, or the first again", .derived = true}, b.back);
+}
+
+// ---- volumes and media
+// ----------------------------------------------------------------------------------------------
+template <class V, Of<ConstVolume> T>
+void describe(V& v, T& s) {
+  v.field({.name = "value", .doc = "the value", .range = kNonNegative}, s.value);
+}
+template <class V, Of<GridVolume> T>
+void describe(V& v, T& s) {
+  v.field({.name = "filename", .doc = "Mitsuba `.vol` or OpenVDB `.vdb`", .required = true}, s.file);
+  v.field({.name = "grid_name", .doc = "which grid of a `.vdb`; empty: the only one, or \"density\""},
+          s.grid_name);
+  v.field({.name = "filter_type", .doc = "between voxels"}, s.filter);
+  v.field({.name = "wrap_mode", .doc = "outside the grid"}, s.wrap);
+  v.field(
+      {.name = "use_grid_bbox", .doc = "place the grid by the bounding box in its file instead of [0, 1]^3"},
+      s.use_grid_bbox);
+  v.field({.name = "raw", .doc = "no colour conversion; without effect, as volumes are linear RGB here"},
+          s.raw);
+  v.field({.name = "to_world", .doc = "places the grid's box in the world"}, s.to_world);
+}
+template <class V, Of<IsotropicPhase> T>
+void describe(V&, T&) {}
+template <class V, Of<HgPhase> T>
+void describe(V& v, T& p) {
+  v.field({.name = "g", .doc = "mean cosine; positive: forwards", .range = {-1, 1, true, true}}, p.g);
+}
+template <class V, Of<HomogeneousMedium> T>
+void describe(V& v, T& m) {
+  v.field({.name = "sigma_t", .doc = "extinction", .unit = "1/length", .range = kNonNegative}, m.sigma_t);
+  v.field({.name = "albedo", .doc = "share of extinction that is scattering", .range = kUnit}, m.albedo);
+  v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
+  v.field({.name = "phase", .doc = "the nested phase function", .derived = true}, m.phase);
+}
+template <class V, Of<HeterogeneousMedium> T>
+void describe(V& v, T& m) {
+  v.field({.name = "sigma_t", .doc = "extinction", .unit = "1/length", .range = kNonNegative}, m.sigma_t);
+  v.field({.name = "albedo",
+           .doc = "share of extinction that is scattering",
+           .range = kUnit,
+           .fallback = {.75, .75, .75}},
+          m.albedo);
+  v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
+  v.field({.name = "phase", .doc = "the nested phase function", .derived = true}, m.phase);
+}
+
+// ---- shapes
+// ---------------------------------------------------------------------------------------------------------
+template <class V, Of<RectangleShape> T>
+void describe(V&, T&) {}
+template <class V, Of<CubeShape> T>
+void describe(V&, T&) {}
+template <class V, Of<DiskShape> T>
+void describe(V&, T&) {}
+template <class V, Of<SphereShape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "center", .doc = "centre", .unit = "length"}, s.center);
+  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
+}
+template <class V, Of<MeshShape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "filename", .doc = "Wavefront OBJ or Stanford PLY", .required = true}, s.file);
+  v.field({.name = "format", .doc = "of the file: the plugin's name", .derived = true}, s.format);
+  v.field({.name = "face_normals", .doc = "flat shading: the file's vertex normals are left out"},
+          s.face_normals);
+  v.field({.name = "flip_tex_coords", .doc = "v becomes 1 - v; true unless said otherwise for `obj`"},
+          s.flip_tex_coords);
+}
+// What all shapes have; their geometry, emitter, bsdf and media are nested objects.
+template <class V, Of<Shape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
+  v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
+  v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
+  v.field({.name = "bsdf",
+           .doc = "nested; `diffuse` if there is none, black if the shape emits light",
+           .derived = true},
+          s.bsdf);
+  v.field({.name = "emitter", .doc = "nested `area`", .derived = true}, s.emitter);
+  v.field({.name = "interior", .doc = "nested medium of this name: behind the normal", .derived = true},
+          s.interior);
+  v.field({.name = "exterior", .doc = "nested medium of this name: before the normal", .derived = true},
+          s.exterior);
+  v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
+          s.is_medium_transition);
+}
+
+// ---- emitters
+// -------------------------------------------------------------------------------------------------------
+template <class V, Of<AreaEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "radiance", .doc = "emitted radiance", .range = kNonNegative}, e.radiance);
+}
+template <class V, Of<ConstantEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "radiance", .doc = "radiance", .range = kNonNegative}, e.radiance);
+}
+template <class V, Of<DirectionalEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "direction", .doc = "the way the light travels, in the world"}, e.direction);
+  v.field({.name = "irradiance", .doc = "on a plane that faces the light", .range = kNonNegative},
+          e.irradiance);
+}
+template <class V, Of<PointEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "position", .doc = "where, in the world", .unit = "length"}, e.position);
+  v.field({.name = "intensity", .doc = "radiant intensity", .unit = "W/sr", .range = kNonNegative},
+          e.intensity);
+}
+template <class V, Of<SpotEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "to_world", .doc = "places and turns the light"}, e.to_world);
+  v.field({.name = "intensity",
+           .doc = "radiant intensity within the beam",
+           .unit = "W/sr",
+           .range = kNonNegative},
+          e.intensity);
+  v.field({.name = "cutoff_angle",
+           .doc = "dark beyond this angle from the axis",
+           .unit = "degrees",
+           .range = {0, 180, true, true}},
+          e.cutoff_angle);
+  v.field({.name = "beam_width",
+           .doc = "full intensity within this angle; 3/4 of cutoff_angle if not given",
+           .unit = "degrees",
+           .range = {0, 180}},
+          e.beam_width);
+  v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
+}
+
+// ---- camera, film, integrator
+// ---------------------------------------------------------------------------------------
+template <class V, Of<BoxFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+}
+template <class V, Of<TentFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+}
+template <class V, Of<GaussianFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "stddev", .doc = "standard deviation", .unit = "pixels", .range = {0, 8, true}}, f.stddev);
+}
+template <class V, Of<Sensor> T>
+void describe_perspective(V& v, T& s) {
+  v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
+  v.field({.name = "fov",
+           .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given)",
+           .unit = "degrees",
+           .range = {0, 180, true, true}},
+          s.fov);
+  v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
+  v.field({.name = "near_clip", .doc = "nearest depth that is seen", .unit = "length", .range = kPositive},
+          s.near_clip);
+  v.field({.name = "far_clip", .doc = "farthest depth that is seen", .unit = "length", .range = kPositive},
+          s.far_clip);
+  v.field({.name = "principal_point_offset_x", .doc = "shift of the image", .unit = "frame widths"},
+          s.principal_point_offset[0]);
+  v.field({.name = "principal_point_offset_y", .doc = "shift of the image", .unit = "frame heights"},
+          s.principal_point_offset[1]);
+}
+template <class V, Of<Sensor> T>
+void describe_lens(V& v, T& s) {
+  v.field({.name = "aperture_radius",
+           .doc = "radius of the lens (`thinlens` only, and needed there); 0: pinhole",
+           .unit = "length",
+           .range = kNonNegative},
+          s.aperture_radius);
+  v.field({.name = "focus_distance",
+           .doc = "depth that is sharp (`thinlens`); far_clip if not given",
+           .unit = "length",
+           .range = kPositive},
+          s.focus_distance);
+}
+template <class V, Of<Sensor> T>
+void describe(V& v, T& s) {
+  describe_perspective(v, s);
+  describe_lens(v, s);
+  v.field({.name = "medium", .doc = "nested medium that the camera is in", .derived = true}, s.medium);
+}
+template <class V, Of<FilmSettings> T>
+void describe(V& v, T& f) {
+  v.field({.name = "width", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
+          f.size.width);
+  v.field({.name = "height", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
+          f.size.height);
+  v.field({.name = "filter", .doc = "nested rfilter; gaussian if there is none", .derived = true}, f.filter);
+}
+template <class V, Of<IntegratorSettings> T>
+void describe(V& v, T& i) {
+  v.field({.name = "name", .doc = "\"volpath\" or \"path\" (leaves media out)", .derived = true}, i.name);
+  v.field({.name = "max_depth",
+           .doc = "longest path in segments: 1 emission, 2 direct light; -1: no limit",
+           .range = {-1, 1e9}},
+          i.max_depth);
+  v.field({.name = "rr_depth", .doc = "depth from which Russian roulette may end a path", .range = {1, 1e9}},
+          i.rr_depth);
+  v.field({.name = "hide_emitters", .doc = "lights are invisible to the camera"}, i.hide_emitters);
+}
+
+template <class V, Of<Asset> T>
+void describe(V& v, T& a) {
+  v.field({.name = "name", .doc = "as the scene calls the file", .derived = true}, a.name);
+  v.field({.name = "sha256", .doc = "digest of its bytes", .derived = true}, a.digest);
+  v.field({.name = "bytes", .doc = "its size", .derived = true}, a.bytes);
+}
+template <class V, Of<Scene> T>
+void describe(V& v, T& s) {
+  v.field({.name = "assets", .doc = ""}, s.assets);
+  v.field({.name = "textures", .doc = ""}, s.textures);
+  v.field({.name = "bsdfs", .doc = ""}, s.bsdfs);
+  v.field({.name = "volumes", .doc = ""}, s.volumes);
+  v.field({.name = "phases", .doc = ""}, s.phases);
+  v.field({.name = "media", .doc = ""}, s.media);
+  v.field({.name = "shapes", .doc = ""}, s.shapes);
+  v.field({.name = "emitters", .doc = ""}, s.emitters);
+  v.field({.name = "sensor", .doc = ""}, s.sensor);
+  v.field({.name = "film", .doc = ""}, s.film);
+  v.field({.name = "integrator", .doc = ""}, s.integrator);
+  v.field({.name = "sample_count", .doc = "samples per pixel, of the sampler", .range = {1, kMaxSampleCount}},
+          s.sample_count);
+}
+
+// Anything that the table describes as an object.
+struct AnyVisitor {
+  template <class T>
+  void field(const Field&, T&) {}
+};
+template <class T>
+concept Described = requires(AnyVisitor& v, T& t) {
+  describe(v, t);
+};
+
+}  // namespace ls::scene

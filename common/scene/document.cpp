@@ -1,0 +1,297 @@
+#include "common/scene/document.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "common/scene/limits.h"
+#include "common/scene/suggest.h"
+
+namespace ls::scene {
+namespace {
+
+bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
+
+// `$name` -> value. What is put in is not searched again, so there is no recursion and no explosion.
+class Parameters {
+ public:
+  Parameters(const std::map<std::string, std::string>& defines, Report& report)
+      : values_(defines), report_(report) {}
+
+  bool declare(const Element& e, std::string name, std::string value) {
+    if (name.empty()) return complain(e.at, "<default> needs a name");
+    if (values_.size() >= kMaxParameters)
+      return complain(e.at, fmt::format("more than {} parameters", kMaxParameters));
+    values_.emplace(std::move(name), std::move(value));  // -D and earlier defaults win
+    return true;
+  }
+
+  bool substitute(Attribute& a) {
+    if (a.value.find('$') == std::string::npos) return true;
+    std::string out;
+    for (std::size_t i = 0; i < a.value.size();) {
+      if (a.value.compare(i, 2, "\\$") == 0) {
+        out += '$';
+        i += 2;
+      } else if (a.value[i] != '$') {
+        out += a.value[i++];
+      } else {
+        const auto found = longest_at(a.value, i + 1);
+        if (found == values_.end()) return undefined(a, i + 1);
+        out += found->second;
+        i += 1 + found->first.size();
+      }
+      if (out.size() > kMaxValueBytes)
+        return complain(a.value_at, fmt::format("with its parameters put in, this is longer than {} bytes",
+                                                kMaxValueBytes));
+    }
+    total_ += out.size();
+    if (total_ > kMaxSubstitutedBytes)
+      return complain(a.value_at,
+                      fmt::format("parameters fill in more than {} bytes altogether", kMaxSubstitutedBytes));
+    a.value = std::move(out);
+    return true;
+  }
+
+ private:
+  using Values = std::map<std::string, std::string>;
+
+  // The longest parameter name that stands at `at` (Mitsuba: "$resx" is `resx` if there is one, else `res`
+  // and an x).
+  Values::const_iterator longest_at(const std::string& text, std::size_t at) const {
+    std::size_t end = at;
+    while (end < text.size() && is_name_char(text[end])) ++end;
+    for (; end > at; --end)
+      if (const auto it = values_.find(text.substr(at, end - at)); it != values_.end()) return it;
+    return values_.end();
+  }
+
+  bool undefined(const Attribute& a, std::size_t at) {
+    std::size_t end = at;
+    while (end < a.value.size() && is_name_char(a.value[end])) ++end;
+    const std::string name = a.value.substr(at, end - at);
+    std::vector<std::string> known;
+    for (const auto& [key, value] : values_) known.push_back(key);
+    return complain(a.value_at, fmt::format("the parameter ${} is not defined: give it by <default "
+                                            "name=\"{}\" value=\"...\"/> or -D {}=...{}",
+                                            name, name, name, suggestion(name, known)));
+  }
+
+  bool complain(const Span& at, std::string text) {
+    report_.error(at, std::move(text));
+    return false;
+  }
+
+  Values values_;
+  Report& report_;
+  std::size_t total_ = 0;
+};
+
+// Parameters of 0.x files are in camelCase; Mitsuba 3 renames them when it reads such a file, and so do we.
+std::string snake_case(std::string_view name) {
+  std::string out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const auto c = static_cast<unsigned char>(name[i]);
+    const bool hump = i > 0 && std::isupper(c) && std::islower(static_cast<unsigned char>(name[i - 1]));
+    if (hump) out += '_';
+    out += static_cast<char>(hump || (i > 0 && std::isupper(c)) ? std::tolower(c) : c);
+  }
+  return out;
+}
+
+class Loader {
+ public:
+  Loader(AssetSource& assets, const std::map<std::string, std::string>& defines, Report& report)
+      : assets_(assets), parameters_(defines, report), report_(report) {}
+
+  bool load(std::string name, std::string text, const Span* included_at, Element& root) {
+    total_bytes_ += text.size();
+    if (text.size() > kMaxTextBytes || total_bytes_ > kMaxTotalTextBytes)
+      return too_large(std::move(name), included_at);
+    const std::uint32_t file = report_.add_file(SourceText(std::move(name), std::move(text)));
+    auto tree = parse_xml(file, report_, elements_left_);
+    if (!tree) return false;
+    root = std::move(*tree);
+    const Attribute* version = root.find("version");
+    if (!version) {
+      report_.error(
+          root.at,
+          fmt::format("<{}> has no version: a Mitsuba file begins with <scene version=\"3.0.0\">", root.tag));
+      return false;
+    }
+    if (version->value.empty() || !std::isdigit(static_cast<unsigned char>(version->value[0]))) {
+      report_.error(version->value_at,
+                    fmt::format("'{}' is not a version; write version=\"3.0.0\"", version->value));
+      return false;
+    }
+    const bool old_names =
+        version->value[0] < '2' && (version->value.size() == 1 || version->value[1] == '.');
+    return expand(root, old_names);
+  }
+
+  std::vector<std::string> search_paths;
+
+ private:
+  bool too_large(std::string name, const Span* included_at) {
+    const std::string text =
+        fmt::format("scene text is limited to {} MiB a file and {} MiB with everything included",
+                    kMaxTextBytes >> 20, kMaxTotalTextBytes >> 20);
+    const Span at =
+        included_at ? *included_at : Span{report_.add_file(SourceText(std::move(name), "")), 0, 1};
+    report_.error(at, text);
+    return false;
+  }
+
+  // Substitutes, and replaces the elements that speak about the text itself. Depth: bounded by kMaxNesting
+  // and kMaxIncludeDepth.
+  bool expand(Element& e, bool old_names) {
+    for (Attribute& a : e.attributes)
+      if (!parameters_.substitute(a)) return false;
+    if (old_names) upgrade(e);
+    std::vector<Element> children;
+    for (Element& child : e.children)
+      if (!expand_child(child, old_names, children)) return false;
+    e.children = std::move(children);
+    return true;
+  }
+
+  bool expand_child(Element& child, bool old_names, std::vector<Element>& out) {
+    if (child.tag == "include") return include(child, out);
+    if (!expand(child, old_names)) return false;
+    if (child.tag == "default") {
+      return check_attributes(child, {"name", "value"}) &&
+             parameters_.declare(child, std::string(child.get("name")), std::string(child.get("value")));
+    }
+    if (child.tag == "path") {
+      if (!check_attributes(child, {"value"})) return false;
+      if (search_paths.size() >= kMaxSearchPaths) {
+        report_.error(child.at, fmt::format("more than {} <path> elements", kMaxSearchPaths));
+        return false;
+      }
+      search_paths.insert(search_paths.begin(), join_path("", child.get("value")));
+      return true;
+    }
+    out.push_back(std::move(child));
+    return true;
+  }
+
+  void upgrade(Element& e) {
+    if (e.tag == "lookAt") e.tag = "lookat";
+    for (Attribute& a : e.attributes)
+      if (a.name == "name") a.value = snake_case(a.value);
+  }
+
+  bool check_attributes(const Element& e, std::initializer_list<std::string_view> names) {
+    for (const std::string_view name : names)
+      if (!e.find(name)) {
+        report_.error(e.at, fmt::format("<{}> needs the attribute '{}'", e.tag, name));
+        return false;
+      }
+    for (const Attribute& a : e.attributes)
+      if (std::find(names.begin(), names.end(), a.name) == names.end()) {
+        const std::vector<std::string> known(names.begin(), names.end());
+        report_.error(a.name_at,
+                      fmt::format("<{}> has no attribute '{}'{}", e.tag, a.name, suggestion(a.name, known)));
+        return false;
+      }
+    return true;
+  }
+
+  bool include(Element& e, std::vector<Element>& out) {
+    for (Attribute& a : e.attributes)
+      if (!parameters_.substitute(a)) return false;
+    if (!check_attributes(e, {"filename"})) return false;
+    const Span at = e.find("filename")->value_at;
+    const std::string name(e.get("filename"));
+    if (static_cast<int>(including_.size()) >= kMaxIncludeDepth || ++includes_ > kMaxIncludes) {
+      report_.error(at, fmt::format("includes are limited to {} within each other and {} altogether",
+                                    kMaxIncludeDepth, kMaxIncludes));
+      return false;
+    }
+    auto found = find_included(name);
+    if (!found) {
+      report_.error(at, found.error().message);
+      return false;
+    }
+    if (std::find(including_.begin(), including_.end(), found->name) != including_.end()) {
+      report_.error(at, fmt::format("\"{}\" includes itself", name));
+      return false;
+    }
+    including_.push_back(found->name);
+    Element root;
+    const bool ok = load(std::move(found->name), std::move(found->text), &at, root);
+    including_.pop_back();
+    if (!ok) return false;
+    if (root.tag != "scene") {
+      std::erase_if(root.attributes, [](const Attribute& a) { return a.name == "version"; });
+      out.push_back(std::move(root));
+    } else {
+      std::move(root.children.begin(), root.children.end(), std::back_inserter(out));
+    }
+    return true;
+  }
+
+  struct Included {
+    std::string name, text;
+  };
+  // As Mitsuba 3 looks for files: in the folder of the including file, in the <path>s, latest first, beside
+  // the main file.
+  Result<Included> find_included(const std::string& name) {
+    std::vector<std::string> places;
+    if (!including_.empty()) places.push_back(join_path(join_path(including_.back(), ".."), name));
+    for (const std::string& path : search_paths) places.push_back(join_path(path, name));
+    for (const std::string& place : places)
+      if (auto text = assets_.text(place)) return Included{place, std::move(*text)};
+    const std::string own = join_path("", name);
+    auto text = assets_.text(own);
+    if (!text) return tl::unexpected<Error>(text.error());
+    return Included{own, std::move(*text)};
+  }
+
+  AssetSource& assets_;
+  Parameters parameters_;
+  Report& report_;
+  std::vector<std::string> including_;
+  std::size_t total_bytes_ = 0, elements_left_ = kMaxElements;
+  int includes_ = 0;
+};
+
+}  // namespace
+
+std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
+                                      const std::map<std::string, std::string>& defines, Report& report) {
+  Loader loader(assets, defines, report);
+  Document document;
+  if (!loader.load(std::string(file_name), std::string(text.substr(0, kMaxTextBytes + 1)), nullptr,
+                   document.root))
+    return std::nullopt;
+  document.search_paths = std::move(loader.search_paths);
+  return document;
+}
+
+std::string join_path(std::string_view folder, std::string_view name) {
+  const bool own_root = !name.empty() && name[0] == '/';
+  const std::string joined =
+      own_root || folder.empty() ? std::string(name) : fmt::format("{}/{}", folder, name);
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin <= joined.size();) {
+    const std::size_t end = std::min(joined.find('/', begin), joined.size());
+    const std::string_view part = std::string_view(joined).substr(begin, end - begin);
+    begin = end + 1;
+    if (part.empty() || part == ".") continue;
+    if (part == ".." && !parts.empty() && parts.back() != "..")
+      parts.pop_back();
+    else
+      parts.push_back(part);
+  }
+  std::string out = joined.empty() || joined[0] != '/' ? "" : "/";
+  for (const std::string_view part : parts) {
+    if (!out.empty() && out.back() != '/') out += '/';
+    out += part;
+  }
+  return out;
+}
+
+}  // namespace ls::scene

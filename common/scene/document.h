@@ -1,0 +1,50 @@
+// A scene file as a tree of elements with places: includes spliced in, $parameters substituted, nothing
+// interpreted yet.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/read.h"
+#include "common/scene/report.h"
+
+namespace ls::scene {
+
+struct Attribute {
+  std::string name, value;  // value: entities decoded, parameters substituted
+  Span name_at, value_at;   // value_at: between the quotes
+};
+
+struct Element {
+  std::string tag;
+  Span at;  // the tag's name
+  std::vector<Attribute> attributes;
+  std::vector<Element> children;
+
+  const Attribute* find(std::string_view attribute) const;
+  // The attribute's value, empty if there is none.
+  std::string_view get(std::string_view attribute) const;
+};
+
+struct Document {
+  Element root;
+  std::vector<std::string> search_paths;  // of <path>, the first to be tried first
+};
+
+// XML text -> tree; nothing (and diagnostics) if it is malformed, not UTF-8 or beyond the limits. The only
+// door to pugixml.
+std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
+
+// The whole stage: parses, follows <include>, applies <default> and `defines`. Handles <include>, <default>
+// and <path>, which are gone from the result.
+std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
+                                      const std::map<std::string, std::string>& defines, Report& report);
+
+// `name` below `folder` (either may be absolute or empty), with "." and ".." resolved where that needs no
+// disk.
+std::string join_path(std::string_view folder, std::string_view name);
+
+}  // namespace ls::scene

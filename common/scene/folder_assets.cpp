@@ -1,0 +1,92 @@
+#include "common/scene/folder_assets.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <system_error>
+#include <vector>
+
+#include "common/scene/limits.h"
+#include "common/scene/suggest.h"
+
+namespace ls {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxNamesLookedAt = 4096;  // of a folder, for a suggestion
+
+// "; did you mean 'cloud.vol'?" from the files beside the one that is missing.
+std::string names_like(const fs::path& missing) {
+  std::vector<std::string> names;
+  std::error_code error;
+  const fs::path folder = missing.has_parent_path() ? missing.parent_path() : fs::path(".");
+  fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error);
+  for (; !error && it != fs::directory_iterator() && names.size() < kMaxNamesLookedAt; it.increment(error))
+    names.push_back(it->path().filename().string());
+  if (names.empty())
+    return fs::is_directory(folder, error) ? "; its folder is empty" : "; its folder does not exist";
+  const auto near = scene::nearest_name(missing.filename().string(), names);
+  return near ? fmt::format("; did you mean '{}'?", *near) : "";
+}
+
+}  // namespace
+
+Result<fs::path> FolderAssets::locate(std::string_view name) const {
+  if (name.empty() || name.find('\0') != std::string_view::npos)
+    return fail(Errc::invalid_argument, "this is not the name of a file");
+  const fs::path path = folder_ / fs::path(name);  // an absolute name stays itself
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found)
+    return fail(Errc::not_found, fmt::format("there is no file \"{}\"{}", name, names_like(path)));
+  if (error)
+    return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be opened: {}", name, error.message()));
+  if (!fs::is_regular_file(status))
+    return fail(Errc::invalid_argument, fmt::format("\"{}\" is not a regular file", name));
+  return path;
+}
+
+Result<Asset> FolderAssets::find(std::string_view name) {
+  if (const auto it = found_.find(name); it != found_.end()) return it->second;
+  const auto path = locate(name);
+  if (!path) return tl::unexpected<Error>(path.error());
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(*path, error);
+  const auto digest = sha256_file(*path);
+  if (!digest)
+    return fail(Errc::invalid_argument,
+                fmt::format("\"{}\" can't be read: {}", name, digest.error().message));
+  if (error)
+    return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be read: {}", name, error.message()));
+  const Asset asset{std::string(name), *digest, bytes};
+  found_.emplace(asset.name, asset);
+  paths_.emplace(asset.name, *path);
+  by_digest_.emplace(asset.digest, *path);
+  return asset;
+}
+
+Result<std::string> FolderAssets::text(std::string_view name) {
+  const auto path = locate(name);
+  if (!path) return tl::unexpected<Error>(path.error());
+  std::error_code error;
+  if (fs::file_size(*path, error) > scene::kMaxTextBytes && !error)
+    return fail(Errc::resource_exhausted, fmt::format("\"{}\" is larger than the {} MiB of a scene file",
+                                                      name, scene::kMaxTextBytes >> 20));
+  std::ifstream in(*path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (!in.good() && !in.eof()) return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be read", name));
+  return text;
+}
+
+std::optional<fs::path> FolderAssets::path_of(std::string_view name) const {
+  const auto it = paths_.find(name);
+  return it == paths_.end() ? std::nullopt : std::optional(it->second);
+}
+
+std::optional<fs::path> FolderAssets::path_of(const Digest& digest) const {
+  const auto it = by_digest_.find(digest);
+  return it == by_digest_.end() ? std::nullopt : std::optional(it->second);
+}
+
+}  // namespace ls

@@ -1,0 +1,150 @@
+#include "common/scene/known.h"
+
+#include <algorithm>
+#include <map>
+
+namespace ls::scene {
+namespace {
+
+using Names = std::vector<std::string>;
+
+struct PluginRow {
+  Names supported, unsupported;
+};
+
+const std::map<std::string_view, PluginRow>& plugins() {
+  static const std::map<std::string_view, PluginRow> table = {
+      {"integrator",
+       {{"path", "volpath", "volpathmis", "volpath_simple", "direct", "ptracer", "moment", "aov"},
+        {"bdpt", "depth", "irrcache", "mlt", "pssmlt", "photonmapper", "ppm", "sppm", "prb", "prb_basic",
+         "prbvolpath", "direct_projective", "prb_projective", "prb_reparam", "stokes", "vpl", "erpt"}}},
+      {"sensor",
+       {{"perspective", "thinlens"},
+        {"batch", "distant", "irradiancemeter", "orthographic", "perspective_rdist", "radiancemeter",
+         "fluencemeter", "spherical", "telecentric"}}},
+      {"film", {{"hdrfilm"}, {"ldrfilm", "mfilm", "specfilm", "tiledhdrfilm"}}},
+      {"rfilter", {{"box", "gaussian", "tent"}, {"catmullrom", "lanczos", "mitchell"}}},
+      {"shape",
+       {{"cube", "disk", "obj", "ply", "rectangle", "sphere"},
+        {"bsplinecurve", "cylinder", "deformable", "ellipsoids", "ellipsoidsmesh", "hair", "heightfield",
+         "instance", "linearcurve", "merge", "sdfgrid", "serialized", "shapegroup"}}},
+      {"bsdf",
+       {{"conductor", "dielectric", "diffuse", "null", "roughconductor", "roughplastic", "twosided"},
+        {"blendbsdf",
+         "bumpmap",
+         "circular",
+         "coating",
+         "difftrans",
+         "hair",
+         "hk",
+         "irawan",
+         "mask",
+         "measured",
+         "measured_polarized",
+         "mixturebsdf",
+         "normalmap",
+         "phong",
+         "plastic",
+         "pplastic",
+         "polarizer",
+         "principled",
+         "principledthin",
+         "retarder",
+         "roughcoating",
+         "roughdielectric",
+         "roughdiffuse",
+         "thindielectric",
+         "ward"}}},
+      {"emitter",
+       {{"area", "constant", "directional", "point", "spot"},
+        {"collimated", "directionalarea", "envmap", "projector", "sky", "sun", "sunsky", "timed_sunsky",
+         "avg_sunsky"}}},
+      {"texture",
+       {{"bitmap", "checkerboard", "srgb", "uniform"},
+        {"mesh_attribute", "scale", "sampledspectrum", "volume", "vertexcolors", "wireframe", "curvature",
+         "gridtexture"}}},
+      {"spectrum", {{"srgb", "uniform"}, {"blackbody", "d65", "irregular", "rawconstant", "regular"}}},
+      {"volume", {{"constvolume", "gridvolume"}, {"hgridvolume", "volcache"}}},
+      {"medium", {{"heterogeneous", "homogeneous"}, {}}},
+      {"phase",
+       {{"hg", "isotropic"},
+        {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
+  };
+  return table;
+}
+
+const Names kNone;
+
+}  // namespace
+
+const std::vector<MeaninglessRow>& meaningless_table() {
+  static const std::string_view output = "the output format is chosen by the command line or the job";
+  static const std::string_view sampling = "it only steers sampling, which is chosen here";
+  static const std::string_view once = "motion is not rendered";
+  static const std::vector<MeaninglessRow> rows = {
+      {"film",
+       "",
+       {"pixel_format", "component_format", "file_format", "banner", "attach_log", "high_quality_edges",
+        "sample_border", "compensate", "fps"},
+       output},
+      {"sampler",
+       "",
+       {"seed", "scramble", "jitter", "dimension", "strict"},
+       "samples are this program's own (--seed)"},
+      {"integrator",
+       "",
+       {"strict_normals", "samples_per_pass", "block_size", "timeout", "render_time_step"},
+       "it does not change the exact answer"},
+      {"integrator",
+       "direct",
+       {"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"},
+       sampling},
+      {"integrator", "ptracer", {"samples_per_pass"}, sampling},
+      {"integrator", "aov", {"aovs", "img"}, "extra channels are asked for by --aov"},
+      {"sensor", "", {"shutter_open", "shutter_close", "srf"}, once},
+      {"shape", "", {"silhouette_sampling_weight", "sampling_weight"}, sampling},
+      {"shape", "obj", {"collapse"}, "files are read as they are"},
+      {"bsdf", "roughconductor", {"sample_visible"}, sampling},
+      {"bsdf", "roughplastic", {"sample_visible", "specular_sampling_weight"}, sampling},
+      {"emitter", "", {"sampling_weight", "medium"}, sampling},
+      {"texture", "bitmap", {"format", "accel", "cache", "max_anisotropy"}, "it does not change the values"},
+      {"volume", "gridvolume", {"accel", "max_value", "send_data"}, "it does not change the values"},
+      {"medium",
+       "",
+       {"sample_emitters", "has_spectral_extinction", "majorant_resolution_factor", "majorant_factor",
+        "majorant_grid_resolution", "max_density", "method", "step_size"},
+       sampling},
+  };
+  return rows;
+}
+
+std::string_view meaningless_because(std::string_view tag, std::string_view plugin,
+                                     std::string_view parameter) {
+  for (const MeaninglessRow& row : meaningless_table())
+    if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin) &&
+        std::find(row.parameters.begin(), row.parameters.end(), parameter) != row.parameters.end())
+      return row.because;
+  return {};
+}
+
+std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin) {
+  std::vector<std::string> all;
+  for (const MeaninglessRow& row : meaningless_table())
+    if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin))
+      all.insert(all.end(), row.parameters.begin(), row.parameters.end());
+  return all;
+}
+
+const std::vector<std::string>& supported_plugins(std::string_view tag) {
+  const auto it = plugins().find(tag);
+  return it == plugins().end() ? kNone : it->second.supported;
+}
+
+bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {
+  const auto it = plugins().find(tag);
+  if (it == plugins().end()) return false;
+  const Names& names = it->second.unsupported;
+  return std::find(names.begin(), names.end(), plugin) != names.end();
+}
+
+}  // namespace ls::scene

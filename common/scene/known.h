@@ -1,0 +1,26 @@
+// What the dialect has and we do not: parameters without meaning here, and plugins not supported.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ls::scene {
+
+// Why a parameter of the dialect has no effect here; empty if it is not such a parameter.
+std::string_view meaningless_because(std::string_view tag, std::string_view plugin,
+                                     std::string_view parameter);
+std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin);
+
+// The plugins of a tag that can be read, and those that the dialect has besides.
+const std::vector<std::string>& supported_plugins(std::string_view tag);
+bool is_unsupported_plugin(std::string_view tag, std::string_view plugin);
+
+struct MeaninglessRow {
+  std::string_view tag, plugin;  // plugin "": all of this tag
+  std::vector<std::string> parameters;
+  std::string_view because;
+};
+const std::vector<MeaninglessRow>& meaningless_table();  // for the documentation
+
+}  // namespace ls::scene

@@ -1,0 +1,28 @@
+// Every bound of scene reading. Scene text is hostile: each of these is checked before memory is spent on it.
+#pragma once
+
+#include <cstddef>
+
+namespace ls::scene {
+
+inline constexpr std::size_t kMaxTextBytes = std::size_t{32} << 20;       // one scene file
+inline constexpr std::size_t kMaxTotalTextBytes = std::size_t{64} << 20;  // with everything included
+inline constexpr std::size_t kMaxElements = 500'000;                      // with everything included
+inline constexpr std::size_t kMaxAttributes = 2'000'000;
+inline constexpr int kMaxNesting = 64;
+inline constexpr int kMaxIncludeDepth = 15;  // as Mitsuba 3
+inline constexpr int kMaxIncludes = 256;
+inline constexpr std::size_t kMaxParameters = 4096;                   // <default> and -D together
+inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;  // one attribute after substitution
+inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;  // all attributes together
+inline constexpr std::size_t kMaxSearchPaths = 64;                          // <path>
+inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, by reference too
+inline constexpr std::size_t kMaxDiagnostics = 20;
+inline constexpr std::size_t kMaxExcerptBytes = 160;  // of a source line in a message
+inline constexpr int kMaxFrameSide = 65536;
+inline constexpr std::size_t kMaxFramePixels = std::size_t{1} << 30;
+inline constexpr double kMaxSampleCount = 1e9;
+inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
+inline constexpr int kMaxJsonNesting = 16;
+
+}  // namespace ls::scene

@@ -1,0 +1,173 @@
+// Sensor, film, filter, sampler and integrator.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/scene/known.h"
+#include "common/scene/plugin_error.h"
+#include "common/scene/reader.h"
+#include "common/scene/suggest.h"
+#include "common/scene/transform.h"
+#include "common/scene/values.h"
+
+namespace ls::scene {
+
+void Reader::read_sensor(const Element& e) {
+  const bool lens = e.get("type") == "thinlens";
+  if (!lens && e.get("type") != "perspective") return unknown_plugin(e, report_);
+  if (sensor_)
+    return report_.warning(
+        e.at, fmt::format("a second sensor; the first ({}) is used", report_.refer_to(sensor_->at, e.at)));
+  sensor_ = &e;
+  Params p(*this, e);
+  Sensor& s = scene_.sensor;
+  const bool has_focus = p.has("focus_distance"), has_aperture = p.has("aperture_radius");
+  read_fov(p, s);
+  Binder binder(p);
+  describe_perspective(binder, s);
+  if (lens) {
+    describe_lens(binder, s);
+    if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
+    if (!has_focus) s.focus_distance = s.far_clip;
+  } else {
+    p.take("focus_distance");  // a pinhole has everything in focus
+  }
+  if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
+  if (!std::isfinite(determinant3(s.to_world)) || determinant3(s.to_world) == 0)
+    report_.error(e.at, "to_world flattens the camera's space: it can't be inverted");
+
+  const auto media = p.take_nested("medium");
+  if (const Element* use = p.take("medium"))
+    if (const Element* object = resolve(*use)) s.medium = medium(*object, *use);
+  if (!media.empty()) s.medium = medium(*media[0].object, *media[0].use);
+  const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
+  if (films.size() > 1) report_.error(films[1].use->at, "this sensor has a second film");
+  if (samplers.size() > 1) report_.error(samplers[1].use->at, "this sensor has a second sampler");
+  if (!films.empty()) read_film(*films[0].object);
+  if (!samplers.empty()) read_sampler(*samplers[0].object);
+  p.finish();
+}
+
+// Without `fov` the angle is that of a focal length on 35 mm film, over the diagonal of 36 mm x 24 mm.
+void Reader::read_fov(Params& p, Sensor& s) {
+  const bool has_fov = p.has("fov");
+  const Element* given = p.take("focal_length");
+  if (has_fov && given)
+    return report_.error(given->at, fmt::format("{} gives both fov and focal_length", p.title()));
+  if (has_fov) return;
+  double length = 50;
+  if (given) {
+    std::string_view text = given->get("value");
+    if (text.ends_with("mm")) text.remove_suffix(2);
+    const auto number = given->tag == "string" ? parse_number(text) : std::nullopt;
+    if (!number || *number <= 0)
+      return report_.error(value_place(*given, "value"), "'focal_length' wants a <string> such as \"50mm\"");
+    length = *number;
+  }
+  s.fov = 2 * std::atan(std::sqrt(36.0 * 36 + 24.0 * 24) / (2 * length)) * (180 / std::numbers::pi);
+  s.fov_axis = FovAxis::diagonal;
+  p.take("fov_axis");  // has no say then, as in Mitsuba
+}
+
+void Reader::read_film(const Element& e) {
+  if (e.get("type") != "hdrfilm") return unknown_plugin(e, report_);
+  Params p(*this, e);
+  FilmSettings& film = scene_.film;
+  bind(p, film);
+  check_crop(p);
+  if (static_cast<std::size_t>(film.size.width) * static_cast<std::size_t>(film.size.height) >
+      kMaxFramePixels)
+    report_.error(e.at, fmt::format("a frame of {} x {} is larger than {} pixels", film.size.width,
+                                    film.size.height, kMaxFramePixels));
+  const auto filters = p.take_nested("rfilter");
+  if (filters.size() > 1) report_.error(filters[1].use->at, "this film has a second filter");
+  if (!filters.empty()) film.filter = read_filter(*filters[0].object);
+  p.finish();
+}
+
+// A crop window that is the whole frame is no crop; any other would change which pixels there are.
+void Reader::check_crop(Params& p) {
+  const struct {
+    std::string_view name;
+    int whole;
+  } parts[] = {{"crop_offset_x", 0},
+               {"crop_offset_y", 0},
+               {"crop_width", scene_.film.size.width},
+               {"crop_height", scene_.film.size.height}};
+  for (const auto& [name, whole] : parts) {
+    const Element* e = p.take(name);
+    if (!e) continue;
+    int value = whole;
+    p.convert({.name = name, .doc = ""}, *e, value);
+    if (value != whole)
+      report_.error(value_place(*e, "value"),
+                    fmt::format("'{}': rendering a part of the frame is not supported", name));
+  }
+}
+
+template <class T>
+ReconstructionFilter Reader::read_plain_filter(const Element& e) {
+  Params p(*this, e);
+  T filter;
+  bind(p, filter);
+  p.finish();
+  return filter;
+}
+
+ReconstructionFilter Reader::read_filter(const Element& e) {
+  const std::string_view type = e.get("type");
+  if (type == "box") return read_plain_filter<BoxFilter>(e);
+  if (type == "tent") return read_plain_filter<TentFilter>(e);
+  if (type == "gaussian") return read_plain_filter<GaussianFilter>(e);
+  if (is_unsupported_plugin("rfilter", type))
+    report_.error(value_place(e, "type"),
+                  fmt::format("the filter \"{}\" has negative lobes, which samples that each belong to one "
+                              "pixel can't follow; use box, tent or gaussian",
+                              type));
+  else
+    unknown_plugin(e, report_);
+  return GaussianFilter{};
+}
+
+// Samples are this program's own; only how many of them is the scene's to say.
+void Reader::read_sampler(const Element& e) {
+  Params p(*this, e);
+  if (const Element* count = p.take("sample_count"))
+    p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSampleCount}}, *count,
+              scene_.sample_count);
+  p.finish();
+}
+
+void Reader::read_integrator(const Element& e, int depth) {
+  if (depth == 0 && integrator_)
+    return report_.error(e.at, fmt::format("a second integrator; the first is in {}",
+                                           report_.refer_to(integrator_->at, e.at)));
+  if (depth == 0) integrator_ = &e;
+  if (depth > 4) return report_.error(e.at, "integrators are nested too deep, or contain themselves");
+  const std::string_view type = e.get("type");
+  Params p(*this, e);
+  if (type == "moment" || type == "aov") {
+    const auto inner = p.take_nested("integrator");
+    if (inner.size() != 1)
+      report_.error(e.at, fmt::format("{} needs one nested integrator, not {}", p.title(), inner.size()));
+    report_.warning(
+        value_place(e, "type"),
+        fmt::format("the extra channels of \"{}\" are not written: only its nested integrator is used",
+                    type));
+    if (!inner.empty()) read_integrator(*inner[0].object, depth + 1);
+    return p.finish();
+  }
+  IntegratorSettings& i = scene_.integrator;
+  if (type == "path" || type == "direct" || type == "ptracer")
+    i.name = "path";
+  else if (type == "volpath" || type == "volpathmis" || type == "volpath_simple")
+    i.name = "volpath";
+  else
+    return unknown_plugin(e, report_);
+  bind(p, i);
+  if (type == "direct") i.max_depth = 2;
+  p.finish();
+}
+
+}  // namespace ls::scene

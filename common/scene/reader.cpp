@@ -1,0 +1,158 @@
+#include "common/scene/reader.h"
+
+#include <fmt/format.h>
+
+#include "common/scene/known.h"
+#include "common/scene/limits.h"
+#include "common/scene/read.h"
+#include "common/scene/suggest.h"
+#include "common/scene/transform.h"
+#include "common/scene/validate.h"
+
+namespace ls {
+namespace scene {
+
+Reader::Reader(const Document& document, AssetSource& assets, Report& report)
+    : document_(document), assets_(assets), report_(report), ids_(check_structure(document.root, report)) {}
+
+Scene Reader::read() {
+  if (report_.has_errors()) return {};
+  for (const Element& child : document_.root.children) {
+    if (report_.full()) return {};
+    read_child(child);
+  }
+  if (!sensor_) report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
+  return std::move(scene_);
+}
+
+// At the top level a reference means the object itself, as for any parent.
+void Reader::read_child(const Element& child) {
+  const TagKind kind = kind_of(child);
+  if (kind == TagKind::alias) return;
+  if (kind == TagKind::property || kind == TagKind::transform)
+    return report_.error(
+        child.at, fmt::format("<{}> stands in no object: <scene> itself has no parameters", child.tag));
+  const Element* e = kind == TagKind::reference ? resolve(child) : &child;
+  if (!e) return;
+  if (e->tag == "shape") return read_shape(*e);
+  if (e->tag == "emitter") return read_emitter(*e);
+  if (e->tag == "sensor") return read_sensor(*e);
+  if (e->tag == "integrator") return read_integrator(*e, 0);
+  if (e->tag == "bsdf") return void(bsdf(*e, child));
+  if (e->tag == "texture" || e->tag == "spectrum") return void(texture(*e, child));
+  if (e->tag == "volume") return void(volume(*e, child));
+  if (e->tag == "phase") return void(phase(*e, child));
+  if (e->tag == "medium") return void(medium(*e, child));
+  if (e->find("id")) return;  // a film, filter or sampler that a sensor refers to
+  report_.error(e->at, fmt::format("a <{}> belongs into a <sensor>", e->tag));
+}
+
+const Element* Reader::resolve(const Element& child) {
+  if (kind_of(child) != TagKind::reference) return &child;
+  const auto it = ids_.find(child.get("id"));
+  if (it != ids_.end()) return it->second;
+  if (!bad_refs_.insert(&child).second) return nullptr;
+  std::vector<std::string> known;
+  for (const auto& [id, object] : ids_) known.push_back(id);
+  std::string hint = ids_.empty() ? "; no object here has one" : suggestion(child.get("id"), known);
+  if (const auto near = nearest_name(child.get("id"), known))
+    hint = fmt::format("; did you mean \"{}\" ({})?", *near,
+                       report_.refer_to(ids_.find(*near)->second->at, child.at));
+  report_.error(value_place(child, "id"),
+                fmt::format("no object has the id \"{}\"{}", child.get("id"), hint));
+  return nullptr;
+}
+
+template <class I, class F>
+std::optional<I> Reader::once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
+                              F read) {
+  if (object.tag != kind && !(kind == "texture" && object.tag == "spectrum")) {
+    report_.error(use.at, fmt::format("a {} is wanted here, not a {}", kind, object.tag));
+    return std::nullopt;
+  }
+  if (const auto it = memo.find(&object); it != memo.end()) return it->second;
+  if (in_progress_.contains(&object)) {
+    report_.error(
+        use.at, fmt::format("this {} contains itself: it is referred to from within (it begins in {})", kind,
+                            report_.refer_to(object.at, use.at)));
+    return std::nullopt;
+  }
+  if (in_progress_.size() >= static_cast<std::size_t>(kMaxReferenceDepth)) {
+    report_.error(use.at, fmt::format("objects are nested more than {} deep", kMaxReferenceDepth));
+    return std::nullopt;
+  }
+  in_progress_.insert(&object);
+  const std::optional<I> index = read(object);
+  in_progress_.erase(&object);
+  memo.emplace(&object, index);
+  return index;
+}
+
+std::optional<TextureIndex> Reader::texture(const Element& object, const Element& use) {
+  return once(textures_, "texture", object, use, [&](const Element& e) { return read_texture(e); });
+}
+std::optional<BsdfIndex> Reader::bsdf(const Element& object, const Element& use) {
+  return once(bsdfs_, "bsdf", object, use, [&](const Element& e) { return read_bsdf(e); });
+}
+std::optional<VolumeIndex> Reader::volume(const Element& object, const Element& use) {
+  return once(volumes_, "volume", object, use, [&](const Element& e) { return read_volume(e); });
+}
+std::optional<PhaseIndex> Reader::phase(const Element& object, const Element& use) {
+  return once(phases_, "phase", object, use, [&](const Element& e) { return read_phase(e); });
+}
+std::optional<MediumIndex> Reader::medium(const Element& object, const Element& use) {
+  return once(media_, "medium", object, use, [&](const Element& e) { return read_medium(e); });
+}
+
+TextureIndex Reader::add_constant_texture(const Rgb& value) {
+  scene_.textures.push_back(ConstantTexture{value});
+  return {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+}
+
+VolumeIndex Reader::add_constant_volume(const Rgb& value) {
+  scene_.volumes.push_back(ConstVolume{value});
+  return {static_cast<std::uint32_t>(scene_.volumes.size() - 1)};
+}
+
+std::optional<AssetIndex> Reader::asset(const std::string& name, const Span& at) {
+  if (const auto it = assets_by_name_.find(name); it != assets_by_name_.end()) return it->second;
+  if (name.empty()) {
+    report_.error(at, "the name of a file is wanted here");
+    return std::nullopt;
+  }
+  std::vector<std::string> places;
+  for (const std::string& path : document_.search_paths) places.push_back(join_path(path, name));
+  places.push_back(join_path("", name));
+  Error last;
+  for (const std::string& place : places) {
+    auto found = assets_.find(place);
+    if (!found) {
+      last = found.error();
+      if (last.code != Errc::not_found) break;
+      continue;
+    }
+    found->name = place;
+    scene_.assets.push_back(std::move(*found));
+    const AssetIndex index{static_cast<std::uint32_t>(scene_.assets.size() - 1)};
+    assets_by_name_.emplace(name, index);
+    return index;
+  }
+  report_.error(at, last.message);
+  return std::nullopt;
+}
+
+}  // namespace scene
+
+ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSource& assets,
+                      const ReadOptions& options) {
+  scene::Report report(options.strict);
+  ReadResult result;
+  if (const auto document = scene::load_document(file_name, text, assets, options.defines, report)) {
+    const Scene read = scene::Reader(*document, assets, report).read();
+    if (!report.has_errors()) result.scene = scene::compacted(read);
+  }
+  result.diagnostics = report.take();
+  return result;
+}
+
+}  // namespace ls

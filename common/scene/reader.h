@@ -1,0 +1,103 @@
+// Document -> Scene: the state that the readers of all kinds of objects share. One .cpp per kind.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "common/scene/params.h"
+#include "common/scene/structure.h"
+
+namespace ls::scene {
+
+class Reader {
+ public:
+  Reader(const Document& document, AssetSource& assets, Report& report);
+  Scene read();  // complete only if the report has no errors afterwards
+
+  Report& report() { return report_; }
+  // The object that `child` is or refers to; nullptr (reported) if there is none.
+  const Element* resolve(const Element& child);
+
+  // Objects are read once, whoever refers to them; `use` is where it is asked for. Nothing: it was reported.
+  std::optional<TextureIndex> texture(const Element& object, const Element& use);
+  std::optional<BsdfIndex> bsdf(const Element& object, const Element& use);
+  std::optional<VolumeIndex> volume(const Element& object, const Element& use);
+  std::optional<PhaseIndex> phase(const Element& object, const Element& use);
+  std::optional<MediumIndex> medium(const Element& object, const Element& use);
+
+  TextureIndex add_constant_texture(const Rgb& value);
+  VolumeIndex add_constant_volume(const Rgb& value);
+  std::optional<AssetIndex> asset(const std::string& name, const Span& at);
+
+ private:
+  template <class I>
+  using Memo = std::unordered_map<const Element*, std::optional<I>>;
+  template <class I, class F>
+  std::optional<I> once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
+                        F read);
+
+  void read_child(const Element& child);
+  void warn_unused_sensor(const Element& e);
+
+  std::optional<TextureIndex> read_texture(const Element& e);
+  template <class T>
+  std::optional<TextureIndex> read_plain_texture(const Element& e);
+  std::optional<TextureIndex> read_uniform_texture(const Element& e, std::string_view parameter);
+  std::optional<BsdfIndex> read_bsdf(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_plain_bsdf(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_metal(const Element& e);
+  std::optional<BsdfIndex> read_twosided(const Element& e);
+  void read_metal_preset(Params& p, Rgb& eta, Rgb& k);
+  std::optional<VolumeIndex> read_volume(const Element& e);
+  std::optional<PhaseIndex> read_phase(const Element& e);
+  std::optional<MediumIndex> read_medium(const Element& e);
+  template <class T>
+  std::optional<MediumIndex> read_any_medium(const Element& e);
+
+  void read_shape(const Element& e);
+  template <class T>
+  void read_geometry(const Element& e, T geometry);
+  void read_shape_parts(Params& p, Shape& shape);
+  std::optional<AreaEmitter> read_area(const Element& e);
+  void check_placement(const Element& e, const Shape& shape);
+
+  void read_emitter(const Element& e);
+  void read_directional(const Element& e);
+  void read_point(const Element& e);
+  void read_spot(const Element& e);
+
+  void read_sensor(const Element& e);
+  void read_fov(Params& p, Sensor& sensor);
+  void read_film(const Element& e);
+  void check_crop(Params& p);
+  ReconstructionFilter read_filter(const Element& e);
+  template <class T>
+  ReconstructionFilter read_plain_filter(const Element& e);
+  void read_sampler(const Element& e);
+  void read_integrator(const Element& e, int depth);
+
+  const Document& document_;
+  AssetSource& assets_;
+  Report& report_;
+  Ids ids_;
+  Scene scene_;
+  const Element* sensor_ = nullptr;
+  const Element* integrator_ = nullptr;
+
+  Memo<TextureIndex> textures_;
+  Memo<BsdfIndex> bsdfs_;
+  Memo<VolumeIndex> volumes_;
+  Memo<PhaseIndex> phases_;
+  Memo<MediumIndex> media_;
+  std::map<std::string, AssetIndex> assets_by_name_;
+  std::unordered_set<const Element*> in_progress_;
+  std::unordered_set<const Element*> bad_refs_;  // reported already
+};
+
+}  // namespace ls::scene

@@ -1,0 +1,81 @@
+#include "common/scene/source_text.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/scene/limits.h"
+
+namespace ls::scene {
+namespace {
+
+bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
+
+int count_characters(std::string_view text) {
+  return static_cast<int>(
+      std::count_if(text.begin(), text.end(), [](char c) { return !is_continuation(c); }));
+}
+
+// Length in bytes of the well-formed sequence at the start of `text`, 0 if there is none (RFC 3629, table 3-7
+// of Unicode).
+std::size_t sequence_length(std::string_view text) {
+  const auto at = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = at(0);
+  if (lead < 0x80) return 1;
+  const std::size_t n = lead >= 0xC2 && lead <= 0xDF   ? 2
+                        : (lead & 0xF0) == 0xE0        ? 3
+                        : lead >= 0xF0 && lead <= 0xF4 ? 4
+                                                       : 0;
+  if (n == 0 || text.size() < n) return 0;
+  for (std::size_t i = 1; i < n; ++i)
+    if (!is_continuation(text[i])) return 0;
+  const bool overlong = (lead == 0xE0 && at(1) < 0xA0) || (lead == 0xF0 && at(1) < 0x90);
+  const bool out_of_range = (lead == 0xED && at(1) > 0x9F) || (lead == 0xF4 && at(1) > 0x8F);
+  return overlong || out_of_range ? 0 : n;
+}
+
+}  // namespace
+
+SourceText::SourceText(std::string name, std::string text)
+    : name_(std::move(name)), text_(std::move(text)), line_starts_{0} {
+  for (std::size_t i = 0; i < text_.size(); ++i)
+    if (text_[i] == '\n') line_starts_.push_back(i + 1);
+}
+
+std::size_t SourceText::line_of(std::size_t offset) const {
+  const auto next = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset);
+  return static_cast<std::size_t>(next - line_starts_.begin()) - 1;
+}
+
+SourcePlace SourceText::place(std::size_t offset) const {
+  offset = std::min(offset, text_.size());
+  const std::size_t line = line_of(offset), start = line_starts_[line];
+  return {name_, static_cast<int>(line) + 1,
+          count_characters(std::string_view(text_).substr(start, offset - start)) + 1};
+}
+
+Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
+                                std::string message) const {
+  offset = std::min(offset, text_.size());
+  Diagnostic d{severity, place(offset), std::move(message), {}, 1};
+  const std::size_t start = line_starts_[line_of(offset)];
+  std::size_t end = std::min(text_.find('\n', start), text_.size());
+  if (end > start && text_[end - 1] == '\r') --end;
+  const std::size_t shown = std::min(length, end - std::min(offset, end));
+  d.length = std::max(1, count_characters(std::string_view(text_).substr(std::min(offset, end), shown)));
+  // A line of megabytes is not shown; one that is only long is, so that columns and carets fit.
+  const std::string_view line = std::string_view(text_).substr(start, end - start);
+  if (line.size() <= 20 * kMaxExcerptBytes && find_invalid_utf8(line) == std::string_view::npos)
+    d.source_line = line;
+  return d;
+}
+
+std::size_t find_invalid_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t n = sequence_length(text.substr(i));
+    if (n == 0) return i;
+    i += n;
+  }
+  return std::string_view::npos;
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,43 @@
+// The text of a scene file, and where in it something stands.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/diagnostic.h"
+
+namespace ls::scene {
+
+// A piece of one of the files that were read: bytes [offset, offset + length).
+struct Span {
+  std::uint32_t file = 0;
+  std::size_t offset = 0;
+  std::size_t length = 1;
+  bool operator==(const Span&) const = default;
+};
+
+class SourceText {
+ public:
+  SourceText(std::string name, std::string text);
+
+  const std::string& name() const { return name_; }
+  const std::string& text() const { return text_; }
+  // Line and column from 1; the column counts characters (UTF-8 code points), not bytes.
+  SourcePlace place(std::size_t offset) const;
+  // A diagnostic at [offset, offset + length), with its line cut to a readable length.
+  Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
+                      std::string message) const;
+
+ private:
+  std::size_t line_of(std::size_t offset) const;  // index into line_starts_
+  std::string name_, text_;
+  std::vector<std::size_t> line_starts_;
+};
+
+// Offset of the first byte that is not well-formed UTF-8; npos if there is none.
+std::size_t find_invalid_utf8(std::string_view text);
+
+}  // namespace ls::scene

@@ -1,0 +1,205 @@
+#include "common/scene/validate.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/scene/describe_fields.h"
+#include "common/scene/limits.h"
+
+namespace ls::scene {
+namespace {
+
+// The list that an index points into.
+template <class S>
+auto& pool(S& s, AssetIndex) {
+  return s.assets;
+}
+template <class S>
+auto& pool(S& s, TextureIndex) {
+  return s.textures;
+}
+template <class S>
+auto& pool(S& s, BsdfIndex) {
+  return s.bsdfs;
+}
+template <class S>
+auto& pool(S& s, VolumeIndex) {
+  return s.volumes;
+}
+template <class S>
+auto& pool(S& s, PhaseIndex) {
+  return s.phases;
+}
+template <class S>
+auto& pool(S& s, MediumIndex) {
+  return s.media;
+}
+
+// Calls on_index for every index within a described value.
+template <class F>
+class IndexWalker {
+ public:
+  explicit IndexWalker(F on_index) : on_index_(on_index) {}
+  template <class T>
+  void field(const Field&, T& value) {
+    walk(value);
+  }
+  template <class T>
+  void walk(T& value) {
+    if constexpr (Described<T>) describe(*this, value);
+  }
+  template <class Tag>
+  void walk(Index<Tag>& i) {
+    on_index_(i);
+  }
+  template <class Tag>
+  void walk(const Index<Tag>& i) {
+    on_index_(i);
+  }
+  template <class T>
+  void walk(std::optional<T>& x) {
+    if (x) walk(*x);
+  }
+  template <class T>
+  void walk(const std::optional<T>& x) {
+    if (x) walk(*x);
+  }
+  template <class... Ts>
+  void walk(std::variant<Ts...>& x) {
+    std::visit([&](auto& alternative) { describe(*this, alternative); }, x);
+  }
+  template <class... Ts>
+  void walk(const std::variant<Ts...>& x) {
+    std::visit([&](const auto& alternative) { describe(*this, alternative); }, x);
+  }
+
+ private:
+  F on_index_;
+};
+
+class Checker {
+ public:
+  explicit Checker(const Scene& s) : s_(s) {}
+
+  std::string run() {
+    check_list("textures", s_.textures);
+    check_list("bsdfs", s_.bsdfs);
+    check_list("volumes", s_.volumes);
+    check_list("media", s_.media);
+    check_list("shapes", s_.shapes);
+    check_list("emitters", s_.emitters);
+    IndexWalker walker([&](const auto& i) { check("sensor", i); });
+    walker.walk(s_.sensor);
+    if (wrong_.empty()) check_twosided();
+    if (wrong_.empty()) check_texture_nesting();
+    if (wrong_.empty() &&
+        static_cast<std::size_t>(s_.film.size.width) * static_cast<std::size_t>(s_.film.size.height) >
+            kMaxFramePixels)
+      wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
+    return wrong_;
+  }
+
+ private:
+  template <class List>
+  void check_list(std::string_view name, const List& list) {
+    for (std::size_t i = 0; i < list.size() && wrong_.empty(); ++i) {
+      IndexWalker walker([&](const auto& index) { check(fmt::format("{}[{}]", name, i), index); });
+      walker.walk(list[i]);
+    }
+  }
+  template <class Tag>
+  void check(std::string_view where, const Index<Tag>& i) {
+    if (wrong_.empty() && i.value >= pool(s_, i).size())
+      wrong_ =
+          fmt::format("scene.{} refers to object {} of a list of {}", where, i.value, pool(s_, i).size());
+  }
+  // Also what keeps bsdfs from containing themselves.
+  void check_twosided() {
+    for (const Bsdf& b : s_.bsdfs) {
+      const auto* two = std::get_if<TwoSidedBsdf>(&b);
+      if (!two) continue;
+      for (const BsdfIndex side : {two->front, two->back}) {
+        const Bsdf& inner = s_.bsdfs[side.value];
+        if (std::holds_alternative<TwoSidedBsdf>(inner) || std::holds_alternative<DielectricBsdf>(inner) ||
+            std::holds_alternative<NullBsdf>(inner))
+          wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
+      }
+    }
+  }
+  // Depth of each texture by relaxation over the list, as often as textures may nest.
+  void check_texture_nesting() {
+    std::vector<int> depth(s_.textures.size(), 0);
+    for (int round = 0; round <= kMaxReferenceDepth; ++round) {
+      bool changed = false;
+      for (std::size_t i = 0; i < s_.textures.size(); ++i)
+        if (const auto* c = std::get_if<CheckerboardTexture>(&s_.textures[i])) {
+          const int d = 1 + std::max(depth[c->color0.value], depth[c->color1.value]);
+          changed |= std::exchange(depth[i], d) != d;
+        }
+      if (!changed) return;
+    }
+    wrong_ =
+        fmt::format("scene.textures contain each other in a circle or more than {} deep", kMaxReferenceDepth);
+  }
+
+  const Scene& s_;
+  std::string wrong_;
+};
+
+class Compactor {
+ public:
+  explicit Compactor(const Scene& from) : from_(from) {}
+
+  Scene run() {
+    to_.shapes = from_.shapes;
+    to_.emitters = from_.emitters;
+    to_.sensor = from_.sensor;
+    to_.film = from_.film;
+    to_.integrator = from_.integrator;
+    to_.sample_count = from_.sample_count;
+    for (Shape& s : to_.shapes) move(s);
+    for (Emitter& e : to_.emitters) move(e);
+    move(to_.sensor);
+    return std::move(to_);
+  }
+
+ private:
+  // Nesting is bounded by kMaxReferenceDepth (checked before).
+  template <class T>
+  void move(T& object) {
+    IndexWalker walker([&](auto& i) { i = moved(i); });
+    walker.walk(object);
+  }
+  template <class I>
+  I moved(I old) {
+    auto& known = std::get<std::map<I, I>>(moved_);
+    if (const auto it = known.find(old); it != known.end()) return it->second;
+    auto object = pool(from_, old)[old.value];
+    move(object);  // what it contains comes first
+    auto& list = pool(to_, old);
+    const I fresh{static_cast<std::uint32_t>(list.size())};
+    list.push_back(std::move(object));
+    known.emplace(old, fresh);
+    return fresh;
+  }
+
+  const Scene& from_;
+  Scene to_;
+  std::tuple<std::map<AssetIndex, AssetIndex>, std::map<TextureIndex, TextureIndex>,
+             std::map<BsdfIndex, BsdfIndex>, std::map<VolumeIndex, VolumeIndex>,
+             std::map<PhaseIndex, PhaseIndex>, std::map<MediumIndex, MediumIndex>>
+      moved_;
+};
+
+}  // namespace
+
+std::string find_inconsistency(const Scene& s) { return Checker(s).run(); }
+
+Scene compacted(const Scene& s) { return Compactor(s).run(); }
+
+}  // namespace ls::scene

@@ -1,0 +1,166 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <pugixml.hpp>
+
+#include "common/scene/document.h"
+#include "common/scene/limits.h"
+
+namespace ls::scene {
+namespace {
+
+bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+// pugixml says where a tag begins but not where its attributes stand: they are found again in the text. `at`
+// is the offset of the tag's name in well-formed XML.
+class AttributePlaces {
+ public:
+  AttributePlaces(std::uint32_t file, std::string_view text, std::size_t at)
+      : file_(file), text_(text), at_(at) {
+    while (more() && !is_space(text_[at_]) && text_[at_] != '>' && text_[at_] != '/') ++at_;
+  }
+
+  void next(Attribute& out) {
+    skip_space();
+    const std::size_t name = at_;
+    while (more() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>') ++at_;
+    out.name_at = {file_, name, at_ - name};
+    skip_space();
+    if (more()) ++at_;  // '='
+    skip_space();
+    const char quote = more() ? text_[at_] : '"';
+    const std::size_t value = std::min(at_ + 1, text_.size());
+    at_ = std::min(text_.find(quote, value), text_.size());
+    out.value_at = {file_, value, at_ - value};
+    if (more()) ++at_;
+  }
+
+ private:
+  bool more() const { return at_ < text_.size(); }
+  void skip_space() {
+    while (more() && is_space(text_[at_])) ++at_;
+  }
+  std::uint32_t file_;
+  std::string_view text_;
+  std::size_t at_;
+};
+
+class TreeBuilder {
+ public:
+  TreeBuilder(std::uint32_t file, Report& report)
+      : file_(file), report_(report), text_(report.file(file).text()) {}
+
+  // Depth is bounded by kMaxNesting.
+  bool build(pugi::xml_node node, Element& out, int depth) {
+    out.tag = node.name();
+    out.at = {file_, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, node.offset_debug())),
+              out.tag.size()};
+    if (depth > kMaxNesting) {
+      report_.error(out.at, fmt::format("elements are nested more than {} deep", kMaxNesting));
+      return false;
+    }
+    if (!read_attributes(node, out)) return false;
+    for (const pugi::xml_node child : node.children()) {
+      if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata) {
+        report_.error(out.at,
+                      fmt::format("text inside <{}>: a scene says everything in attributes", out.tag));
+        return false;
+      }
+      if (child.type() != pugi::node_element) continue;
+      out.children.emplace_back();
+      if (!build(child, out.children.back(), depth + 1)) return false;
+    }
+    return true;
+  }
+
+ private:
+  bool read_attributes(pugi::xml_node node, Element& out) {
+    AttributePlaces places(file_, text_, out.at.offset);
+    for (const pugi::xml_attribute attribute : node.attributes()) {
+      Attribute a{attribute.name(), attribute.value(), {}, {}};
+      places.next(a);
+      if (out.find(a.name)) {
+        report_.error(a.name_at, fmt::format("<{}> has the attribute '{}' twice", out.tag, a.name));
+        return false;
+      }
+      if (a.value.size() > kMaxValueBytes) {
+        report_.error(a.name_at,
+                      fmt::format("the value of '{}' is longer than {} bytes", a.name, kMaxValueBytes));
+        return false;
+      }
+      out.attributes.push_back(std::move(a));
+    }
+    return true;
+  }
+
+  std::uint32_t file_;
+  Report& report_;
+  std::string_view text_;
+};
+
+// What pugixml would allocate is bounded before it is asked to.
+bool small_enough(std::uint32_t file, std::string_view text, Report& report, std::size_t& elements_left) {
+  std::size_t tags = 0, attributes = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    tags += text[i] == '<' && i + 1 < text.size() && text[i + 1] != '/';
+    attributes += text[i] == '=';
+    if (tags <= elements_left && attributes <= kMaxAttributes) continue;
+    report.error({file, i, 1}, fmt::format("the scene has more than {} elements or {} attributes",
+                                           kMaxElements, kMaxAttributes));
+    return false;
+  }
+  elements_left -= tags;
+  return true;
+}
+
+}  // namespace
+
+const Attribute* Element::find(std::string_view attribute) const {
+  const auto it = std::find_if(attributes.begin(), attributes.end(),
+                               [&](const Attribute& a) { return a.name == attribute; });
+  return it == attributes.end() ? nullptr : &*it;
+}
+
+std::string_view Element::get(std::string_view attribute) const {
+  const Attribute* a = find(attribute);
+  return a ? std::string_view(a->value) : std::string_view{};
+}
+
+std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left) {
+  const std::string& text = report.file(file).text();
+  if (const std::size_t bad = find_invalid_utf8(text); bad != std::string_view::npos) {
+    report.error({file, bad, 1}, "this is not UTF-8 text");
+    return std::nullopt;
+  }
+  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
+    report.error({file, nul, 1}, "a zero byte in the text");
+    return std::nullopt;
+  }
+  if (!small_enough(file, text, report, elements_left)) return std::nullopt;
+
+  pugi::xml_document xml;
+  // No DTD entities are expanded by pugixml: only the five of XML itself and character numbers.
+  const pugi::xml_parse_result result =
+      xml.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!result) {
+    const auto offset = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, result.offset));
+    report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
+    return std::nullopt;
+  }
+  const pugi::xml_node root = xml.document_element();
+  if (!root) {
+    report.error({file, 0, 1}, "no XML element in this file: it is empty or not XML");
+    return std::nullopt;
+  }
+  for (pugi::xml_node other = root.next_sibling(); other; other = other.next_sibling()) {
+    if (other.type() != pugi::node_element) continue;
+    report.error({file, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, other.offset_debug())), 1},
+                 "a second root element: everything belongs into one <scene>");
+    return std::nullopt;
+  }
+  Element tree;
+  if (!TreeBuilder(file, report).build(root, tree, 1)) return std::nullopt;
+  return tree;
+}
+
+}  // namespace ls::scene
