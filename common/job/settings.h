@@ -46,6 +46,9 @@ std::string canonical_json(const RenderSettings& settings);
 Result<RenderSettings> parse_render_settings(std::string_view json);
 Digest digest_of(const RenderSettings& settings);
 
+// Is this much work at all possible? Size, tile, samples and the number of units against common/job/limits.h.
+Result<void> check_job_size(const RenderSettings& settings, std::uint64_t spp);
+
 std::string canonical_json(const JobSpec& spec);
 // Unknown keys, wrong types and values out of range are errors that name the key.
 Result<JobSpec> parse_job_spec(std::string_view json);

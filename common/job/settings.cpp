@@ -1,0 +1,137 @@
+#include "common/job/settings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/image/rounds.h"
+#include "common/job/json_fields.h"
+#include "common/job/limits.h"
+
+namespace ls {
+namespace {
+
+using job::Fields;
+using job::Json;
+
+// nlohmann's objects are sorted by key, and dump() without indentation writes no spaces.
+std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Json size_json(FrameSize size) { return Json::array({size.width, size.height}); }
+
+void read_defines(Fields& fields, JobSpec& spec) {
+  const Json* v = fields.find("defines");
+  if (!v) return;
+  if (!v->is_object() || v->size() > kMaxDefines)
+    return fields.wrong("defines",
+                        fmt::format("must be an object {{name: value}} of at most {} entries", kMaxDefines));
+  for (const auto& item : v->items()) {
+    const Json& value = item.value();
+    if (!value.is_string() && !value.is_number() && !value.is_boolean())
+      return fields.wrong("defines",
+                          fmt::format("has a value for '{}' that is not a string, number or boolean",
+                                      job::printable(item.key(), kMaxNameBytes)));
+    const std::string text = value.is_string() ? value.get<std::string>() : dump(value);
+    if (item.key().empty() || item.key().size() > kMaxNameBytes || text.size() > kMaxDefineBytes)
+      return fields.wrong(
+          "defines", fmt::format("has an entry whose name is empty or over {} bytes, or its value over {}",
+                                 kMaxNameBytes, kMaxDefineBytes));
+    spec.defines[item.key()] = text;
+  }
+}
+
+}  // namespace
+
+std::string canonical_json(const RenderSettings& s) {
+  return dump(Json{{"aov", s.aov},
+                   {"integrator", s.integrator},
+                   {"max_depth", s.max_depth},
+                   {"rr_depth", s.rr_depth},
+                   {"seed", s.seed},
+                   {"size", size_json(s.size)},
+                   {"tile", s.tile}});
+}
+
+Digest digest_of(const RenderSettings& settings) { return sha256(canonical_json(settings)); }
+
+Result<RenderSettings> parse_render_settings(std::string_view text) {
+  const auto json = job::parse_object(text, "render settings");
+  if (!json) return tl::unexpected(json.error());
+  const std::vector<std::string> keys = {"aov",  "integrator", "max_depth", "rr_depth",
+                                         "seed", "size",       "tile"};
+  Fields fields(*json, "render settings", keys);
+  for (const auto& key : keys) fields.require(key.c_str());
+  RenderSettings s;
+  s.aov = fields.names("aov").value_or(s.aov);
+  s.integrator = fields.name("integrator").value_or("");
+  s.max_depth = static_cast<int>(fields.integer("max_depth", -1, kMaxDepthSetting).value_or(-1));
+  s.rr_depth = static_cast<int>(fields.integer("rr_depth", 0, kMaxDepthSetting).value_or(5));
+  s.seed = fields.whole("seed", 0, UINT64_MAX).value_or(0);
+  s.size = fields.size("size").value_or(FrameSize{});
+  s.tile = static_cast<int>(fields.whole("tile", kMinTile, kMaxTile).value_or(32));
+  if (std::adjacent_find(s.aov.begin(), s.aov.end(), std::greater_equal<>()) != s.aov.end())
+    fields.wrong("aov", "must be sorted, each name once");
+  if (fields.error()) return tl::unexpected(*fields.error());
+  return s;
+}
+
+Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
+  const auto refuse = [](std::string text) { return fail(Errc::invalid_argument, std::move(text)); };
+  const auto pixels = static_cast<std::int64_t>(s.size.width) * s.size.height;
+  if (s.size.width < 1 || s.size.height < 1 || s.size.width > kMaxFrameSide ||
+      s.size.height > kMaxFrameSide || pixels > kMaxFramePixels)
+    return refuse(
+        fmt::format("the frame is {} x {} pixels; each side must be 1 to {}, and all together at most {}",
+                    s.size.width, s.size.height, kMaxFrameSide, kMaxFramePixels));
+  if (s.tile < kMinTile || s.tile > kMaxTile)
+    return refuse(fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
+  if (spp < 1 || spp > kMaxSpp)
+    return refuse(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
+  const std::uint64_t tiles = TileGrid{s.size, s.tile}.count(), units = tiles * round_count(spp);
+  if (tiles > kMaxTiles || units > kMaxUnits)
+    return refuse(
+        fmt::format("{} x {} pixels in tiles of {} at {} samples are {} tiles and {} units of work; the "
+                    "limits are {} and {}: "
+                    "ask for fewer samples, a smaller frame or larger tiles",
+                    s.size.width, s.size.height, s.tile, spp, tiles, units, kMaxTiles, kMaxUnits));
+  return {};
+}
+
+std::string canonical_json(const JobSpec& spec) {
+  Json json{{"aov", spec.aov},
+            {"defines", spec.defines},
+            {"float", spec.float_output},
+            {"priority", spec.priority},
+            {"tags", spec.tags}};
+  if (spec.spp) json["spp"] = *spec.spp;
+  if (spec.target_error) json["target_error"] = *spec.target_error;
+  if (spec.time) json["time"] = *spec.time;
+  if (spec.seed) json["seed"] = *spec.seed;
+  if (spec.size) json["size"] = size_json(*spec.size);
+  if (spec.integrator) json["integrator"] = *spec.integrator;
+  return dump(json);
+}
+
+Result<JobSpec> parse_job_spec(std::string_view text) {
+  const auto json = job::parse_object(text, "spec");
+  if (!json) return tl::unexpected(json.error());
+  Fields fields(*json, "spec",
+                {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
+                 "float", "tags"});
+  JobSpec spec;
+  spec.spp = fields.whole("spp", 1, kMaxSpp);
+  spec.target_error = fields.positive("target_error", kMaxTargetError);
+  spec.time = fields.positive("time", kMaxSeconds);
+  spec.seed = fields.whole("seed", 0, UINT64_MAX);
+  spec.size = fields.size("size");
+  spec.integrator = fields.name("integrator");
+  spec.aov = fields.names("aov").value_or(spec.aov);
+  read_defines(fields, spec);
+  spec.priority = static_cast<int>(fields.integer("priority", -kMaxPriority, kMaxPriority).value_or(0));
+  spec.float_output = fields.boolean("float").value_or(false);
+  spec.tags = fields.names("tags").value_or(spec.tags);
+  if (fields.error()) return tl::unexpected(*fields.error());
+  return spec;
+}
+
+}  // namespace ls

@@ -1,0 +1,178 @@
+#include "common/job/settings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/job/limits.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string spec_error(std::string_view json) {
+  const auto got = parse_job_spec(json);
+  return got ? "accepted" : got.error().message;
+}
+
+RenderSettings some_settings() {
+  return {.size = {640, 480},
+          .tile = 16,
+          .seed = 18446744073709551615ull,
+          .integrator = "volpath",
+          .max_depth = 12,
+          .rr_depth = 5,
+          .aov = {"albedo", "depth"}};
+}
+
+TEST(RenderSettings, CanonicalJsonIsSortedAndWithoutSpaces) {
+  EXPECT_EQ(
+      canonical_json(some_settings()),
+      R"({"aov":["albedo","depth"],"integrator":"volpath","max_depth":12,"rr_depth":5,"seed":18446744073709551615,)"
+      R"("size":[640,480],"tile":16})");
+}
+
+TEST(RenderSettings, ParsesWhatItWrites) {
+  EXPECT_EQ(parse_render_settings(canonical_json(some_settings())).value(), some_settings());
+  EXPECT_EQ(digest_of(some_settings()), sha256(canonical_json(some_settings())));
+}
+
+TEST(RenderSettings, EveryFieldChangesTheDigest) {
+  const auto changed = [](auto change) {
+    RenderSettings s = some_settings();
+    change(s);
+    return digest_of(s) != digest_of(some_settings());
+  };
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.size.width = 641; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.tile = 32; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.seed = 1; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.integrator = "path"; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.max_depth = -1; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.rr_depth = 6; }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.aov.pop_back(); }));
+}
+
+TEST(RenderSettings, RefusesMissingUnknownAndOutOfRangeKeysByName) {
+  const std::string good = canonical_json(some_settings());
+  const auto with = [&](std::string_view from, std::string_view to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    const auto got = parse_render_settings(text);
+    return got ? "accepted" : got.error().message;
+  };
+  EXPECT_THAT(with("\"seed\":18446744073709551615,", ""), HasSubstr("'seed' is missing"));
+  EXPECT_THAT(with("\"tile\":16", "\"tile\":7"),
+              HasSubstr("'tile' must be a whole number from 8 to 256, not 7"));
+  EXPECT_THAT(with("\"tile\":16", "\"tile\":257"), HasSubstr("'tile'"));
+  EXPECT_THAT(with("\"max_depth\":12", "\"max_depth\":-2"), HasSubstr("'max_depth'"));
+  EXPECT_THAT(with("\"max_depth\"", "\"maxdepth\""),
+              HasSubstr("'maxdepth' is not known; did you mean 'max_depth'"));
+  EXPECT_THAT(with("[\"albedo\",\"depth\"]", "[\"depth\",\"albedo\"]"), HasSubstr("'aov' must be sorted"));
+  EXPECT_THAT(with("[640,480]", "[0,480]"), HasSubstr("'size' is 0 x 480"));
+}
+
+TEST(JobSpec, AnEmptyObjectAsksForNothing) { EXPECT_EQ(parse_job_spec("{}").value(), JobSpec{}); }
+
+TEST(JobSpec, ReadsEveryKeyOfTheContract) {
+  const auto spec =
+      parse_job_spec(R"({"spp": 128, "target_error": 0.001, "time": 60, "seed": 7, "size": [320, 200],
+    "integrator": "volpath", "aov": ["depth"], "defines": {"density": "2.5", "n": 3, "on": true}, "priority": -2, "float": true,
+    "tags": ["gpu", "big-memory"]})");
+
+  ASSERT_TRUE(spec) << spec.error().message;
+  EXPECT_EQ(*spec, (JobSpec{.spp = 128,
+                            .target_error = 0.001,
+                            .time = 60,
+                            .seed = 7,
+                            .size = FrameSize{320, 200},
+                            .integrator = "volpath",
+                            .aov = {"depth"},
+                            .defines = {{"density", "2.5"}, {"n", "3"}, {"on", "true"}},
+                            .priority = -2,
+                            .float_output = true,
+                            .tags = {"gpu", "big-memory"}}));
+  EXPECT_EQ(parse_job_spec(canonical_json(*spec)).value(), *spec);
+}
+
+TEST(JobSpec, TakesTheSizeInBothForms) {
+  EXPECT_EQ(parse_job_spec(R"({"size": "1920x1080"})")->size, (FrameSize{1920, 1080}));
+  EXPECT_EQ(parse_job_spec(R"({"size": [1920, 1080]})")->size, (FrameSize{1920, 1080}));
+  for (const char* bad :
+       {R"({"size": "1920"})", R"({"size": "1920x"})", R"({"size": "x1080"})", R"({"size": "1920x1080x3"})",
+        R"({"size": "1920 x 1080"})", R"({"size": [1920]})", R"({"size": [1920.5, 3]})", R"({"size": {}})"})
+    EXPECT_THAT(spec_error(bad), HasSubstr("'size' must be [width, height]")) << bad;
+}
+
+TEST(JobSpec, RefusesImpossibleSizesNamingTheLimit) {
+  for (const char* bad : {R"({"size": [0, 10]})", R"({"size": "10x-1"})", R"({"size": [65537, 1]})",
+                          R"({"size": "65536x65536"})", R"({"size": [18446744073709551615, 2]})"})
+    EXPECT_THAT(spec_error(bad), HasSubstr("65536")) << bad;
+  EXPECT_EQ(spec_error(R"({"size": [65536, 32768]})"), "accepted");  // 2^31 pixels
+}
+
+TEST(JobSpec, NamesTheKeyThatIsWrong) {
+  EXPECT_THAT(spec_error(R"({"sp": 1})"), HasSubstr("spec: 'sp' is not known; did you mean 'spp'"));
+  EXPECT_THAT(spec_error(R"({"spp": 0})"),
+              HasSubstr("'spp' must be a whole number from 1 to 2147483648, not 0"));
+  EXPECT_THAT(spec_error(R"({"spp": 2147483649})"), HasSubstr("'spp'"));
+  EXPECT_THAT(spec_error(R"({"spp": -1})"), HasSubstr("'spp'"));
+  EXPECT_THAT(spec_error(R"({"spp": 1.5})"), HasSubstr("'spp'"));
+  EXPECT_THAT(spec_error(R"({"spp": "64"})"), HasSubstr("not \"64\""));
+  EXPECT_THAT(spec_error(R"({"spp": null})"), HasSubstr("'spp'"));
+  EXPECT_THAT(spec_error(R"({"target_error": 0})"), HasSubstr("'target_error'"));
+  EXPECT_THAT(spec_error(R"({"time": -3})"), HasSubstr("'time'"));
+  EXPECT_THAT(spec_error(R"({"seed": 18446744073709551616})"), HasSubstr("'seed'"));
+  EXPECT_THAT(spec_error(R"({"integrator": ""})"), HasSubstr("'integrator'"));
+  EXPECT_THAT(spec_error(R"({"integrator": "../x"})"), HasSubstr("'integrator'"));
+  EXPECT_THAT(spec_error(R"({"aov": "depth"})"), HasSubstr("'aov'"));
+  EXPECT_THAT(spec_error(R"({"defines": {"a": []}})"), HasSubstr("'a'"));
+  EXPECT_THAT(spec_error(R"({"priority": 1e3})"), HasSubstr("'priority'"));
+  EXPECT_THAT(spec_error(R"({"priority": 18446744073709551615})"), HasSubstr("'priority'"));
+  EXPECT_THAT(spec_error(R"({"float": 1})"), HasSubstr("'float'"));
+  EXPECT_THAT(spec_error(R"({"tags": [1]})"), HasSubstr("'tags'"));
+}
+
+TEST(JobSpec, RefusesWhatIsNotOneObject) {
+  EXPECT_THAT(spec_error(""), HasSubstr("not valid JSON"));
+  EXPECT_THAT(spec_error("[]"), HasSubstr("must be a JSON object"));
+  EXPECT_THAT(spec_error(R"({"spp": 1, "spp": 2})"), HasSubstr("'spp' is given twice"));
+  EXPECT_THAT(spec_error(R"({"defines": {"a": 1, "a": 2}})"), HasSubstr("'a' is given twice"));
+  EXPECT_THAT(spec_error(R"({"spp": 1} x)"), HasSubstr("not valid JSON"));
+  EXPECT_THAT(spec_error("{\"tags\": [\"\xff\"]}"), HasSubstr("not valid JSON"));
+  EXPECT_THAT(spec_error(std::string(kMaxSpecBytes, '[')), HasSubstr("not valid JSON"));
+  const std::string deep = std::string(400'000, '[') + std::string(400'000, ']');
+  EXPECT_THAT(spec_error("{\"spp\": " + deep + "}"), HasSubstr("nested deeper"));
+  EXPECT_THAT(spec_error(std::string(kMaxSpecBytes + 1, ' ')), HasSubstr("limit"));
+}
+
+TEST(JobSpec, MessagesStayShortAndPrintable) {
+  const std::string longest(100'000, 'x');
+  for (const std::string& bad :
+       {"{\"" + longest + "\": 1}", "{\"spp\": \"" + longest + "\"}", "{\"spp\": \"" + longest,
+        std::string("{\"\xc3\xa9\x01\": 1}"), std::string("{\"\xc3\xa9\": 1}")}) {
+    const std::string message = spec_error(bad);
+    EXPECT_LT(message.size(), 500u);
+    for (const char c : message) EXPECT_TRUE(c >= ' ' && c <= '~');
+  }
+}
+
+TEST(JobSize, IsBoundedWithAdvice) {
+  const RenderSettings small{.size = {32, 32}, .tile = 32, .integrator = "volpath"};
+  RenderSettings large = small;
+  large.size = {1920, 1080};
+
+  EXPECT_TRUE(check_job_size(small, 1'000'000'000));
+  EXPECT_THAT(check_job_size(large, 1'000'000'000).error().message, HasSubstr("ask for fewer samples"));
+  EXPECT_FALSE(check_job_size(small, 0));
+  EXPECT_FALSE(check_job_size(small, kMaxSpp + 1));
+  large.size = {65536, 65536};
+  EXPECT_FALSE(check_job_size(large, 1));
+  large.size = {0, 7};
+  EXPECT_FALSE(check_job_size(large, 1));
+  large.size = {46340, 46340};
+  large.tile = 8;
+  EXPECT_THAT(check_job_size(large, 1).error().message, HasSubstr("larger tiles"));
+}
+
+}  // namespace
+}  // namespace ls
