@@ -1,0 +1,67 @@
+// Reading numbers from bytes that nobody vouches for.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace ls {
+
+static_assert(std::endian::native == std::endian::little);
+
+inline std::string_view as_text(std::span<const std::byte> b) {
+  return {reinterpret_cast<const char*>(b.data()), b.size()};
+}
+
+// A cursor that never passes the end: take() of more than is left gives nothing and stays where it is.
+class ByteReader {
+ public:
+  explicit ByteReader(std::span<const std::byte> data) : data_(data) {}
+
+  std::size_t position() const { return position_; }
+  std::size_t left() const { return data_.size() - position_; }
+  bool skip(std::uint64_t n) {
+    if (n > left()) return false;
+    position_ += n;
+    return true;
+  }
+  template <class T>
+  std::optional<T> take(bool big_endian = false) {
+    if (left() < sizeof(T)) return std::nullopt;
+    std::byte raw[sizeof(T)];
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      raw[i] = data_[position_ + (big_endian ? sizeof(T) - 1 - i : i)];
+    position_ += sizeof(T);
+    T v;
+    std::memcpy(&v, raw, sizeof v);
+    return v;
+  }
+
+ private:
+  std::span<const std::byte> data_;
+  std::size_t position_ = 0;
+};
+
+// The next run of characters that are not blank, cut off the front of `line`; empty at its end.
+inline std::string_view next_word(std::string_view& line) {
+  const std::size_t a = line.find_first_not_of(" \t\r\v\f");
+  if (a == line.npos) return line = {};
+  const std::size_t b = std::min(line.find_first_of(" \t\r\v\f", a), line.size());
+  const std::string_view word = line.substr(a, b - a);
+  line.remove_prefix(b);
+  return word;
+}
+// The text up to the next line feed, which is cut off with it.
+inline std::string_view next_line(std::string_view& text) {
+  const std::size_t n = std::min(text.find('\n'), text.size());
+  const std::string_view line = text.substr(0, n);
+  text.remove_prefix(std::min(n + 1, text.size()));
+  return line;
+}
+
+}  // namespace ls

@@ -1,0 +1,38 @@
+#include "common/assets/image.h"
+
+#include <fmt/format.h>
+
+#include "common/assets/bytes.h"
+#include "common/image/exr_file.h"
+
+namespace ls {
+
+Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file) {
+  const std::string_view head = as_text(file.subspan(0, std::min<std::size_t>(file.size(), 12)));
+  if (head.starts_with("\x89PNG")) return decode_png(name, file);
+  if (head.starts_with("\xff\xd8\xff")) return decode_jpeg(name, file);
+  if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file);
+  if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file);
+  return fail(Errc::invalid_argument,
+              fmt::format("'{}': is no PNG, JPEG, OpenEXR or Radiance HDR image (by its first bytes)", name));
+}
+
+Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name) {
+  const auto bytes = read_asset(path, name);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return decode_image(name, *bytes);
+}
+
+Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file) {
+  auto image = read_exr_rgb(file, std::string(name),
+                            ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = kMaxImagePixels, .max_side = kMaxImageSide});
+  if (!image) return tl::unexpected(image.error());
+  ImageData out;
+  out.width = static_cast<std::uint32_t>(image->size.width);
+  out.height = static_cast<std::uint32_t>(image->size.height);
+  out.channels = 3;
+  out.f32 = std::move(image->rgb);
+  return out;
+}
+
+}  // namespace ls

@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include <csetjmp>
+#include <cstdio>  // jpeglib.h needs it first
+
+#include <jpeglib.h>
+
+#include "common/assets/image.h"
+
+namespace ls {
+
+namespace {
+
+struct Failure {
+  jpeg_error_mgr base;  // first, so that the library's pointer to it is ours
+  std::jmp_buf escape;
+  char message[JMSG_LENGTH_MAX];
+};
+
+void on_error(j_common_ptr info) {
+  auto* f = reinterpret_cast<Failure*>(info->err);
+  f->base.format_message(info, f->message);
+  std::longjmp(f->escape, 1);
+}
+// The library mends truncated data with grey; for us a broken file is an error.
+void on_message(j_common_ptr info, int level) {
+  if (level < 0) on_error(info);
+}
+
+struct Decoder {
+  jpeg_decompress_struct info{};
+  Failure failure{};
+  Decoder() {
+    info.err = jpeg_std_error(&failure.base);
+    failure.base.error_exit = on_error;
+    failure.base.emit_message = on_message;
+  }
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  ~Decoder() { jpeg_destroy_decompress(&info); }
+};
+
+// No object with a destructor lives in these two: longjmp would skip it.
+bool read_header(Decoder& d, const unsigned char* data, unsigned long size) {
+  if (setjmp(d.failure.escape)) return false;
+  jpeg_create_decompress(&d.info);
+  jpeg_mem_src(&d.info, data, size);
+  jpeg_read_header(&d.info, TRUE);
+  d.info.out_color_space = d.info.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  d.info.dct_method = JDCT_ISLOW;
+  return true;
+}
+bool read_rows(Decoder& d, unsigned char* out, std::size_t row_bytes) {
+  if (setjmp(d.failure.escape)) return false;
+  jpeg_start_decompress(&d.info);
+  while (d.info.output_scanline < d.info.output_height) {
+    unsigned char* row = out + d.info.output_scanline * row_bytes;
+    jpeg_read_scanlines(&d.info, &row, 1);
+  }
+  jpeg_finish_decompress(&d.info);
+  return true;
+}
+
+}  // namespace
+
+Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file) {
+  Decoder d;
+  const auto bad = [&](const char* text) {
+    return fail(Errc::invalid_argument, fmt::format("'{}': broken JPEG: {}", name, text));
+  };
+  if (!read_header(d, reinterpret_cast<const unsigned char*>(file.data()), file.size())) return bad(d.failure.message);
+  ImageData image;
+  image.width = d.info.image_width;
+  image.height = d.info.image_height;
+  image.channels = d.info.num_components == 1 ? 1 : 3;
+  image.srgb = true;
+  const std::uint64_t pixels = std::uint64_t{image.width} * image.height;
+  if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
+    return bad("its size is not believable");
+  if (pixels / 64 / 64 > file.size())  // an 8 x 8 block takes at least two bits, shared by up to 4 blocks of chroma
+    return bad("it is too short for its size");
+  image.u8.resize(pixels * image.channels);
+  if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels)) return bad(d.failure.message);
+  return image;
+}
+
+}  // namespace ls

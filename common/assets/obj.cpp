@@ -1,0 +1,174 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <optional>
+#include <unordered_map>
+
+#include "common/assets/bytes.h"
+#include "common/assets/mesh.h"
+#include "common/assets/triangles.h"
+
+namespace ls {
+
+namespace {
+
+// One corner of a face as written, from 0; -1: none.
+struct Corner {
+  std::int64_t v = -1, vt = -1, vn = -1;
+  bool operator==(const Corner&) const = default;
+};
+struct CornerHash {
+  std::size_t operator()(const Corner& c) const {
+    std::uint64_t h = static_cast<std::uint64_t>(c.v) * 0x9e3779b97f4a7c15u;
+    h = (h ^ (h >> 29) ^ static_cast<std::uint64_t>(c.vt)) * 0xbf58476d1ce4e5b9u;
+    h = (h ^ (h >> 32) ^ static_cast<std::uint64_t>(c.vn)) * 0x94d049bb133111ebu;
+    return h ^ (h >> 31);
+  }
+};
+
+class ObjReader {
+ public:
+  explicit ObjReader(std::string_view name) : name_(name) {}
+
+  Result<MeshData> read(std::string_view text) {
+    while (!text.empty()) {
+      ++line_;
+      std::string_view line = next_line(text);
+      if (!statement(line)) return bad();
+    }
+    if (mesh_.indices.empty() && mesh_.dropped_triangles == 0)
+      return fail(Errc::invalid_argument, fmt::format("'{}': has no faces", name_));
+    if (!any_uv_) mesh_.uvs = {};
+    if (!any_normal_) mesh_.normals = {};
+    return std::move(mesh_);
+  }
+
+ private:
+  bool statement(std::string_view line) {
+    const std::string_view key = next_word(line);
+    if (key.empty() || key[0] == '#') return true;
+    if (key == "v") return numbers<3>(line, v_, 3);
+    if (key == "vt") return numbers<2>(line, vt_, 1);
+    if (key == "vn") return numbers<3>(line, vn_, 3);
+    if (key == "f") return face(line);
+    for (const std::string_view known : {"g", "o", "s", "usemtl", "mtllib", "p", "l", "vp", "mg", "usemap", "maplib", "lod",
+                                         "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp", "cstype", "deg", "curv",
+                                         "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "fo", "bmat",
+                                         "step", "ctech", "stech"})
+      if (key == known) return true;
+    return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
+  }
+
+  // N numbers, of which the first `needed` must be there; what follows (w, vertex colours) is not ours.
+  template <std::size_t N>
+  bool numbers(std::string_view line, std::vector<std::array<float, N>>& into, std::size_t needed) {
+    std::array<float, N> a{};
+    for (std::size_t i = 0; i < N; ++i) {
+      std::string_view w = next_word(line);
+      if (w.empty() && i >= needed) break;
+      if (!w.empty() && w[0] == '+') w.remove_prefix(1);
+      const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
+      if (ec == std::errc::result_out_of_range)  // too small is 0; too large leaves a triangle that is dropped
+        a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
+      else if (ec != std::errc{} || end != w.data() + w.size())
+        return complain(fmt::format("expected {} numbers, found '{}'", needed, w.substr(0, 40)));
+    }
+    if (into.size() >= kMaxMeshVertices) return complain("too many vertices");
+    into.push_back(a);
+    return true;
+  }
+
+  bool face(std::string_view line) {
+    polygon_.clear();
+    for (std::string_view w = next_word(line); !w.empty(); w = next_word(line)) {
+      if (w[0] == '#') break;
+      const auto c = corner(w);
+      if (!c) return false;
+      if (polygon_.size() >= kMaxPolygonCorners) return complain("a face of too many corners");
+      polygon_.push_back(vertex(*c));
+    }
+    if (polygon_.size() < 3) return complain("a face needs at least three corners");
+    if (mesh_.triangle_count() + polygon_.size() > kMaxMeshTriangles || mesh_.vertex_count() > kMaxMeshVertices)
+      return complain("too many triangles");
+    add_polygon(mesh_, polygon_);
+    return true;
+  }
+
+  std::optional<Corner> corner(std::string_view word) {
+    Corner c;
+    const std::string_view whole = word;
+    std::int64_t* const parts[] = {&c.v, &c.vt, &c.vn};
+    const std::size_t counts[] = {v_.size(), vt_.size(), vn_.size()};
+    for (int i = 0; i < 3; ++i) {
+      const std::size_t slash = std::min(word.find('/'), word.size());
+      const std::string_view digits = word.substr(0, slash);
+      const bool more = slash < word.size();
+      word.remove_prefix(std::min(slash + 1, word.size()));
+      if (!digits.empty()) {
+        std::int64_t n = 0;
+        const auto [end, ec] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
+        if (ec != std::errc{} || end != digits.data() + digits.size()) break;
+        const auto count = static_cast<std::int64_t>(counts[i]);
+        if (n == 0 || n > count || n < -count) {
+          complain(fmt::format("index {} in '{}' is out of range: {} so far", n, whole.substr(0, 40), count));
+          return std::nullopt;
+        }
+        *parts[i] = n > 0 ? n - 1 : count + n;
+      }
+      if (!more) {
+        if (c.v < 0) break;
+        return c;
+      }
+    }
+    complain(fmt::format("'{}' is no corner of a face (v, v/vt, v//vn or v/vt/vn)", whole.substr(0, 40)));
+    return std::nullopt;
+  }
+
+  std::uint32_t vertex(const Corner& c) {
+    const auto [it, fresh] = known_.try_emplace(c, static_cast<std::uint32_t>(mesh_.vertex_count()));
+    if (!fresh) return it->second;
+    const auto& p = v_[static_cast<std::size_t>(c.v)];
+    mesh_.positions.insert(mesh_.positions.end(), p.begin(), p.end());
+    const auto n = c.vn < 0 ? std::array<float, 3>{} : vn_[static_cast<std::size_t>(c.vn)];
+    mesh_.normals.insert(mesh_.normals.end(), n.begin(), n.end());
+    const auto t = c.vt < 0 ? std::array<float, 2>{} : vt_[static_cast<std::size_t>(c.vt)];
+    mesh_.uvs.insert(mesh_.uvs.end(), t.begin(), t.end());
+    any_uv_ |= c.vt >= 0;
+    any_normal_ |= c.vn >= 0;
+    return it->second;
+  }
+
+  bool complain(std::string text) {
+    problem_ = std::move(text);
+    return false;
+  }
+  tl::unexpected<Error> bad() const {
+    return fail(Errc::invalid_argument, fmt::format("'{}', line {}: {}", name_, line_, problem_));
+  }
+
+  std::string_view name_;
+  std::uint64_t line_ = 0;
+  std::string problem_;
+  std::vector<std::array<float, 3>> v_, vn_;
+  std::vector<std::array<float, 2>> vt_;
+  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+  std::vector<std::uint32_t> polygon_;
+  MeshData mesh_;
+  bool any_uv_ = false, any_normal_ = false;
+};
+
+}  // namespace
+
+Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file) {
+  return ObjReader(name).read(as_text(file));
+}
+
+Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name) {
+  const auto bytes = read_asset(path, name);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return as_text(*bytes).starts_with("ply") ? decode_ply(name, *bytes) : decode_obj(name, *bytes);
+}
+
+}  // namespace ls

@@ -1,0 +1,287 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "common/assets/bytes.h"
+#include "common/assets/mesh.h"
+#include "common/assets/triangles.h"
+
+namespace ls {
+
+namespace {
+
+constexpr std::size_t kMaxHeaderLines = 1000;
+
+enum class Coding { ascii, little_endian, big_endian };
+enum class Type { i8, u8, i16, u16, i32, u32, f32, f64 };
+
+struct TypeName {
+  std::string_view name;
+  Type type;
+  std::size_t bytes;
+};
+constexpr TypeName kTypes[] = {
+    {"char", Type::i8, 1},    {"int8", Type::i8, 1},    {"uchar", Type::u8, 1},   {"uint8", Type::u8, 1},
+    {"short", Type::i16, 2},  {"int16", Type::i16, 2},  {"ushort", Type::u16, 2}, {"uint16", Type::u16, 2},
+    {"int", Type::i32, 4},    {"int32", Type::i32, 4},  {"uint", Type::u32, 4},   {"uint32", Type::u32, 4},
+    {"float", Type::f32, 4},  {"float32", Type::f32, 4}, {"double", Type::f64, 8}, {"float64", Type::f64, 8}};
+
+const TypeName* type_named(std::string_view name) {
+  const auto it = std::ranges::find(kTypes, name, &TypeName::name);
+  return it == std::end(kTypes) ? nullptr : &*it;
+}
+
+struct Property {
+  std::string_view name;
+  const TypeName* type = nullptr;
+  const TypeName* count = nullptr;  // of a list; else null
+};
+struct Element {
+  std::string_view name;
+  std::uint64_t count = 0;
+  std::vector<Property> properties;
+
+  // The fewest bytes that one of it can take.
+  std::uint64_t least_bytes(Coding c) const {
+    if (c == Coding::ascii) return properties.size();
+    std::uint64_t n = 0;
+    for (const Property& p : properties) n += p.count ? p.count->bytes : p.type->bytes;
+    return n;
+  }
+};
+
+// Where a vertex property goes: positions 0-2, normals 3-5, uvs 6-7; -1 nowhere.
+int vertex_slot(std::string_view name) {
+  constexpr std::pair<std::string_view, int> kSlots[] = {
+      {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3}, {"ny", 4}, {"nz", 5},       {"u", 6},         {"v", 7},
+      {"s", 6}, {"t", 7}, {"texture_u", 6}, {"texture_v", 7}, {"texture_s", 6}, {"texture_t", 7}};
+  const auto it = std::ranges::find(kSlots, name, &std::pair<std::string_view, int>::first);
+  return it == std::end(kSlots) ? -1 : it->second;
+}
+
+class PlyReader {
+ public:
+  PlyReader(std::string_view name, std::span<const std::byte> file) : name_(name), file_(file), body_(file) {}
+
+  Result<MeshData> read() {
+    if (!header() || !elements()) return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    return std::move(mesh_);
+  }
+
+ private:
+  bool complain(std::string text) {
+    problem_ = std::move(text);
+    return false;
+  }
+  bool complain_line(std::size_t line, std::string_view text) { return complain(fmt::format("line {}: {}", line, text)); }
+
+  bool header() {
+    std::string_view text = as_text(file_);
+    bool has_format = false;
+    for (std::size_t line = 1; line <= kMaxHeaderLines; ++line) {
+      if (text.empty()) return complain("ends within the header (no end_header)");
+      std::string_view rest = next_line(text);
+      const std::string_view key = next_word(rest);
+      if (line == 1) {
+        if (key != "ply") return complain("does not begin with \"ply\"");
+      } else if (key == "format") {
+        has_format = true;
+        const std::string_view f = next_word(rest);
+        coding_ = f == "ascii" ? Coding::ascii : f == "binary_big_endian" ? Coding::big_endian : Coding::little_endian;
+        if (coding_ == Coding::little_endian && f != "binary_little_endian")
+          return complain_line(line, fmt::format("unknown format '{}'", f.substr(0, 40)));
+      } else if (key == "element") {
+        if (!element(rest, line)) return false;
+      } else if (key == "property") {
+        if (!property(rest, line)) return false;
+      } else if (key == "end_header") {
+        if (!has_format) return complain("the header has no format line");
+        body_.skip(file_.size() - text.size());
+        rest_ = text;
+        return true;
+      } else if (!key.empty() && key != "comment" && key != "obj_info") {
+        return complain_line(line, fmt::format("unknown header line '{}'", key.substr(0, 40)));
+      }
+    }
+    return complain(fmt::format("the header has more than {} lines", kMaxHeaderLines));
+  }
+
+  bool element(std::string_view rest, std::size_t line) {
+    Element e;
+    e.name = next_word(rest);
+    const std::string_view n = next_word(rest);
+    const auto [end, ec] = std::from_chars(n.data(), n.data() + n.size(), e.count);
+    if (e.name.empty() || ec != std::errc{} || end != n.data() + n.size())
+      return complain_line(line, "an element needs a name and a count");
+    elements_.push_back(std::move(e));
+    return true;
+  }
+
+  bool property(std::string_view rest, std::size_t line) {
+    if (elements_.empty()) return complain_line(line, "a property before any element");
+    Property p;
+    std::string_view word = next_word(rest);
+    if (word == "list") {
+      p.count = type_named(next_word(rest));
+      word = next_word(rest);
+      if (!p.count || p.count->type >= Type::f32) return complain_line(line, "a list's length needs a whole-number type");
+    }
+    p.type = type_named(word);
+    p.name = next_word(rest);
+    if (!p.type || p.name.empty())
+      return complain_line(line, fmt::format("a property of unknown type '{}' or without a name", word.substr(0, 40)));
+    elements_.back().properties.push_back(p);
+    return true;
+  }
+
+  bool elements() {
+    for (const Element& e : elements_) {
+      if (e.properties.empty()) continue;
+      const std::uint64_t left = coding_ == Coding::ascii ? rest_.size() : body_.left();
+      if (e.count > left / e.least_bytes(coding_))
+        return complain(fmt::format("{} elements '{}' are announced, but only {} bytes follow", e.count, e.name, left));
+      const bool ok = e.name == "vertex" ? vertices(e) : e.name == "face" ? faces(e) : skip(e);
+      if (!ok) return false;
+    }
+    if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
+    return true;
+  }
+
+  // The next number of the body; nothing at its end or if it is none.
+  std::optional<double> number(const TypeName& t) {
+    if (coding_ == Coding::ascii) {
+      std::size_t a = rest_.find_first_not_of(" \t\r\n\v\f");
+      if (a == rest_.npos) return std::nullopt;
+      if (rest_[a] == '+') ++a;
+      double v = 0;
+      const char* const last = rest_.data() + rest_.size();
+      const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
+      if (ec == std::errc::invalid_argument) return std::nullopt;
+      if (ec == std::errc::result_out_of_range) v = 0;  // below or above what a double holds: no mesh means that
+      if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos) return std::nullopt;
+      rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+      return v;
+    }
+    const bool big = coding_ == Coding::big_endian;
+    const auto wide = [](auto v) { return v ? std::optional<double>(static_cast<double>(*v)) : std::nullopt; };
+    switch (t.type) {
+      case Type::i8: return wide(body_.take<std::int8_t>(big));
+      case Type::u8: return wide(body_.take<std::uint8_t>(big));
+      case Type::i16: return wide(body_.take<std::int16_t>(big));
+      case Type::u16: return wide(body_.take<std::uint16_t>(big));
+      case Type::i32: return wide(body_.take<std::int32_t>(big));
+      case Type::u32: return wide(body_.take<std::uint32_t>(big));
+      case Type::f32: return wide(body_.take<float>(big));
+      case Type::f64: return wide(body_.take<double>(big));
+    }
+    return std::nullopt;
+  }
+  bool broken(const Element& e, std::uint64_t i) {
+    const std::size_t at = file_.size() - (coding_ == Coding::ascii ? rest_.size() : body_.left());
+    return complain(fmt::format("{} {} of {} cannot be read: the file ends or holds no number at byte {}", e.name, i,
+                                e.count, at));
+  }
+  std::optional<std::uint32_t> list_length(const Property& p) {
+    const auto n = number(*p.count);
+    if (!n || !(*n >= 0) || *n > kMaxPolygonCorners || *n != std::floor(*n)) return std::nullopt;
+    return static_cast<std::uint32_t>(*n);
+  }
+  bool skip_property(const Property& p) {
+    std::uint32_t n = 1;
+    if (p.count) {
+      const auto length = list_length(p);
+      if (!length) return false;
+      n = *length;
+    }
+    for (std::uint32_t i = 0; i < n; ++i)
+      if (!number(*p.type)) return false;
+    return true;
+  }
+  bool skip(const Element& e) {
+    for (std::uint64_t i = 0; i < e.count; ++i)
+      for (const Property& p : e.properties)
+        if (!skip_property(p)) return broken(e, i);
+    return true;
+  }
+
+  bool vertices(const Element& e) {
+    if (vertex_count_ > 0) return complain("has two elements 'vertex'");
+    if (e.count > kMaxMeshVertices) return complain(fmt::format("has {} vertices; the limit is {}", e.count, kMaxMeshVertices));
+    std::vector<int> slots;
+    std::array<bool, 8> has{};
+    for (const Property& p : e.properties) {
+      slots.push_back(p.count ? -1 : vertex_slot(p.name));
+      if (slots.back() >= 0) has[static_cast<std::size_t>(slots.back())] = true;
+    }
+    if (!has[0] || !has[1] || !has[2]) return complain("its vertices lack x, y or z");
+    const bool normals = has[3] && has[4] && has[5], uvs = has[6] && has[7];
+    mesh_.positions.reserve(e.count * 3);
+    for (std::uint64_t i = 0; i < e.count; ++i) {
+      std::array<float, 8> values{};
+      for (std::size_t k = 0; k < slots.size(); ++k) {
+        if (slots[k] < 0) {
+          if (!skip_property(e.properties[k])) return broken(e, i);
+          continue;
+        }
+        const auto v = number(*e.properties[k].type);
+        if (!v) return broken(e, i);
+        values[static_cast<std::size_t>(slots[k])] = static_cast<float>(*v);
+      }
+      mesh_.positions.insert(mesh_.positions.end(), values.begin(), values.begin() + 3);
+      if (normals) mesh_.normals.insert(mesh_.normals.end(), values.begin() + 3, values.begin() + 6);
+      if (uvs) mesh_.uvs.insert(mesh_.uvs.end(), values.begin() + 6, values.end());
+    }
+    vertex_count_ = e.count;
+    return true;
+  }
+
+  bool faces(const Element& e) {
+    const auto is_list = [](const Property& p) {
+      return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
+    };
+    if (std::ranges::count_if(e.properties, is_list) != 1)
+      return complain("its faces need one list 'vertex_indices' or 'vertex_index'");
+    std::vector<std::uint32_t> corners;
+    for (std::uint64_t i = 0; i < e.count; ++i)
+      for (const Property& p : e.properties) {
+        if (!is_list(p)) {
+          if (!skip_property(p)) return broken(e, i);
+          continue;
+        }
+        const auto n = list_length(p);
+        if (!n) return broken(e, i);
+        corners.clear();
+        for (std::uint32_t k = 0; k < *n; ++k) {
+          const auto v = number(*p.type);
+          if (!v) return broken(e, i);
+          if (!(*v >= 0 && *v < static_cast<double>(vertex_count_)))
+            return complain(fmt::format("face {} names vertex {} of {}", i, *v, vertex_count_));
+          corners.push_back(static_cast<std::uint32_t>(*v));
+        }
+        if (mesh_.triangle_count() + corners.size() > kMaxMeshTriangles) return complain("has too many triangles");
+        add_polygon(mesh_, corners);
+      }
+    return true;
+  }
+
+  std::string_view name_;
+  std::span<const std::byte> file_;
+  ByteReader body_;         // what follows the header, binary
+  std::string_view rest_;   // the same, ascii
+  Coding coding_ = Coding::ascii;
+  std::vector<Element> elements_;
+  std::uint64_t vertex_count_ = 0;
+  std::string problem_;
+  MeshData mesh_;
+};
+
+}  // namespace
+
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) { return PlyReader(name, file).read(); }
+
+}  // namespace ls

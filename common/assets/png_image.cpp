@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+#include <png.h>
+
+#include <csetjmp>
+#include <cstring>
+#include <memory>
+
+#include "common/assets/image.h"
+
+namespace ls {
+
+namespace {
+
+// What libpng's callbacks see. They must not throw: errors go back by longjmp, over plain data only.
+struct Source {
+  const std::byte* data;
+  std::size_t left;
+  char message[200];
+};
+
+void read_bytes(png_structp png, png_bytep out, png_size_t n) {
+  auto* s = static_cast<Source*>(png_get_io_ptr(png));
+  if (n > s->left) png_error(png, "the file ends too early");
+  std::memcpy(out, s->data, n);
+  s->data += n;
+  s->left -= n;
+}
+void on_error(png_structp png, png_const_charp text) {
+  auto* s = static_cast<Source*>(png_get_error_ptr(png));
+  std::snprintf(s->message, sizeof s->message, "%s", text);
+  std::longjmp(png_jmpbuf(png), 1);
+}
+void on_warning(png_structp, png_const_charp) {}
+
+struct Png {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  ~Png() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+struct Shape {
+  png_uint_32 width = 0, height = 0, channels = 0, bits = 0;
+  std::size_t row_bytes = 0;
+};
+
+// No object with a destructor lives in these two: longjmp would skip it.
+bool read_header(Png& p, Shape& shape) {
+  if (setjmp(png_jmpbuf(p.png))) return false;
+  png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
+  png_read_info(p.png, p.info);
+  if (png_get_color_type(p.png, p.info) == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(p.png);
+  if (png_get_bit_depth(p.png, p.info) < 8) png_set_expand_gray_1_2_4_to_8(p.png);
+  if (png_get_valid(p.png, p.info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(p.png);
+  if (png_get_bit_depth(p.png, p.info) == 16) png_set_swap(p.png);
+  png_set_interlace_handling(p.png);
+  png_read_update_info(p.png, p.info);
+  shape = {png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info), png_get_channels(p.png, p.info),
+           png_get_bit_depth(p.png, p.info), png_get_rowbytes(p.png, p.info)};
+  return true;
+}
+bool read_rows(Png& p, png_bytepp rows) {
+  if (setjmp(png_jmpbuf(p.png))) return false;
+  png_read_image(p.png, rows);
+  png_read_end(p.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file) {
+  Source source{file.data(), file.size(), {}};
+  Png p;
+  const auto bad = [&](const char* text) {
+    return fail(Errc::invalid_argument, fmt::format("'{}': broken PNG: {}", name, text));
+  };
+  p.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
+  if (p.png) p.info = png_create_info_struct(p.png);
+  if (!p.info) return fail(Errc::resource_exhausted, fmt::format("'{}': no memory to read a PNG", name));
+  png_set_read_fn(p.png, &source, read_bytes);
+  Shape shape;
+  if (!read_header(p, shape)) return bad(source.message);
+  const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
+  // Deflate packs at most 1032 to 1 and a palette of one bit becomes four bytes: a file that claims more lies.
+  if (pixels == 0 || pixels > kMaxImagePixels || shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
+    return bad("its size is not believable");
+  std::vector<std::uint8_t> bytes(shape.row_bytes * shape.height);
+  std::vector<png_bytep> rows(shape.height);
+  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = bytes.data() + y * shape.row_bytes;
+  if (!read_rows(p, rows.data())) return bad(source.message);
+  ImageData image{shape.width, shape.height, shape.channels, {}, {}, true};
+  if (shape.bits == 8) {
+    image.u8 = std::move(bytes);
+    return image;
+  }
+  image.f32.resize(bytes.size() / 2);
+  for (std::size_t i = 0; i < image.f32.size(); ++i) {
+    std::uint16_t v;
+    std::memcpy(&v, &bytes[2 * i], 2);
+    image.f32[i] = static_cast<float>(v / 65535.);
+  }
+  return image;
+}
+
+}  // namespace ls

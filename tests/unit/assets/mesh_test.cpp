@@ -1,0 +1,165 @@
+#include "common/assets/mesh.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "tests/unit/assets/hostile.h"
+
+namespace ls {
+namespace {
+
+using test::append;
+using test::bytes_of;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const std::string kQuadObj =
+    "# a quad\nmtllib a.mtl\no quad\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
+    "usemtl m\ns off\nf 1/1/1 2/2/1 3/3/1 4/4/1\n";
+
+void expect_sound(const MeshData& m) {
+  const std::size_t n = m.vertex_count();
+  EXPECT_EQ(m.positions.size() % 3, 0u);
+  EXPECT_EQ(m.indices.size() % 3, 0u);
+  EXPECT_TRUE(m.normals.empty() || m.normals.size() == 3 * n);
+  EXPECT_TRUE(m.uvs.empty() || m.uvs.size() == 2 * n);
+  for (const std::uint32_t i : m.indices) EXPECT_LT(i, n);
+}
+
+std::string obj_error(const std::string& text) {
+  const auto m = decode_obj("m.obj", bytes_of(text));
+  return m ? "" : m.error().message;
+}
+
+TEST(Obj, ReadsAQuadAsTwoTriangles) {
+  const auto m = decode_obj("q.obj", bytes_of(kQuadObj));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 0, 2, 3));
+  EXPECT_THAT(m->positions, ElementsAre(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0));
+  EXPECT_THAT(m->uvs, ElementsAre(0, 0, 1, 0, 1, 1, 0, 1));
+  EXPECT_EQ(m->normals.size(), 12u);
+}
+
+TEST(Obj, CountsNegativeIndicesBackFromTheLast) {
+  const auto m = decode_obj("q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\r\n"));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 2));
+  EXPECT_TRUE(m->uvs.empty());
+  EXPECT_TRUE(m->normals.empty());
+}
+
+TEST(Obj, SharesOnlyCornersThatAreAlikeInEverything) {
+  const auto m = decode_obj("q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 2/1 3/1\n"));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 3, 1, 2));
+}
+
+TEST(Obj, DropsAndCountsTrianglesWithoutAreaOrWithVerticesThatAreNotFinite) {
+  const auto m = decode_obj("q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_EQ(m->triangle_count(), 1u);
+  EXPECT_EQ(m->dropped_triangles, 3u);
+}
+
+TEST(Obj, ErrorsNameFileAndLine) {
+  EXPECT_THAT(obj_error("v 0 0 0\nf 1 2 3\n"), HasSubstr("'m.obj', line 2: index 2 in '2' is out of range: 1 so far"));
+  EXPECT_THAT(obj_error("v 0 0 zero\n"), HasSubstr("line 1: expected 3 numbers, found 'zero'"));
+  EXPECT_THAT(obj_error("v 0 0 0\nf 0 1 1\n"), HasSubstr("line 2"));
+  EXPECT_THAT(obj_error("v 0 0 0\nf 1 1\n"), HasSubstr("at least three corners"));
+  EXPECT_THAT(obj_error("v 0 0 0\nf 1/x 1 1\n"), HasSubstr("no corner of a face"));
+  EXPECT_THAT(obj_error("\nfrobnicate\n"), HasSubstr("line 2: unknown statement 'frobnicate'"));
+  EXPECT_THAT(obj_error(""), HasSubstr("has no faces"));
+}
+
+TEST(Obj, SurvivesTruncationsAndMutations) {
+  test::accepted_truncations(kQuadObj, decode_obj);
+  test::survive_mutations(kQuadObj, decode_obj, expect_sound);
+}
+
+std::string ply_header(const std::string& format) {
+  return "ply\nformat " + format + " 1.0\ncomment made by hand\nelement vertex 4\nproperty float z\nproperty double x\n" +
+         "property float y\nproperty uchar red\nproperty float s\nproperty float t\nelement face 1\nproperty uchar flags\n" +
+         "property list uchar int vertex_indices\nelement edge 1\nproperty list int float w\nend_header\n";
+}
+
+const std::string kPlyAscii = ply_header("ascii") +
+                              "0 -1 -1 255 0 0\n0 1 -1 255 1 0\n0 1 1 255 1 1\n0 -1 1 255 0 1\n7 4 0 1 2 3\n2 0.5 0.25\n";
+
+template <class T>
+void put(std::string& s, T v, bool big) {
+  std::string raw;
+  append(raw, v);
+  if (big) std::reverse(raw.begin(), raw.end());
+  s += raw;
+}
+std::string ply_binary(bool big) {
+  std::string s = ply_header(big ? "binary_big_endian" : "binary_little_endian");
+  const float corners[4][4] = {{-1, -1, 0, 0}, {1, -1, 1, 0}, {1, 1, 1, 1}, {-1, 1, 0, 1}};
+  for (const auto& c : corners) {
+    put(s, 0.f, big);
+    put(s, double{c[0]}, big);
+    put(s, c[1], big);
+    put(s, std::uint8_t{255}, big);
+    put(s, c[2], big);
+    put(s, c[3], big);
+  }
+  put(s, std::uint8_t{7}, big);
+  put(s, std::uint8_t{4}, big);
+  for (const std::int32_t i : {0, 1, 2, 3}) put(s, i, big);
+  put(s, std::int32_t{1}, big);
+  put(s, .5f, big);
+  return s;
+}
+std::string ply_error(const std::string& text) {
+  const auto m = decode_ply("m.ply", bytes_of(text));
+  return m ? "" : m.error().message;
+}
+std::string replaced(std::string s, const std::string& what, const std::string& with) {
+  return s.replace(s.find(what), what.size(), with);
+}
+
+TEST(Ply, ReadsAllThreeCodingsAlike) {
+  for (const std::string& file : {kPlyAscii, ply_binary(false), ply_binary(true)}) {
+    const auto m = decode_ply("q.ply", bytes_of(file));
+
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 0, 2, 3));
+    EXPECT_THAT(m->positions, ElementsAre(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0));
+    EXPECT_THAT(m->uvs, ElementsAre(0, 0, 1, 0, 1, 1, 0, 1));
+    EXPECT_TRUE(m->normals.empty());
+  }
+}
+
+TEST(Ply, RefusesCountsThatTheFileCannotHold) {
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 4000000000")), HasSubstr("4000000000 elements 'vertex'"));
+  EXPECT_THAT(ply_error(replaced(ply_binary(false), "face 1", "face 99")), HasSubstr("99 elements 'face'"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 3")), HasSubstr("m.ply"));
+}
+
+TEST(Ply, RefusesIndicesOutOfRangeAndBrokenHeaders) {
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 4\n")), HasSubstr("face 0 names vertex 4 of 4"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 -1\n")), HasSubstr("face 0 names vertex -1 of 4"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "ascii", "ebcdic")), HasSubstr("line 2: unknown format 'ebcdic'"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "double x", "double q")), HasSubstr("lack x, y or z"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "property float z", "property real z")), HasSubstr("line 5"));
+}
+
+TEST(Ply, NeverAcceptsATruncatedFile) {
+  EXPECT_EQ(test::accepted_truncations(ply_binary(false), decode_ply), 0);
+  EXPECT_EQ(test::accepted_truncations(ply_binary(true), decode_ply), 0);
+  // The last number of a text may lose its last digits without trace.
+  EXPECT_LE(test::accepted_truncations(kPlyAscii, decode_ply), 5);
+}
+
+TEST(Ply, SurvivesMutations) {
+  for (const std::string& file : {kPlyAscii, ply_binary(false), ply_binary(true)})
+    test::survive_mutations(file, decode_ply, expect_sound);
+}
+
+}  // namespace
+}  // namespace ls
