@@ -13,7 +13,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 STATIC = pathlib.Path(__file__).resolve().parents[2] / "web" / "static"
 TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".png": "image/png"}
-POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; font-src 'self'; "
+          "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'")
 TOKEN = "let-there-be-light"
 
 
@@ -135,7 +136,7 @@ def _handler(farm):
                 return self._static(path)
             parts = path[len("/api/v1/"):].split("/")
             if parts == ["session"]:
-                return self._session()
+                return self._session(body)
             if not farm.signed_in:
                 return self._problem(401, "No valid token or session came with this request.")
             answer = getattr(self, f"_{self.command.lower()}_{parts[0]}", None)
@@ -149,11 +150,11 @@ def _handler(farm):
                 return self._problem(404, f"There is nothing at {path}.")
             return self._send(200, file.read_bytes(), TYPES[file.suffix])
 
-        def _session(self):
+        def _session(self, body):
             if self.command == "DELETE":
                 farm.signed_in = False
                 return self._send(204)
-            if self.headers.get("Authorization") != f"Bearer {TOKEN}":
+            if json.loads(body) != {"token": TOKEN}:
                 return self._problem(401, "This token is not known.")
             farm.signed_in = True
             return self._send(204, headers=[("Set-Cookie", "session=1; HttpOnly; SameSite=Strict; Path=/")])

@@ -81,6 +81,17 @@ def test_what_was_missed_while_the_stream_was_down_is_there_afterwards(farm, das
     assert farm.asked("GET", "/api/v1/events") == 2
 
 
+def test_events_that_are_kept_no_longer_lead_to_fresh_lists(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+
+    farm.jobs["j-1"] = job(progress=0.75)
+    farm.emit("reset", {"missed_from": 1, "missed_to": 9})
+
+    page.wait("document.querySelector('[data-job]').innerText.includes('75 %')")
+
+
 def test_cancelling_asks_once_more(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()

@@ -8,7 +8,7 @@ FACTS = {
     "jobs": ["7 jobs", "steam-bath.xml", "43 %", "215 / 512", "0.00418", "4.2 min", "1 h 12 min", "7.20 × 10⁻⁵", "failed"],
     "jobs-confirm": ["Really cancel", "Keep"],
     "jobs-lost": ["connection lost", "The coordinator does not answer."],
-    "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.00100", "clean", "tile 104", "lab-03", "EXR"],
+    "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.001", "clean", "tile 104", "lab-03", "EXR"],
     "job-queued": ["Waiting for a worker", "The first point appears"],
     "job-done": ["Done after 7 min: the target error is reached."],
     "job-failed": ["The job failed", "SIGSEGV on 3 workers", "lightshaft render forge-v12.xml --pixel 412,96 --sample 11"],

@@ -38,7 +38,7 @@ const json = (value) => ({ headers: { "Content-Type": "application/json" }, body
 const jobPath = (id) => `/jobs/${encodeURIComponent(id)}`;
 
 export const api = {
-  signIn: (token) => call("POST", "/session", { headers: { Authorization: `Bearer ${token}` } }),
+  signIn: (token) => call("POST", "/session", json({ token })),
   signOut: () => call("DELETE", "/session"),
   jobs: async () => (await (await call("GET", "/jobs")).json()).jobs,
   job: async (id) => (await call("GET", jobPath(id))).json(),

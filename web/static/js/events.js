@@ -1,6 +1,6 @@
 // The coordinator's event stream. After a lost connection the browser resumes by itself with Last-Event-ID; when the
 // coordinator was away for longer, or refused, a new stream is opened with growing pauses. onOpen is called after every
-// (re)connection: the caller then fetches fresh lists, so nothing that was missed matters.
+// (re)connection and on `reset` (events were missed that are kept no longer): the caller then fetches fresh lists.
 
 const kFirstPauseMs = 500;
 const kLongestPauseMs = 15000;
@@ -28,6 +28,7 @@ export function openEvents(handlers, url = "/api/v1/events") {
       }
       handlers.onLost(closed);
     };
+    source.addEventListener("reset", () => handlers.onOpen());
     for (const type of ["job", "tile", "worker"]) {
       source.addEventListener(type, (event) => deliver(type, event.data));
     }

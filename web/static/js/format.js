@@ -16,6 +16,9 @@ export function figure(x, digits = 3) {
   return `${mantissa} × 10${superscript(Number(power))}`;
 }
 
+/** A figure that a person chose: with the digits it was given. */
+export const given = (x) => (known(x) ? (Math.abs(x) < 1e-4 ? figure(x) : x.toLocaleString("en", { maximumSignificantDigits: 6 })) : kAbsent);
+
 export const interval = (ci) => (Array.isArray(ci) && known(ci[0]) && known(ci[1]) ? `${figure(ci[0])} – ${figure(ci[1])}` : null);
 
 /** 0.4 s, 12 s, 4.2 min, 1 h 12 min, 3 d 4 h. */

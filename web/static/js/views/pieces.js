@@ -58,5 +58,6 @@ function caretUnder({ source_line, column, length }) {
 
 /** A window and the light that falls through it. */
 export const mark = () => h("svg", { class: "mark", viewBox: "0 0 32 32", "aria-hidden": "true" },
+  h("defs", null, h("linearGradient", { id: "beam", x1: "0.2", y1: "0", x2: "0.8", y2: "1" }, h("stop", { class: "near", offset: "0" }), h("stop", { class: "far", offset: "1" }))),
   h("path", { class: "mark-beam", d: "M8 5 L15 3 L30 29 L13 29 Z" }),
   h("path", { class: "mark-window", d: "M8 5 L15 3 L16.4 5.5 L8.6 7.8 Z" }));

@@ -1,7 +1,7 @@
 // Error against time, both logarithmic: measured points, their 95 % band, the target, and where the fitted line meets it.
 import { h } from "../dom.js";
 import { drawable, errorLabel, fit, logAxis, ticks, timeLabel } from "../plot_scale.js";
-import { duration, figure, interval, spp } from "../format.js";
+import { duration, figure, given, interval, spp } from "../format.js";
 
 const kWidth = 440;
 const kHeight = 270;
@@ -72,7 +72,7 @@ function targetLine(target, { y }) {
   if (!(target > 0)) return null;
   return h("g", { class: "plot-target" },
     h("line", { x1: kBox.left, x2: kBox.right, y1: y.at(target), y2: y.at(target) }),
-    h("text", { x: kBox.left + 6, y: y.at(target) - 6 }, `target ${figure(target)}`));
+    h("text", { x: kBox.left + 6, y: y.at(target) - 6 }, `target ${given(target)}`));
 }
 
 function prediction(points, target, { x, y }) {
@@ -104,5 +104,5 @@ function slopeText(points) {
 
 function summary(points, target) {
   const last = points.at(-1);
-  return `Error against time: relMSE ${figure(last.relmse)} after ${duration(last.seconds)}` + (target > 0 ? `, target ${figure(target)}` : "");
+  return `Error against time: relMSE ${figure(last.relmse)} after ${duration(last.seconds)}` + (target > 0 ? `, target ${given(target)}` : "");
 }
