@@ -1,0 +1,134 @@
+#include "coordinator/rpc/server.h"
+
+#include <fmt/format.h>
+#include <grpcpp/grpcpp.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "common/base/log.h"
+#include "common/protocol/limits.h"
+#include "coordinator/rpc/blob_stream.h"
+#include "coordinator/rpc/limits.h"
+#include "coordinator/rpc/work_stream.h"
+
+namespace ls::coordinator {
+
+using rpc::BlobStream;
+using rpc::WorkStream;
+namespace pb = ::lightshaft::farm::v1;
+
+namespace {
+// A reactor that only says no.
+template <class Reactor>
+class Refusal final : public Reactor {
+ public:
+  explicit Refusal(const grpc::Status& status) { this->Finish(status); }
+  void OnDone() override { delete this; }
+};
+}  // namespace
+
+struct GrpcServer::Impl final : pb::Farm::CallbackService {
+  Impl(Coordinator& c, std::string token) : coordinator(c), join_token(std::move(token)) {}
+
+  grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>* Work(grpc::CallbackServerContext* context) override {
+    const std::lock_guard lock(mutex);
+    if (stopping || streams.size() >= rpc::kWorkStreams)
+      return new Refusal<grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>>(
+          stopping ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down")
+                   : grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many workers are connected"));
+    const TimePoint deadline = clock.now() + std::chrono::seconds(rpc::kHelloSeconds);
+    auto* stream = new WorkStream(coordinator, context, deadline, [this](WorkStream* gone) {
+      const std::lock_guard inner(mutex);
+      streams.erase(gone);
+    });
+    streams.insert(stream);
+    stream->begin();
+    return stream;
+  }
+
+  grpc::ServerWriteReactor<pb::BlobChunk>* FetchBlob(grpc::CallbackServerContext*,
+                                                     const pb::FetchBlobRequest* request) override {
+    if (++fetches > rpc::kFetches) {
+      --fetches;
+      return new Refusal<grpc::ServerWriteReactor<pb::BlobChunk>>(
+          grpc::Status(grpc::StatusCode::UNAVAILABLE, "too many transfers at once; try again"));
+    }
+    auto* stream = new BlobStream(coordinator.blobs(), *request, join_token, [this] { --fetches; });
+    stream->begin();
+    return stream;
+  }
+
+  // Cuts off streams that were opened and then said nothing.
+  void sweep(std::stop_token token) {
+    std::unique_lock lock(mutex);
+    while (!token.stop_requested()) {
+      changed.wait_for(lock, token, std::chrono::seconds(1), [] { return false; });
+      for (WorkStream* stream : streams)
+        if (stream->hello_overdue(clock.now())) stream->cut();
+    }
+  }
+
+  Coordinator& coordinator;
+  const std::string join_token;
+  const SystemClock clock;
+  std::unique_ptr<grpc::Server> server;
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  std::set<WorkStream*> streams;  // guarded by mutex
+  bool stopping = false;          // guarded by mutex
+  std::atomic<int> fetches{0};
+  std::jthread sweeper;
+};
+
+GrpcServer::GrpcServer(Coordinator& coordinator, std::string join_token)
+    : impl_(std::make_unique<Impl>(coordinator, std::move(join_token))) {}
+
+GrpcServer::~GrpcServer() { stop(); }
+
+Result<int> GrpcServer::start(const std::string& address) {
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(impl_.get());
+  builder.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
+  builder.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, rpc::kHandshakeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, rpc::kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, rpc::kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, rpc::kPingsNotOftenerMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
+  impl_->server = builder.BuildAndStart();
+  if (!impl_->server || port == 0) {
+    impl_->server.reset();
+    return fail(Errc::unavailable,
+                fmt::format("cannot listen for workers on {}: the port is taken (another coordinator?) or the address is "
+                            "not this machine's; choose another with --grpc",
+                            address));
+  }
+  impl_->sweeper = std::jthread([this](std::stop_token token) { impl_->sweep(token); });
+  return port;
+}
+
+void GrpcServer::stop() {
+  if (!impl_->server) return;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->stopping = true;
+    for (WorkStream* stream : impl_->streams)
+      stream->end(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"));
+  }
+  impl_->sweeper.request_stop();
+  impl_->changed.notify_all();
+  // Streams that do not end by themselves within this time are cut.
+  impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
+  impl_->server->Wait();
+  impl_->server.reset();
+}
+
+}  // namespace ls::coordinator

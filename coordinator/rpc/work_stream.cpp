@@ -1,0 +1,138 @@
+#include "coordinator/rpc/work_stream.h"
+
+#include <fmt/format.h>
+
+#include "common/base/log.h"
+#include "coordinator/rpc/convert.h"
+#include "coordinator/rpc/limits.h"
+#include "proto/convert.h"
+
+namespace ls::coordinator::rpc {
+
+void Outlet::send(ToWorker message) {
+  pb::ToWorker wire = wire::to_wire(message);
+  const std::lock_guard lock(mutex_);
+  if (!stream_ || closing_ || finished_) return;
+  if (queue_.size() >= kQueuedMessages) {
+    closing_ = true;
+    stream_->context_->TryCancel();
+    return;
+  }
+  queue_.push_back(std::move(wire));
+  stream_->pump_locked();
+}
+
+void Outlet::close() {
+  const std::lock_guard lock(mutex_);
+  if (!stream_ || closing_ || finished_) return;
+  closing_ = true;
+  status_ = grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator closed this stream");
+  stream_->pump_locked();
+}
+
+WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, TimePoint hello_deadline,
+                       std::function<void(WorkStream*)> on_gone)
+    : coordinator_(coordinator),
+      context_(context),
+      hello_deadline_(hello_deadline),
+      on_gone_(std::move(on_gone)),
+      outlet_(std::make_shared<Outlet>(this)) {}
+
+void WorkStream::refuse(const Error& error, bool retry) {
+  outlet_->send(Refused{error, retry});
+  end(to_status(error));
+}
+
+void WorkStream::end(const grpc::Status& status) {
+  const std::lock_guard lock(outlet_->mutex_);
+  if (outlet_->closing_ || outlet_->finished_) return;
+  outlet_->closing_ = true;
+  outlet_->status_ = status;
+  pump_locked();
+}
+
+void WorkStream::cut() {
+  const std::lock_guard lock(outlet_->mutex_);
+  if (!outlet_->finished_) context_->TryCancel();
+}
+
+void WorkStream::pump_locked() {
+  Outlet& out = *outlet_;
+  if (out.writing_ || out.finished_) return;
+  if (!out.queue_.empty()) {
+    out.writing_ = true;
+    StartWrite(&out.queue_.front());
+  } else if (out.closing_) {
+    out.finished_ = true;
+    Finish(out.status_);
+  }
+}
+
+void WorkStream::OnReadDone(bool ok) {
+  if (!ok) {  // the worker has closed its side, or is gone
+    end(grpc::Status::OK);
+    return;
+  }
+  auto message = wire::from_wire(incoming_);
+  if (!message) {
+    log_warn("peer=" + context_->peer(), message.error().message);
+    refuse(message.error(), false);
+    return;
+  }
+  if (!session_) {
+    greet(std::move(*message));
+    if (!session_) return;
+  } else {
+    session_->receive(std::move(*message));
+  }
+  StartRead(&incoming_);
+}
+
+void WorkStream::greet(FromWorker message) {
+  const auto* hello = std::get_if<WorkerHello>(&message);
+  if (!hello) return refuse({Errc::invalid_argument, "bad message: the first one on a stream must be the hello"}, false);
+  if (hello->protocol != kProtocolVersion)
+    return refuse({Errc::failed_precondition,
+                   fmt::format("this worker speaks protocol {}, the coordinator speaks {}: install the same version on both",
+                               hello->protocol, kProtocolVersion)},
+                  false);
+  auto session = coordinator_.connect(*hello, outlet_);
+  if (!session) {
+    log_warn(fmt::format("peer={} worker={}", context_->peer(), hello->name), "refused: " + session.error().message);
+    return refuse(session.error(), session.error().code == Errc::unavailable || session.error().code == Errc::resource_exhausted);
+  }
+  session_ = std::move(*session);
+  greeted_ = true;
+}
+
+void WorkStream::OnWriteDone(bool ok) {
+  const std::lock_guard lock(outlet_->mutex_);
+  outlet_->writing_ = false;
+  outlet_->queue_.pop_front();
+  if (!ok) {
+    outlet_->queue_.clear();
+    outlet_->closing_ = true;
+  }
+  pump_locked();
+}
+
+void WorkStream::OnCancel() {
+  const std::lock_guard lock(outlet_->mutex_);
+  outlet_->closing_ = true;
+  while (outlet_->queue_.size() > (outlet_->writing_ ? 1U : 0U)) outlet_->queue_.pop_back();
+  pump_locked();
+}
+
+void WorkStream::OnDone() {
+  {
+    const std::lock_guard lock(outlet_->mutex_);
+    outlet_->stream_ = nullptr;
+    outlet_->queue_.clear();
+  }
+  if (session_) session_->disconnected();
+  session_.reset();
+  on_gone_(this);
+  delete this;
+}
+
+}  // namespace ls::coordinator::rpc

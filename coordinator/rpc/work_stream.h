@@ -1,0 +1,73 @@
+// One worker's stream: messages in to its WorkerSession, messages out from a bounded queue.
+//
+// Two objects: the Outlet is the WorkerSink that the coordinator holds, for as long as it likes; the WorkStream is gRPC's
+// reactor and deletes itself at OnDone. The outlet's mutex guards both and is never held while the coordinator is called,
+// so the coordinator may call the sink with its own locks held.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <mutex>
+
+#include "common/base/clock.h"
+#include "coordinator/service.h"
+#include "proto/farm.grpc.pb.h"
+#include "proto/farm.pb.h"
+
+namespace ls::coordinator::rpc {
+
+namespace pb = ::lightshaft::farm::v1;
+
+class WorkStream;
+
+class Outlet final : public WorkerSink {
+ public:
+  explicit Outlet(WorkStream* stream) : stream_(stream) {}
+  void send(ToWorker message) override;
+  void close() override;
+
+ private:
+  friend class WorkStream;
+  std::mutex mutex_;
+  WorkStream* stream_;  // null after OnDone
+  std::deque<pb::ToWorker> queue_;
+  bool writing_ = false;   // a write is under way; queue_.front() is it
+  bool closing_ = false;   // finish with status_ once the queue is empty
+  bool finished_ = false;  // Finish was called
+  grpc::Status status_;
+};
+
+class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
+ public:
+  // `open_streams` is decremented at the end. `on_gone` tells the server, last thing before the stream is deleted.
+  WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, TimePoint hello_deadline,
+             std::function<void(WorkStream*)> on_gone);
+
+  void begin() { StartRead(&incoming_); }
+  void refuse(const Error& error, bool retry);  // tells the worker, then ends the stream
+  void end(const grpc::Status& status);         // after what is queued
+  void cut();                                   // at once
+  bool hello_overdue(TimePoint now) const { return !greeted_ && now >= hello_deadline_; }
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+  void OnDone() override;
+
+ private:
+  friend class Outlet;
+  void greet(FromWorker message);
+  void pump_locked();  // starts the next write, or finishes
+
+  Coordinator& coordinator_;
+  grpc::CallbackServerContext* context_;
+  const TimePoint hello_deadline_;
+  const std::function<void(WorkStream*)> on_gone_;
+  std::shared_ptr<Outlet> outlet_;
+  std::unique_ptr<WorkerSession> session_;  // touched by read reactions and OnDone, which never overlap
+  std::atomic<bool> greeted_{false};
+  pb::FromWorker incoming_;
+};
+
+}  // namespace ls::coordinator::rpc

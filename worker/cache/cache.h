@@ -1,0 +1,48 @@
+// The worker's content-addressed store of blobs: DIR/ab/abcdef... by SHA-256.
+//
+// A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone on with. A file
+// that no longer has its digest (bad disk, meddling) is found when it is first used by this process, thrown away and fetched
+// again. Above the limit the least recently used blobs go first, never one in use: the file is held by a shared flock while a
+// BlobFile lives, also against other workers that use the same folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <span>
+
+#include "common/base/error.h"
+#include "worker/agent/blob_files.h"
+
+namespace ls::worker {
+
+class BlobCache final : public BlobFiles {
+ public:
+  using Sink = std::function<Result<void>(std::span<const std::byte>)>;
+  // Streams a blob from an offset into the sink; see CoordinatorLink::fetch_blob.
+  using Fetch = std::function<Result<void>(const Digest&, std::uint64_t offset, const Sink& sink)>;
+
+  // limit_bytes 0: none. Makes the folder.
+  static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
+
+  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) override;
+  std::vector<Digest> held(std::size_t limit) const override;
+
+ private:
+  BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
+  std::filesystem::path path_of(const Digest& digest) const;
+  std::shared_ptr<const BlobFile> open_verified(const Digest& digest);
+  Result<void> download(const BlobRef& blob);
+  Result<void> make_room(std::uint64_t bytes);
+
+  const std::filesystem::path folder_;
+  const std::uint64_t limit_;
+  const Fetch fetch_;
+  std::mutex mutex_;            // one acquire at a time
+  std::set<Digest> verified_;   // by this process
+};
+
+}  // namespace ls::worker

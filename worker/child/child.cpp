@@ -1,0 +1,307 @@
+#include "worker/child/child.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <mutex>
+
+#include "common/base/check.h"
+#include "common/base/log.h"
+#include "worker/child/job_text.h"
+#include "worker/child/process.h"
+#include "worker/child/protocol.h"
+
+namespace ls::worker {
+namespace {
+
+using child::Kind;
+using child::Outcome;
+using child::Process;
+using child::Reply;
+using child::Request;
+using child::Slot;
+
+// A unit that is innocent of so many deaths in a row is not tried in this worker any more.
+constexpr int kInnocentDeaths = 5;
+constexpr Duration kStopLimit = std::chrono::seconds(10);  // from the stop flag to its obedience
+
+tl::unexpected<UnitFailure> failed(std::string reason) {
+  return tl::unexpected<UnitFailure>(UnitFailure{.reason = std::move(reason)});
+}
+
+class ChildBackend final : public RenderBackend {
+ public:
+  explicit ChildBackend(ChildOptions options) : options_(std::move(options)) {
+    for (int i = 0; i < options_.slots; ++i) free_slots_.push_back(i);
+  }
+
+  Result<void> start() {
+    const std::lock_guard control(control_mutex_);
+    auto process = living_process();
+    if (!process) return tl::unexpected<Error>(process.error());
+    return {};
+  }
+
+  Digest numeric_class() const override { return numeric_class_; }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override;
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override;
+  void forget(const JobId& job) override;
+  std::uint64_t rss_bytes() const override;
+  void shutdown() override;
+
+ private:
+  struct Attempt {
+    tl::expected<RenderedUnit, UnitFailure> outcome;
+    bool innocent = false;  // the child died, of something else
+  };
+  Result<std::shared_ptr<Process>> living_process();
+  Result<void> greet(Process& process);
+  // A child that knows the job, and the job's number in it.
+  tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job, std::uint64_t& number);
+  tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
+  Attempt attempt(Process& process, int index, std::uint64_t number, const LocalJob& job, const LeaseUnit& unit,
+                  const std::atomic<bool>& stop);
+  Attempt judge_death(Process& process, int index);
+  std::uint64_t number_of(const JobId& job);
+
+  const ChildOptions options_;
+  const SystemClock clock_;
+  Digest numeric_class_;
+  std::mutex control_mutex_;  // one request at a time on the control channel; also who respawns
+  mutable std::mutex mutex_;
+  std::shared_ptr<Process> process_;        // guarded by mutex_, like all below
+  std::map<JobId, std::uint64_t> numbers_;
+  std::vector<std::uint64_t> forgotten_;    // told to the child before the next world is built
+  std::uint64_t next_number_ = 1;
+  std::vector<int> free_slots_;
+  bool shut_down_ = false;
+};
+
+// Called with control_mutex_ held.
+Result<std::shared_ptr<Process>> ChildBackend::living_process() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (shut_down_) return fail(Errc::unavailable, "the worker is ending");
+    if (process_ && process_->alive()) return process_;
+  }
+  auto process = Process::spawn(options_);
+  if (!process) return process;
+  if (auto ok = greet(**process); !ok) return tl::unexpected<Error>(ok.error());
+  const std::lock_guard lock(mutex_);
+  if (shut_down_) return fail(Errc::unavailable, "the worker is ending");
+  process_ = *process;
+  forgotten_.clear();
+  return process;
+}
+
+Result<void> ChildBackend::greet(Process& process) {
+  const TimePoint deadline = clock_.now() + options_.start_limit;
+  const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
+    if (clock_.now() > deadline) process.kill();
+  });
+  if (!answer)
+    return fail(Errc::internal, fmt::format("the render child {} before it was ready; run the worker with --fake to see "
+                                            "whether the renderer is the cause",
+                                            process.end().text));
+  numeric_class_ = answer->reply.numeric_class;
+  return {};
+}
+
+std::uint64_t ChildBackend::number_of(const JobId& job) {
+  const std::lock_guard lock(mutex_);
+  const auto [it, is_new] = numbers_.try_emplace(job, next_number_);
+  if (is_new) ++next_number_;
+  return it->second;
+}
+
+tl::expected<void, UnitFailure> ChildBackend::prepare(const LocalJob& job) {
+  std::uint64_t number = 0;
+  if (auto process = ready_process(job, number); !process) return tl::unexpected<UnitFailure>(process.error());
+  return {};
+}
+
+tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(const LocalJob& job,
+                                                                               std::uint64_t& number) {
+  number = number_of(job.brief.job);
+  const auto knows = [&](Process& process) {
+    const std::lock_guard lock(process.prepared_mutex);
+    return process.prepared.contains(number);
+  };
+  {
+    std::shared_ptr<Process> process;
+    {
+      const std::lock_guard lock(mutex_);
+      process = process_;
+    }
+    if (process && knows(*process) && process->alive()) return process;
+  }
+  const std::lock_guard control(control_mutex_);
+  auto process = living_process();
+  if (!process) return failed(process.error().message);
+  if (knows(**process)) return *process;
+  if (auto ok = prepare_in(**process, job, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
+  return *process;
+}
+
+tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job, std::uint64_t number) {
+  std::vector<std::uint64_t> forgotten;
+  {
+    const std::lock_guard lock(mutex_);
+    forgotten.swap(forgotten_);
+  }
+  for (const std::uint64_t old : forgotten) {
+    process.ask(process.control_fd(), Request{.kind = Kind::forget, .job = old}, {}, [] {});
+    const std::lock_guard lock(process.prepared_mutex);
+    process.prepared.erase(old);
+  }
+  const std::string text = child::to_text(job);
+  if (text.size() > child::kTextBytes) return failed("the job names more files than the render child can be told of");
+  const TimePoint deadline = clock_.now() + options_.prepare_limit;
+  bool too_long = false;
+  process.preparing = true;
+  const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::prepare, .job = number}, text, [&] {
+    too_long = clock_.now() > deadline;
+    if (too_long) process.kill();
+  });
+  if (!answer) {
+    const Process::End end = process.end();
+    UnitFailure failure;
+    failure.signal = end.signal;
+    failure.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s", seconds(options_.prepare_limit))
+                              : fmt::format("the renderer {} while it built the scene", end.text);
+    return tl::unexpected<UnitFailure>(std::move(failure));
+  }
+  process.preparing = false;
+  if (answer->reply.outcome != Outcome::ok) {
+    UnitFailure failure;
+    failure.scene_at_fault = answer->reply.outcome == Outcome::scene_at_fault;
+    failure.reason = answer->text;
+    return tl::unexpected<UnitFailure>(std::move(failure));
+  }
+  const std::lock_guard lock(process.prepared_mutex);
+  process.prepared.insert(number);
+  return {};
+}
+
+tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job, const LeaseUnit& unit,
+                                                             const std::atomic<bool>& stop) {
+  if (unit.rect.pixels() > static_cast<std::int64_t>(child::kSlotPixels)) return failed("the tile is too large");
+  int slot = -1;
+  {
+    const std::lock_guard lock(mutex_);
+    CHECK(!free_slots_.empty(), "more threads render than the child has slots ({})", options_.slots);
+    slot = free_slots_.back();
+    free_slots_.pop_back();
+  }
+  Attempt last{failed("the renderer kept dying of other units"), true};
+  for (int i = 0; i < kInnocentDeaths && last.innocent && !stop; ++i) {
+    std::uint64_t number = 0;
+    const auto process = ready_process(job, number);
+    last = process ? attempt(**process, slot, number, job, unit, stop)
+                   : Attempt{tl::unexpected<UnitFailure>(process.error()), false};
+  }
+  const std::lock_guard lock(mutex_);
+  free_slots_.push_back(slot);
+  return std::move(last.outcome);
+}
+
+ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::uint64_t number, const LocalJob& job,
+                                            const LeaseUnit& unit, const std::atomic<bool>& stop) {
+  Slot& slot = process.slot(index);
+  slot.stop = false;
+  slot.where.x = slot.where.y = -1;
+  std::uint64_t seen = 0;
+  TimePoint since = clock_.now();
+  std::optional<TimePoint> stop_since;
+  const auto watch = [&] {
+    const TimePoint now = clock_.now();
+    if (stop && !stop_since) {
+      slot.stop = true;
+      stop_since = now;
+    }
+    const std::uint64_t place = slot.where.sample * 0x9e3779b97f4a7c15ULL ^
+                                (static_cast<std::uint64_t>(static_cast<std::uint32_t>(slot.where.x.load())) << 32 |
+                                 static_cast<std::uint32_t>(slot.where.y.load()));
+    if (place != seen) {
+      seen = place;
+      since = now;
+    }
+    const bool hangs = now - since > options_.hang_limit || (stop_since && now - *stop_since > kStopLimit);
+    if (!hangs || !process.alive()) return;
+    process.hung_slot = index;
+    process.kill();
+  };
+  const Request request{Kind::render, 0, number, unit.tile, unit.round, unit.rect, unit.samples};
+  const auto answer = process.ask(process.slot_fd(index), request, {}, watch);
+  if (!answer) return judge_death(process, index);
+  const Reply& reply = answer->reply;
+  if (reply.outcome != Outcome::ok) {
+    UnitFailure failure{.scene_at_fault = reply.outcome == Outcome::scene_at_fault, .reason = answer->text};
+    if (slot.where.x >= 0) {
+      failure.pixel = {slot.where.x, slot.where.y};
+      failure.sample = slot.where.sample;
+    }
+    return {tl::unexpected<UnitFailure>(std::move(failure)), false};
+  }
+  RenderedUnit out;
+  const JobBrief& brief = job.brief;
+  out.partial.header = {brief.scene, brief.settings_digest, numeric_class_, unit.rect, unit.samples};
+  out.partial.sums.assign(slot.sums, slot.sums + unit.rect.pixels() * kPartialChannels);
+  out.cpu_seconds = reply.cpu_seconds;
+  out.health = {reply.nonfinite, reply.negative, reply.majorant_violations};
+  return {std::move(out), false};
+}
+
+ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
+  const Process::End end = process.end();
+  Slot& slot = process.slot(index);
+  const bool crashed = slot.crashed.load(std::memory_order_relaxed);
+  const int hung = process.hung_slot;
+  const bool known = hung >= 0 || process.some_slot_crashed() || process.preparing;
+  const bool guilty = hung >= 0 ? hung == index : crashed || !known;
+  if (!guilty) return {failed("the renderer died of another unit"), true};
+  UnitFailure failure;
+  if (slot.where.x >= 0) {
+    failure.pixel = {slot.where.x, slot.where.y};
+    failure.sample = slot.where.sample;
+  }
+  failure.signal = end.signal;
+  failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.0f} s",
+                                               seconds(options_.hang_limit))
+                                 : fmt::format("the renderer {}", end.text);
+  if (end.signal == SIGKILL && hung < 0) failure.reason += "; the system may have run out of memory";
+  log_warn(fmt::format("slot={}", index), failure.reason);
+  return {tl::unexpected<UnitFailure>(std::move(failure)), false};
+}
+
+void ChildBackend::forget(const JobId& job) {
+  const std::lock_guard lock(mutex_);
+  const auto it = numbers_.find(job);
+  if (it == numbers_.end()) return;
+  forgotten_.push_back(it->second);
+  numbers_.erase(it);
+}
+
+std::uint64_t ChildBackend::rss_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return process_ ? process_->rss_bytes() : 0;
+}
+
+void ChildBackend::shutdown() {
+  const std::lock_guard lock(mutex_);
+  shut_down_ = true;
+  if (process_) process_->kill();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RenderBackend>> make_child_backend(ChildOptions options) {
+  if (options.slots < 1 || options.slots > child::kMostSlots)
+    return fail(Errc::invalid_argument, fmt::format("--threads must be 1 to {}", child::kMostSlots));
+  auto backend = std::make_unique<ChildBackend>(std::move(options));
+  if (auto ok = backend->start(); !ok) return tl::unexpected<Error>(ok.error());
+  return backend;
+}
+
+}  // namespace ls::worker

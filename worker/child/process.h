@@ -1,0 +1,78 @@
+// One render child, from spawn to its end.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/error.h"
+#include "worker/child/child.h"
+#include "worker/child/protocol.h"
+
+namespace ls::worker::child {
+
+class Process {
+ public:
+  static Result<std::shared_ptr<Process>> spawn(const ChildOptions& options);
+  ~Process();  // kills it
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  struct Answer {
+    Reply reply;
+    std::string text;
+  };
+  // While a request is under way `watch` is called about every 50 ms and may kill(). Nothing: the child died.
+  template <class Watch>
+  std::optional<Answer> ask(int fd, Request request, const std::string& text, Watch watch) {
+    request.text_bytes = static_cast<std::uint32_t>(text.size());
+    if (!send_all(fd, &request, sizeof request) || !send_all(fd, text.data(), text.size())) return std::nullopt;
+    while (!readable(fd)) watch();
+    return receive(fd);
+  }
+
+  void kill();
+  // How it ended, in words and as a signal. Waits for the end, which must be near.
+  struct End {
+    std::optional<int> signal;
+    int exit_code = 0;
+    std::string text;
+  };
+  End end();
+  bool alive();
+  std::uint64_t rss_bytes() const;
+
+  int control_fd() const { return control_; }
+  int slot_fd(int slot) const { return slot_fds_[static_cast<std::size_t>(slot)]; }
+  Slot& slot(int index) { return slots_[index]; }
+  int slots() const { return static_cast<int>(slot_fds_.size()); }
+  bool some_slot_crashed() const;
+
+  std::atomic<int> hung_slot{-1};          // the watchdog killed it for this one
+  std::atomic<bool> preparing{false};      // a world is being built
+  std::mutex prepared_mutex;
+  std::set<std::uint64_t> prepared;        // jobs it knows; guarded by prepared_mutex
+
+ private:
+  Process() = default;
+  static bool readable(int fd);  // waits 50 ms at most
+  std::optional<Answer> receive(int fd);
+  Result<void> start(const ChildOptions& options, const std::vector<int>& theirs);
+
+  pid_t pid_ = -1;
+  int control_ = -1;
+  std::vector<int> slot_fds_;
+  Slot* slots_ = nullptr;
+  std::size_t memory_bytes_ = 0;
+  std::mutex reap_mutex_;
+  std::optional<End> end_;  // guarded by reap_mutex_
+};
+
+}  // namespace ls::worker::child

@@ -1,0 +1,64 @@
+// What agent and render child say to each other: fixed-size frames over a socket pair for each channel, sums and breadcrumbs
+// through one shared memory. Both are the same executable, so plain structs do.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+
+#include "common/base/error.h"
+#include "common/image/frame.h"
+#include "common/image/rounds.h"
+#include "worker/render/render.h"
+
+namespace ls::worker::child {
+
+// File descriptors of the child, set up by posix_spawn. Channel i of the render slots is kFirstSlotFd + i.
+inline constexpr int kSharedMemoryFd = 3;
+inline constexpr int kControlFd = 4;
+inline constexpr int kFirstSlotFd = 5;
+inline constexpr int kMostSlots = 256;
+
+inline constexpr std::size_t kTextBytes = 1 << 20;      // a prepared job as JSON; thousands of assets
+inline constexpr std::size_t kSlotPixels = 202 * 202;   // the largest tile whose partial fits a message
+
+enum class Kind : std::uint32_t { hello, prepare, forget, render };
+
+// Followed by `text_bytes` of text.
+struct Request {
+  Kind kind{};
+  std::uint32_t text_bytes = 0;  // prepare: the job (child/job_text.h)
+  std::uint64_t job = 0;         // the parent's number for it
+  std::uint32_t tile = 0, round = 0;
+  PixelRect rect;
+  SampleRange samples;
+};
+
+enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, stopped };
+
+struct Reply {
+  Outcome outcome{};
+  std::uint32_t text_bytes = 0;  // the reason, when it failed
+  Digest numeric_class;          // hello
+  double cpu_seconds = 0;
+  std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
+};
+static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
+
+// One for each render thread, in the shared memory.
+struct Slot {
+  render::Breadcrumb where;
+  std::atomic<std::int32_t> tile{-1}, round{-1};
+  std::atomic<bool> stop{false};      // set by the parent
+  std::atomic<bool> crashed{false};   // set by the child's signal handler: this thread is the guilty one
+  float sums[kSlotPixels * 6];
+};
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+// Blocking; false at the end of the other side. Frames of up to kTextBytes of text.
+bool send_all(int fd, const void* data, std::size_t bytes);
+bool receive_all(int fd, void* data, std::size_t bytes);
+
+}  // namespace ls::worker::child
