@@ -100,6 +100,11 @@ class Farm {
   std::string why_waiting(const JobId& id) const;
   int threads_connected() const;
 
+  // Looks through everything and says what does not add up: planned = done + leased + queued, what leases,
+  // workers and jobs say of one another, no worker idle while a unit it may take is queued. Empty if all is
+  // well. Slow: for tests and for a rare look in service; only right after handle().
+  std::string audit() const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;

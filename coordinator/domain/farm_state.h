@@ -91,6 +91,8 @@ struct Farm::State {
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered);
   bool assign(Worker& worker);
   bool lease_from(Job& job, Worker& worker);
+  // The next unit of the job for this worker, if it may have one now.
+  std::optional<UnitCode> next_for(Job& job, const Worker& worker);
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
   void copy_overdue(Worker& worker);  // speculation at the tail
 };

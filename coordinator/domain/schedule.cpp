@@ -65,16 +65,21 @@ bool Farm::State::assign(Worker& worker) {
   return false;
 }
 
-bool Farm::State::lease_from(Job& job, Worker& worker) {
+std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   const auto excluded = [&](UnitCode code) {
     return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
   };
+  const auto code = job.queue.front(job.units, excluded);
+  return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
+}
+
+bool Farm::State::lease_from(Job& job, Worker& worker) {
   const LeaseSize size = lease_size(job, worker, workers.threads());
   std::vector<UnitCode> units;
   double cost = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
-    const auto code = job.queue.front(job.units, excluded);
-    if (!code || out_of_time(job, worker, *code, now)) break;
+    const auto code = next_for(job, worker);
+    if (!code) break;
     job.queue.pop(*code);
     units.push_back(*code);
     cost += job.predict(*code);

@@ -1,0 +1,140 @@
+// The three budgets: lost infrastructure, a unit that fails, a worker that fails.
+#include "tests/unit/domain/rig.h"
+
+namespace ls::coordinator {
+namespace {
+
+TEST(Failure, AUnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplay) {
+  Rig rig;
+  for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 1, 2));
+
+  std::vector<Effect> effects;
+  int attempts = 0;
+  std::set<std::string> tried;
+  while (rig.job().state == JobState::running) {
+    for (auto& [id, units] : rig.held) {
+      if (units.empty()) continue;
+      tried.insert(id.value);
+      effects = rig.fail(id.value);
+      ++attempts;
+      break;
+    }
+    ASSERT_LT(attempts, 10);
+  }
+
+  EXPECT_EQ(attempts, 3);
+  EXPECT_EQ(tried.size(), 3u) << "every time on another worker";
+  ASSERT_EQ(of<JobFailed>(effects).size(), 1u);
+  EXPECT_THAT(of<JobFailed>(effects)[0].error,
+              testing::AllOf(testing::HasSubstr("tile 0"), testing::HasSubstr("signal 11"),
+                             testing::HasSubstr("lightshaft render SCENE --pixel 3,4 --sample 5")));
+}
+
+TEST(Failure, ALoneWorkerGetsASecondAttempt) {
+  Rig rig;
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 1, 2));
+
+  rig.fail("a");
+  EXPECT_EQ(rig.job().state, JobState::running);
+  rig.fail("a");
+
+  EXPECT_EQ(rig.job().state, JobState::failed);
+}
+
+TEST(Failure, ASceneAtFaultFailsTheJobAtOnceAndOthersGoOn) {
+  Rig rig;
+  rig.join("a", 1);
+  rig.submit(plan_of("bad", 5, 2));
+  rig.submit(plan_of("good", 5, 2));
+
+  rig.fail("a", true);
+  EXPECT_EQ(rig.job("bad").state, JobState::failed);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job("good").state, JobState::done);
+}
+
+TEST(Failure, LosingWorkersCostsAUnitNothing) {
+  Rig rig;
+  rig.submit(plan_of("j", 1, 2));
+
+  for (int i = 0; i < 20; ++i) {
+    rig.join("a", 1);
+    ASSERT_EQ(rig.held[{"a"}].size(), 1u);
+    rig.lose("a");
+  }
+  rig.join("a", 1);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+// Worker "bad" fails what it gets until it is blocked; "good" renders.
+std::vector<Effect> bad_worker_against(Rig& rig, const std::string& job) {
+  std::vector<Effect> all = rig.submit(plan_of(job, 40, 2));
+  for (int guard = 0; rig.job(job).state != JobState::done && guard < 1000; ++guard) {
+    const char* name = !rig.held[{"bad"}].empty() ? "bad" : "good";
+    for (Effect& e : name[0] == 'b' ? rig.fail(name) : rig.render(name)) all.push_back(std::move(e));
+  }
+  return all;
+}
+
+TEST(Failure, AWorkerThatFailsThreeUnitsGetsNoMoreOfTheJob) {
+  Rig rig;
+  rig.join("bad", 1);
+  rig.join("good", 1);
+
+  const auto effects = bad_worker_against(rig, "j");
+
+  ASSERT_EQ(of<WorkerBlocked>(effects).size(), 1u);
+  EXPECT_EQ(of<WorkerBlocked>(effects)[0].worker.value, "bad");
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::connected) << "one job alone says little";
+}
+
+TEST(Failure, AWorkerThatFailsInTwoJobsIsSickAndForgivenWithTime) {
+  Rig rig;
+  rig.join("bad", 1);
+  rig.join("good", 1);
+  bad_worker_against(rig, "j");
+  bad_worker_against(rig, "k");
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::sick);
+
+  rig.lose("good");
+  rig.submit(plan_of("l", 2, 2));
+  EXPECT_EQ(rig.farm.why_waiting({"l"}), "bad is sick");
+  rig.pass(kForgiveAfter);
+
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::connected);
+  EXPECT_FALSE(rig.held[{"bad"}].empty());
+}
+
+TEST(Failure, CrashingScenesDoNotMakeTheirWorkersSick) {
+  Rig rig;
+  rig.join("a", 4);
+  for (const char* id : {"j", "k", "l"}) {
+    rig.submit(plan_of(id, 20, 2));
+    for (int i = 0; i < 20 && rig.job(id).state == JobState::running; ++i) rig.fail("a");
+    EXPECT_EQ(rig.job(id).state, JobState::failed);
+  }
+
+  EXPECT_EQ(rig.worker("a").state, WorkerState::connected);
+}
+
+TEST(Failure, IsForgottenOnceTheUnitIsRendered) {
+  Rig rig;
+  rig.join("a", 1);
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 1, 2));
+  rig.fail("a");
+
+  ASSERT_EQ(rig.held[{"b"}].size(), 1u) << "retried elsewhere";
+  rig.render("b");
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+}  // namespace
+}  // namespace ls::coordinator

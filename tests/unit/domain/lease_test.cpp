@@ -1,0 +1,316 @@
+// Who gets what, when, and how much of it.
+#include <set>
+
+#include "tests/unit/domain/rig.h"
+
+namespace ls::coordinator {
+namespace {
+
+std::vector<LeaseUnit> units_of(const std::vector<Effect>& effects, const std::string& worker) {
+  std::vector<LeaseUnit> units;
+  for (const auto& [id, message] : sent<AssignLease>(effects)) {
+    if (id.value == worker) units.insert(units.end(), message.lease.units.begin(), message.lease.units.end());
+  }
+  return units;
+}
+
+TEST(Lease, PreviewsComeFirstEveryTileOnceBeforeAnyTwice) {
+  Rig rig;
+  rig.join("w", 2);
+  rig.submit(plan_of("j", 10, 8));
+
+  std::vector<RoundIndex> rounds;
+  while (!rig.held[{"w"}].empty()) {
+    rounds.push_back(rig.held[{"w"}].front().unit.round);
+    rig.render("w");
+  }
+
+  EXPECT_EQ(rounds.size(), 30u);
+  EXPECT_TRUE(std::is_sorted(rounds.begin(), rounds.end()));
+}
+
+TEST(Lease, TheBriefTravelsOnceAStreamAndAgainAfterReconnecting) {
+  Rig rig;
+  rig.join("w", 1);
+  auto leases = sent<AssignLease>(rig.submit(plan_of("j", 50, 8)));
+  ASSERT_GE(leases.size(), 2u);
+  EXPECT_TRUE(leases[0].second.brief.has_value());
+  EXPECT_FALSE(leases[1].second.brief.has_value());
+
+  rig.lose("w");
+  leases = sent<AssignLease>(rig.join("w", 1));
+
+  ASSERT_FALSE(leases.empty());
+  EXPECT_EQ(leases[0].second.brief->job.value, "j");
+}
+
+TEST(Lease, FirstLeasesAreSmallUntilTheCostIsKnown) {
+  Rig rig;
+  rig.join("w", 4);
+
+  for (const auto& [id, message] : sent<AssignLease>(rig.submit(plan_of("j", 10000, 64)))) {
+    EXPECT_LE(message.lease.units.size(), 4u);
+  }
+
+  EXPECT_GE(rig.worker("w").units_out, 8u) << "every thread has a unit and another one waiting";
+}
+
+TEST(Lease, LaterLeasesLastAboutTheTargetTime) {
+  Rig rig;
+  rig.cpu_seconds = 0.1;  // 2 samples of 64 pixels
+  rig.join("w", 4);
+  rig.submit(plan_of("j", 10000, 2));
+
+  const auto leases = sent<AssignLease>(rig.render_all());
+
+  // 2 s on 4 threads at 0.1 s a unit: 80 units, while the rest of the job is much more than that.
+  std::size_t largest = 0;
+  for (const auto& [id, message] : leases) largest = std::max(largest, message.lease.units.size());
+  EXPECT_GE(largest, 80u);
+  EXPECT_LE(largest, 81u) << "a sum of 80 rounded costs may stay a little short of 2 s";
+}
+
+TEST(Lease, NoLeaseExceedsTheLimitHoweverCheapUnitsAre) {
+  Rig rig;
+  rig.cpu_seconds = 0;
+  rig.join("w", 64);
+  rig.submit(plan_of("j", 20000, 2));
+
+  for (const auto& [id, message] : sent<AssignLease>(rig.render_all())) {
+    ASSERT_LE(message.lease.units.size(), kMaxLeaseUnits);
+  }
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Lease, ShrinksAtTheTail) {
+  Rig rig;
+  rig.cpu_seconds = 0.01;
+  rig.join("a", 2);
+  rig.join("b", 2);
+  rig.submit(plan_of("j", 400, 2));
+
+  std::vector<std::size_t> sizes;
+  for (const auto& [id, message] : sent<AssignLease>(rig.render_all()))
+    sizes.push_back(message.lease.units.size());
+
+  EXPECT_GT(*std::max_element(sizes.begin(), sizes.end()), 50u);
+  EXPECT_EQ(sizes.back(), 1u);
+}
+
+TEST(Lease, TwoLeasesWaitBehindTheOneThatIsRendered) {
+  Rig rig;
+  rig.cpu_seconds = 0.5;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 1000, 2));
+
+  for (int i = 0; i < 20; ++i) {
+    rig.render("w");
+    EXPECT_GE(rig.worker("w").leases, kLeasesPerWorker);
+  }
+}
+
+TEST(Lease, SmallWorkIsSpreadOverIdleWorkers) {
+  Rig rig;
+  for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 2);
+
+  rig.submit(plan_of("j", 8, 2));
+
+  for (const char* name : {"a", "b", "c", "d"}) EXPECT_EQ(rig.worker(name).units_out, 2u) << name;
+}
+
+TEST(Lease, HigherPriorityGoesFirstThenOrderOfSubmission) {
+  Rig rig;
+  for (const auto& [id, priority] : {std::pair{"low", 0}, {"high", 5}, {"late", 0}}) {
+    JobPlan plan = plan_of(id, 3, 2);
+    plan.priority = priority;
+    rig.submit(plan);
+  }
+
+  rig.join("w", 1);
+  std::vector<std::string> order;
+  while (!rig.held[{"w"}].empty()) {
+    if (order.empty() || order.back() != rig.held[{"w"}].front().job.value) {
+      order.push_back(rig.held[{"w"}].front().job.value);
+    }
+    rig.render("w");
+  }
+
+  EXPECT_EQ(order, (std::vector<std::string>{"high", "low", "late"}));
+}
+
+TEST(Lease, PriorityMayChangeLater) {
+  Rig rig;
+  rig.submit(plan_of("first", 3, 2));
+  rig.submit(plan_of("second", 3, 2));
+
+  rig.send(JobPriority{{"second"}, 1});
+  rig.join("w", 1);
+
+  EXPECT_EQ(rig.held[{"w"}].front().job.value, "second");
+}
+
+TEST(Lease, AJobIsPinnedToTheNumericClassOfItsFirstLease) {
+  Rig rig;
+  rig.join("a", 1, 1);
+  const auto pinned = of<JobPinned>(rig.submit(plan_of("j", 100, 64)));
+  ASSERT_EQ(pinned.size(), 1u);
+  EXPECT_EQ(pinned[0].numeric_class, digest_number(1));
+
+  EXPECT_TRUE(sent<AssignLease>(rig.join("b", 1, 2)).empty());
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "") << "a may take it";
+  rig.lose("a");
+
+  EXPECT_TRUE(rig.held[{"b"}].empty());
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "b is of another numeric class");
+}
+
+TEST(Lease, TagsOfTheJobMustBeTheWorkers) {
+  Rig rig;
+  JobPlan plan = plan_of("j", 4, 2);
+  plan.tags = {"vdb", "big"};
+  rig.submit(plan);
+
+  rig.join("plain", 1, 1, {"vdb"});
+  EXPECT_EQ(rig.worker("plain").units_out, 0u);
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "plain lacks a tag that the job asks for");
+  rig.join("right", 1, 1, {"x", "big", "vdb"});
+
+  EXPECT_GT(rig.worker("right").units_out, 0u);
+}
+
+TEST(Lease, ADrainingWorkerGetsNoMoreAndItsRestGoesToOthers) {
+  Rig rig;
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 3, 2));
+  rig.send(WorkerDrains{{"a"}});
+  rig.render("a");
+  std::vector<UnitKey> rest;
+  LeaseId lease = rig.held[{"a"}].front().lease;
+  std::vector<LeaseReturned> returned;
+  for (const auto& h : rig.held[{"a"}]) returned.push_back({h.lease, {h.key()}});
+  rig.held.clear();
+  for (const LeaseReturned& r : returned) rig.send(LeaseCameBack{{"a"}, r});
+  EXPECT_EQ(rig.worker("a").units_out, 0u);
+  EXPECT_EQ(rig.worker("a").state, WorkerState::draining);
+
+  rig.join("b", 1);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Lease, AWorkerThatGivesALeaseBackGetsNoneBeforeTheNextTick) {
+  Rig rig;
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 1, 2));
+  const Rig::Held unit = rig.take("a");
+
+  EXPECT_TRUE(sent<AssignLease>(rig.send(LeaseCameBack{{"a"}, {unit.lease, {unit.key()}}})).empty());
+  EXPECT_EQ(rig.job().units_queued, 1u);
+
+  EXPECT_EQ(units_of(rig.pass(1s), "a").size(), 1u);
+}
+
+TEST(Lease, ALostWorkersUnitsGoToOthersForFree) {
+  Rig rig;
+  rig.join("a", 2);
+  rig.submit(plan_of("j", 4, 2));
+  rig.join("b", 2);
+
+  const auto effects = rig.lose("a");
+  std::set<TileIndex> tiles;
+  for (const LeaseUnit& u : units_of(effects, "b")) tiles.insert(u.tile);
+  std::size_t freed = 0;
+  for (const auto& f : of<UnitsFreed>(effects)) freed += f.units.size();
+
+  EXPECT_EQ(freed, 4u);
+  EXPECT_EQ(tiles.size(), 4u);
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Lease, AStaleStreamsEndMeansNothing) {
+  Rig rig;
+  rig.join("a", 1);  // epoch 1
+  rig.join("a", 1);  // epoch 2: replaces the first
+  rig.submit(plan_of("j", 4, 2));
+
+  rig.send(WorkerLost{{"a"}, 1});
+
+  EXPECT_EQ(rig.worker("a").state, WorkerState::connected);
+  EXPECT_GT(rig.worker("a").units_out, 0u);
+}
+
+TEST(Deadline, ExpiredUnitsAreRenderedByOthersAndTheLateResultStillCounts) {
+  Rig rig;
+  rig.join("slow", 1);
+  rig.submit(plan_of("j", 1, 2));
+  const Rig::Held unit = rig.take("slow");
+  rig.pass(kDeadlineSlack + kLoadSlack);
+  EXPECT_EQ(rig.job().units_queued, 1u);
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "slow does not answer");
+  rig.join("fresh", 1);
+  ASSERT_EQ(rig.held[{"fresh"}].size(), 1u);
+
+  const auto late = rig.result("slow", unit);
+
+  EXPECT_EQ(of<RecordUnit>(late).size(), 1u);
+  EXPECT_EQ(sent<CancelLease>(late).size(), 1u) << "the other copy is called off";
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Deadline, ProgressRenewsItButNotForever) {
+  Rig rig;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 1, 2));
+  const LeaseId lease = rig.held[{"w"}].front().lease;
+
+  Duration waited{};
+  for (; rig.job().units_leased == 1 && waited < 2 * kNoGrowthLimit; waited += 1s) {
+    rig.send(LeaseProgress{{"w"}, {{lease, 0}}});
+    rig.pass(1s);
+  }
+
+  EXPECT_GE(waited, kNoGrowthLimit);
+  EXPECT_LE(waited, kNoGrowthLimit + kDeadlineSlack + kLoadSlack + 1s);
+}
+
+TEST(Deadline, FollowsTheMeasuredCost) {
+  Rig rig;
+  rig.cpu_seconds = 20;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 3, 2));
+  rig.render("w");
+  rig.cpu_seconds = 20;
+  rig.join("v", 1);
+  rig.submit(plan_of("k", 2, 2));
+
+  // Leases of unknown cost have the slack; those made now know that a unit lasts 20 s.
+  rig.send(LeaseProgress{{"w"}, {{rig.held[{"w"}].front().lease, 0}}});
+  rig.pass(kDeadlineSlack + from_seconds(kDeadlineFactor * 20) - 1s);
+
+  EXPECT_GT(rig.worker("w").units_out, 0u);
+}
+
+TEST(Speculation, AnIdleWorkerCopiesOverdueUnitsOnce) {
+  Rig rig;
+  rig.join("slow", 1);
+  rig.submit(plan_of("j", 1, 2));
+  rig.join("idle", 1);
+  rig.join("idle2", 1);
+  EXPECT_TRUE(rig.held[{"idle"}].empty()) << "not overdue yet";
+
+  rig.pass(kSpeculateSlack);
+  const std::size_t copies = rig.held[{"idle"}].size() + rig.held[{"idle2"}].size();
+  EXPECT_EQ(copies, 1u);
+  rig.pass(1s);
+  EXPECT_EQ(rig.held[{"idle"}].size() + rig.held[{"idle2"}].size(), 1u) << "at most one extra copy";
+
+  const auto done = rig.render(rig.held[{"idle"}].empty() ? "idle2" : "idle");
+  EXPECT_EQ(sent<CancelLease>(done).size(), 1u);
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.worker("slow").units_out, 0u);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
