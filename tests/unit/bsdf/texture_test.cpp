@@ -1,0 +1,174 @@
+#include "worker/render/texture/texture.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "worker/render/texture/texels.h"
+
+namespace ls::render {
+namespace {
+
+using testing::HasSubstr;
+
+// Texel (x, y) is (x, y, 1), y counted from the top.
+ImageData ramp() {
+  ImageData image{4, 4, 3, {}, {}, false};
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) image.f32.insert(image.f32.end(), {float(x), float(y), 1.f});
+  return image;
+}
+
+TextureTable table(const Scene& scene, ImageData image) {
+  auto t = TextureTable::build(scene, [&](const Asset&) { return Result<ImageData>(image); });
+  EXPECT_TRUE(t.has_value()) << t.error().message;
+  return std::move(*t);
+}
+std::string build_error(const Scene& scene, ImageData image = ramp()) {
+  auto t = TextureTable::build(scene, [&](const Asset&) { return Result<ImageData>(image); });
+  return t ? "" : t.error().message;
+}
+
+Scene with(const Texture& t) {
+  Scene s;
+  s.assets.push_back({"wood.png", {}, 1});
+  s.textures.push_back(t);
+  return s;
+}
+
+// The values of Mitsuba 3.9.1 for the same image and coordinates.
+const V2 kUv[] = {{.1f, .1f}, {.9f, .1f}, {.125f, .125f}, {0, 0}, {1, 1}, {1.3f, -.4f}, {-.2f, 2.6f}};
+
+struct Expected {
+  TextureFilter filter;
+  Wrap wrap;
+  V2 value[7];
+};
+const Expected kExpected[] = {
+    {TextureFilter::nearest, Wrap::repeat, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {0, 0}, {1, 2}, {3, 2}}},
+    {TextureFilter::nearest, Wrap::mirror, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2, 1}, {0, 2}}},
+    {TextureFilter::nearest, Wrap::clamp, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {3, 0}, {0, 3}}},
+    {TextureFilter::bilinear, Wrap::repeat, {{.3f, .3f}, {2.7f, .3f}, {0, 0}, {1.5f, 1.5f}, {1.5f, 1.5f}, {.7f, 1.9f}, {2.7f, 1.9f}}},
+    {TextureFilter::bilinear, Wrap::mirror, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2.3f, 1.1f}, {.3f, 1.9f}}},
+    {TextureFilter::bilinear, Wrap::clamp, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {3, 0}, {0, 3}}}};
+
+// Coordinates are scaled by 4: float32 leaves 4 x 2.6 x 2^-24 of them, times a slope of 3 over the repeated edge.
+constexpr float kUvError = 4e-6f;
+
+TEST(Bitmap, FiltersAndWrapsAsMitsubaDoes) {
+  for (const Expected& e : kExpected) {
+    const TextureTable t = table(with(BitmapTexture{{0}, e.filter, e.wrap, true, {}}), ramp());
+    for (int i = 0; i < 7; ++i) {
+      const C3 c = t.eval({0}, kUv[i]);
+      EXPECT_NEAR(c.x, e.value[i].x, kUvError) << i;
+      EXPECT_NEAR(c.y, e.value[i].y, kUvError) << i;
+      EXPECT_EQ(c.z, 1);
+    }
+  }
+}
+
+UvTransform turned() {  // translate(.25, .1) rotate(30) scale(2, 3)
+  UvTransform t;
+  t.m = {std::sqrt(3.), -1.5, .25, 1, 1.5 * std::sqrt(3.), .1, 0, 0, 1};
+  return t;
+}
+
+TEST(Bitmap, TransformsCoordinatesAsMitsubaDoes) {
+  const TextureTable t = table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, turned()}), ramp());
+  const V2 expected[] = {{.59282f, 1.33923f}, {2.13538f, .53923f}, {.61603f, 1.69904f}, {.5f, .3f},
+                         {1.4282f, 2.2923f},  {.28001f, .94308f},  {1.45692f, 2.11999f}};
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_NEAR(t.eval({0}, kUv[i]).x, expected[i].x, 5e-5f) << i;  // printed to five digits, arguments up to 7
+    EXPECT_NEAR(t.eval({0}, kUv[i]).y, expected[i].y, 5e-5f) << i;
+  }
+}
+
+TEST(Bitmap, IsSafeForAnyCoordinate) {
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+  for (const auto wrap : {Wrap::repeat, Wrap::mirror, Wrap::clamp})
+    for (const auto filter : {TextureFilter::nearest, TextureFilter::bilinear}) {
+      const TextureTable t = table(with(BitmapTexture{{0}, filter, wrap, true, {}}), ramp());
+      for (const float u : {1e9f, -1e9f, 1e38f, -1e38f, inf, -inf, nan, -1e-9f, 0x1.fffffep-1f, 1e-45f})
+        for (const float v : {.5f, u}) {
+          const C3 c = t.eval({0}, {u, v});
+          EXPECT_TRUE(c.x >= 0 && c.x <= 3 && c.y >= 0 && c.y <= 3) << u << " " << v;
+        }
+    }
+}
+
+TEST(Bitmap, DecodesSrgbBeforeFilteringUnlessRaw) {
+  const ImageData image{2, 1, 1, {0, 255}, {}, true};
+  const TextureTable cooked = table(with(BitmapTexture{{0}}), image);
+  const TextureTable raw = table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, {}}), {2, 1, 1, {0, 128}, {}, true});
+
+  EXPECT_EQ(cooked.eval({0}, {.25f, .5f}), C3(0));
+  EXPECT_EQ(cooked.eval({0}, {.75f, .5f}), C3(1));
+  EXPECT_EQ(cooked.eval({0}, {.5f, .5f}), C3(.5f));  // filtered codes would give .2140
+  EXPECT_EQ(raw.eval({0}, {.75f, .5f}), C3(128.f / 255));
+}
+
+TEST(Bitmap, SrgbIsContinuousAndExactAtItsEnds) {
+  EXPECT_EQ(srgb_to_linear(0), 0);
+  EXPECT_EQ(srgb_to_linear(1), 1);
+  // The standard's rounded constants leave a gap of 3e-8 between the pieces.
+  EXPECT_NEAR(srgb_to_linear(.04045), srgb_to_linear(std::nextafter(.04045, 1)), 1e-7);
+  EXPECT_NEAR(srgb_to_linear(.04045), .0031308, 5e-8);
+}
+
+TEST(Bitmap, RefusesTexelsThatAreNotFiniteAndCountsNegativeOnes) {
+  ImageData image = ramp();
+  image.f32[3 * (4 * 2 + 1)] = std::nanf("");
+  EXPECT_THAT(build_error(with(BitmapTexture{{0}}), image), HasSubstr("'wood.png': the texel at x 1, y 2"));
+  image.f32[3 * (4 * 2 + 1)] = -1;
+  const TextureTable t = table(with(BitmapTexture{{0}, TextureFilter::nearest}), image);
+  EXPECT_EQ(t.clamped_texels(), 1u);
+  EXPECT_EQ(t.eval({0}, {.3f, .6f}).x, 0);
+}
+
+TEST(Bitmap, RefusesAnImageWithoutPixels) {
+  EXPECT_THAT(build_error(with(BitmapTexture{{0}}), {0, 0, 3, {}, {}, false}), HasSubstr("no pixels"));
+}
+
+TEST(Bitmap, LoadsAFileOnceHoweverManyTexturesUseIt) {
+  Scene s = with(BitmapTexture{{0}});
+  s.textures.push_back(BitmapTexture{{0}, TextureFilter::nearest});
+  int loads = 0;
+  const auto t = TextureTable::build(s, [&](const Asset&) { return ++loads, Result<ImageData>(ramp()); });
+
+  ASSERT_TRUE(t);
+  EXPECT_EQ(loads, 1);
+  EXPECT_EQ(t->bytes(), 4u * 4 * 3 * sizeof(float));
+}
+
+TEST(Checkerboard, ChoosesAsMitsubaDoes) {
+  const auto board = [](const UvTransform& to_uv) {
+    Scene s;
+    s.textures = {ConstantTexture{{0, 0, 0}}, ConstantTexture{{1, 1, 1}}, CheckerboardTexture{{0}, {1}, to_uv}};
+    return table(s, ramp());
+  };
+  const V2 more[] = {{.5f, .2f}, {.5f, .5f}, {.25f, .1f}, {.50001f, .2f}};
+  const auto expect = [&](const UvTransform& to_uv, const std::vector<int>& values) {
+    const TextureTable t = board(to_uv);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      EXPECT_EQ(t.eval({2}, i < 7 ? kUv[i] : more[i - 7]).x, static_cast<float>(values[i])) << i;
+    EXPECT_EQ(t.mean({2}), C3(.5f));
+    EXPECT_FALSE(t.is_constant({2}));
+  };
+
+  expect({}, {0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+  expect({{2, 0, 0, 0, 2, 0, 0, 0, 1}}, {0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0});
+  expect(turned(), {0, 1, 1, 0, 1, 0, 1, 1, 1, 0, 1});
+}
+
+TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
+  Scene s;
+  s.textures = {CheckerboardTexture{{1}, {1}, {}}, CheckerboardTexture{{0}, {0}, {}}};
+  EXPECT_THAT(build_error(s), HasSubstr("circle"));
+  s.textures = {CheckerboardTexture{{0}, {7}, {}}};
+  EXPECT_THAT(build_error(s), HasSubstr("does not exist"));
+  EXPECT_THAT(build_error(with(BitmapTexture{{3}})), HasSubstr("file 3 of 1"));
+}
+
+}  // namespace
+}  // namespace ls::render
