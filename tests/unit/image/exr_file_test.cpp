@@ -1,0 +1,207 @@
+#include "common/image/exr_file.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
+#include <ImfTiledOutputFile.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/image/exr_memory.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 37, kHeight = 70;  // more than one band of the reader, and odd
+
+// Exact in half: small multiples of 1/8.
+float value(int x, int y, int c) { return static_cast<float>((x * 3 + y * 5 + c * 7) % 64) / 8; }
+
+std::vector<float> plane(int c) {
+  std::vector<float> out;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) out.push_back(value(x, y, c));
+  return out;
+}
+
+void expect_rgb(const Result<RgbImage>& image, bool grey = false) {
+  ASSERT_TRUE(image) << image.error().message;
+  ASSERT_EQ(image->size, (FrameSize{kWidth, kHeight}));
+  for (int y = 0, i = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c, ++i)
+        ASSERT_EQ(image->rgb[static_cast<std::size_t>(i)], value(x, y, grey ? 0 : c))
+            << x << " " << y << " " << c;
+}
+
+// A foreign file: any window, compression, channels; tiled or not.
+struct Foreign {
+  int x0 = 0, y0 = 0;
+  Imf::Compression compression = Imf::ZIP_COMPRESSION;
+  Imf::PixelType type = Imf::FLOAT;
+  std::vector<std::string> channels = {"R", "G", "B"};
+  bool tiled = false;
+};
+
+std::vector<std::byte> write(const Foreign& f) {
+  exr::MemoryWriter out;
+  const Imath::Box2i window({f.x0, f.y0}, {f.x0 + kWidth - 1, f.y0 + kHeight - 1});
+  Imf::Header header(window, window, 1, {0, 0}, 1, Imf::INCREASING_Y, f.compression);
+  if (f.tiled) header.setTileDescription(Imf::TileDescription(16, 16, Imf::ONE_LEVEL));
+  Imf::FrameBuffer buffer;
+  std::vector<std::vector<float>> floats;
+  std::vector<std::vector<half>> halves;
+  floats.reserve(8), halves.reserve(8);
+  for (std::size_t c = 0; c < f.channels.size(); ++c) {
+    floats.push_back(plane(static_cast<int>(c)));
+    halves.emplace_back(floats.back().begin(), floats.back().end());
+    const void* data =
+        f.type == Imf::HALF ? static_cast<const void*>(halves.back().data()) : floats.back().data();
+    header.channels().insert(f.channels[c], Imf::Channel(f.type));
+    buffer.insert(f.channels[c], Imf::Slice::Make(f.type, data, window.min, kWidth, kHeight));
+  }
+  if (f.tiled) {
+    Imf::TiledOutputFile file(out, header, 0);
+    file.setFrameBuffer(buffer);
+    file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+  } else {
+    Imf::OutputFile file(out, header, 0);
+    file.setFrameBuffer(buffer);
+    file.writePixels(kHeight);
+  }
+  return out.take();
+}
+
+TEST(ExrRead, UnderstandsEveryCompressionTypeAndLayout) {
+  for (const auto compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
+                                 Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION})  // the lossless ones
+    for (const auto type : {Imf::HALF, Imf::FLOAT})
+      for (const bool tiled : {false, true})
+        expect_rgb(
+            read_exr_rgb(write({.compression = compression, .type = type, .tiled = tiled}), "foreign"));
+}
+
+TEST(ExrRead, TakesTheDataWindowWhereverItLies) {
+  expect_rgb(read_exr_rgb(write({.x0 = -5, .y0 = 1000}), "shifted"));
+  expect_rgb(read_exr_rgb(write({.x0 = 2'000'000, .y0 = -2'000'000, .tiled = true}), "far away"));
+}
+
+TEST(ExrRead, TakesGreyAndIgnoresOtherChannels) {
+  expect_rgb(read_exr_rgb(write({.channels = {"Y"}}), "grey"), true);
+  expect_rgb(read_exr_rgb(write({.channels = {"R", "G", "B", "A", "Z"}}), "more"));
+}
+
+TEST(ExrRead, TakesTheFirstPartWithColour) {
+  exr::MemoryWriter out;
+  {
+    std::vector<Imf::Header> headers(2, Imf::Header(kWidth, kHeight));
+    headers[0].setName("depth"), headers[1].setName("beauty");
+    for (auto& h : headers) h.setType(Imf::SCANLINEIMAGE);
+    headers[0].channels().insert("Z", Imf::Channel(Imf::FLOAT));
+    for (const char* c : {"R", "G", "B"}) headers[1].channels().insert(c, Imf::Channel(Imf::FLOAT));
+    Imf::MultiPartOutputFile file(out, headers.data(), 2, false, 0);
+    const std::vector<float> planes[3] = {plane(0), plane(1), plane(2)};
+    Imf::FrameBuffer depth, beauty;
+    depth.insert("Z", Imf::Slice::Make(Imf::FLOAT, planes[0].data(), {0, 0}, kWidth, kHeight));
+    const char* names[3] = {"R", "G", "B"};
+    for (int c = 0; c < 3; ++c)
+      beauty.insert(names[c], Imf::Slice::Make(Imf::FLOAT, planes[c].data(), {0, 0}, kWidth, kHeight));
+    Imf::OutputPart first(file, 0), second(file, 1);
+    first.setFrameBuffer(depth), second.setFrameBuffer(beauty);
+    first.writePixels(kHeight), second.writePixels(kHeight);
+  }
+  expect_rgb(read_exr_rgb(out.take(), "parts"));
+}
+
+TEST(ExrRead, RefusesWhatItDoesNotUnderstandNamingTheFile) {
+  const auto refusal = [](const Foreign& f) {
+    const auto got = read_exr_rgb(write(f), "sky.exr");
+    return got ? "accepted" : got.error().message;
+  };
+  EXPECT_THAT(refusal({.channels = {"X", "G", "B"}}), HasSubstr("sky.exr: no flat part"));
+  EXPECT_THAT(refusal({.channels = {"Y", "RY", "BY"}}), HasSubstr("no flat part"));
+  EXPECT_THAT(read_exr_rgb(std::vector<std::byte>(1000), "sky.exr").error().message,
+              HasSubstr("sky.exr: cannot read"));
+  EXPECT_FALSE(read_exr_rgb(std::vector<std::byte>{}, "sky.exr"));
+}
+
+TEST(ExrRead, KeepsItsLimits) {
+  const auto exr = write({});
+
+  EXPECT_THAT(read_exr_rgb(exr, "a", {.max_bytes = 100}).error().message, HasSubstr("limit"));
+  EXPECT_THAT(read_exr_rgb(exr, "a", {.max_pixels = 1000}).error().message, HasSubstr("37 x 70"));
+  EXPECT_EQ(read_exr_rgb(exr, "a", {.max_side = 69}).error().code, Errc::resource_exhausted);
+  EXPECT_TRUE(
+      read_exr_rgb(exr, "a", {.max_bytes = exr.size(), .max_pixels = kWidth * kHeight, .max_side = 70}));
+}
+
+TEST(ExrRead, SurvivesEveryTruncation) {
+  for (const bool tiled : {false, true}) {
+    const auto exr = write({.type = Imf::HALF, .tiled = tiled});
+    for (std::size_t n = 0; n < exr.size(); n += 3)
+      ASSERT_FALSE(read_exr_rgb(std::span(exr).first(n), "cut")) << n;
+  }
+}
+
+// Every byte of header and tables, three ways. It may be read or refused, but never crash (run under ASan,
+// too).
+TEST(ExrRead, SurvivesDamage) {
+  for (const bool tiled : {false, true}) {
+    const auto good = write({.type = Imf::HALF, .tiled = tiled});
+    std::size_t refused = 0;
+    for (std::size_t i = 0; i < std::min<std::size_t>(good.size(), 800); ++i)
+      for (const int flip : {0x01, 0x80, 0xff}) {
+        auto exr = good;
+        exr[i] ^= static_cast<std::byte>(flip);
+        const auto got =
+            read_exr_rgb(exr, "damaged", {.max_bytes = 1 << 20, .max_pixels = 1 << 20, .max_side = 4096});
+        refused += !got;
+      }
+    EXPECT_GT(refused, 500u);
+  }
+}
+
+TEST(ExrRead, ReadsFilesAndNamesMissingOnes) {
+  const auto path = std::filesystem::path(::testing::TempDir()) / "lightshaft_exr_file_test.exr";
+  const auto exr = write({});
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(exr.data()), static_cast<std::streamsize>(exr.size()));
+
+  expect_rgb(read_exr_rgb(path));
+  std::filesystem::remove(path);
+
+  EXPECT_EQ(read_exr_rgb(path).error().code, Errc::not_found);
+  EXPECT_FALSE(read_exr_rgb(std::filesystem::path(::testing::TempDir())));
+}
+
+TEST(ExrWrite, WritesHalfFloatAndIntegerChannels) {
+  ExrPicture picture{{kWidth, kHeight}, {}, {{"lightshaft:test", "hello"}}};
+  const char* names[3] = {"R", "G", "B"};
+  for (int c = 0; c < 3; ++c) picture.channels[names[c]] = ExrHalf{plane(c)};
+  picture.channels["depth.Z"] = ExrFloat{plane(1)};
+  picture.channels["spp"] = ExrUint{std::vector<std::uint32_t>(kWidth * kHeight, 2049)};
+
+  const auto exr = write_exr(picture);
+
+  ASSERT_TRUE(exr) << exr.error().message;
+  expect_rgb(read_exr_rgb(*exr, "own"));
+  EXPECT_EQ(*exr, *write_exr(picture));
+}
+
+TEST(ExrWrite, RefusesPlanesOfTheWrongSize) {
+  ExrPicture picture{{4, 4}, {{"R", ExrFloat{std::vector<float>(15)}}}, {}};
+  EXPECT_THAT(write_exr(picture).error().message, HasSubstr("channel R"));
+  EXPECT_FALSE(write_exr({{0, 4}, {}, {}}));
+}
+
+}  // namespace
+}  // namespace ls
