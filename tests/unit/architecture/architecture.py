@@ -1,0 +1,266 @@
+"""The rules of the tree, as data and pure functions: {path: text} -> violations in words.
+
+Who may include whom, one door per library, and a few habits that review forgets. Every exception stands here with its
+reason; an exception that is no longer needed is a violation too.
+"""
+import dataclasses
+import pathlib
+import re
+
+CODE = (".h", ".cpp")
+CHECKED = (".h", ".cpp", ".proto", ".cmake", ".py", ".js", ".css", ".html", ".sh")
+FOLDERS = ("common", "proto", "worker", "coordinator", "cli", "web", "cmake", "deploy", "scenes", "tests")
+
+# ---- who may include whom ----
+# The longest prefix that fits a file names its area; an area may include itself, and the areas (or single files) listed.
+# "worker/*" are all areas under worker.
+COORDINATOR_BASE = ["common", "coordinator/domain", "coordinator/limits.h", "coordinator/service.h"]
+AREAS = {
+    "common": [],
+    "proto": ["common"],
+    "worker/render": ["common"],
+    "worker": ["common", "worker/*"],
+    "worker/client": ["common", "worker", "proto"],
+    "coordinator/domain": ["common"],
+    "coordinator/limits.h": ["common"],
+    "coordinator/service.h": ["common", "coordinator/domain"],
+    "coordinator/store": COORDINATOR_BASE,
+    "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store"],  # it folds partials out of the store's log
+    "coordinator/rpc": COORDINATOR_BASE + ["proto"],
+    "coordinator/http": COORDINATOR_BASE + ["coordinator/views.h"],
+    # What stands in coordinator/ itself wires domain, store and assembler into the service; it knows no network.
+    "coordinator": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble"],
+    "coordinator/main.cpp": ["common", "coordinator/*"],
+    # `lightshaft render` is coordinator and worker in one process.
+    "cli": ["common", "worker/*", "coordinator/*"],
+}
+# Made by the build.
+GENERATED = re.compile(r"^proto/\w+(\.grpc)?\.pb\.h$")
+
+
+@dataclasses.dataclass(frozen=True)
+class Door:
+    library: str
+    headers: str  # regular expression of what is included
+    files: str  # regular expression of the paths that may include it
+    why: str
+
+
+EVERYWHERE = r"^(common|worker|coordinator|cli)/"
+
+DOORS = [
+    Door("Embree", r"^embree\d?/", r"^worker/render/accel\.(h|cpp)$", "one file pair of the renderer"),
+    Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a module that is loaded on demand"),
+    Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr\w*\.(h|cpp)$", "common/image/exr*"),
+    Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
+    Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
+    Door("Boost", r"^boost/", r"^coordinator/http/", "the HTTP server"),
+    Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
+    Door("hiredis", r"^hiredis/", r"^$", "nowhere yet"),
+    Door("pugixml", r"^pugixml\.hpp$", r"^common/scene/", "the scene reader"),
+    Door("spdlog", r"^spdlog/", r"^common/base/log\.cpp$", "the log"),
+    Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/preview)\.cpp$", "its decoder, and the preview"),
+    Door("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^common/assets/jpeg_\w+\.cpp$", "its decoder"),
+    Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
+    Door("OpenSSL", r"^openssl/", r"^(common/base/digest|coordinator/http/(auth|token_file))\.cpp$", "digests and tokens"),
+    Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
+    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$", "the executables"),
+    Door("libcurl", r"^curl/", r"^cli/", "the command line's client"),
+    Door("nlohmann-json", r"^nlohmann/", EVERYWHERE, "our own code"),
+]
+# In tests a library may be needed as an oracle or to make broken files; doors bind the product.
+
+MAX_LINES = 400
+LONG_FILES = {}  # path: reason
+
+CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/bench/")
+CLOCK_EXCEPTIONS = {
+    "coordinator/http/auth.cpp": "a session's end is a wall-clock date inside the cookie; the function is injected",
+    "coordinator/http/body_reader.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/http/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/http/socket_io.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/rpc/server.cpp": "gRPC's Shutdown takes a point in time",
+    "worker/fake/fake.cpp": "plays a slow renderer",
+}
+
+EXIT_CALLERS = re.compile(r"(^|/)main\.cpp$|^common/base/check\.cpp$")
+EXIT_EXCEPTIONS = {
+    "worker/child/serve.cpp": "the render child when its agent is gone, with threads deep in a sample",
+}
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.M)
+NOW = re.compile(r"::now\s*\(\s*\)")
+SLEEP = re.compile(r"\bsleep_(for|until)\b|(?<![\w.])(u|nano)?sleep\s*\(|\b(time|asyncio)\.sleep\b")
+SHELL_SLEEP = re.compile(r"^\s*sleep\s|[;&|]\s*sleep\s", re.M)
+EXIT = re.compile(r"(?<![\w.>:~])(?:std::|::)?(?:_exit|_Exit|exit|abort|quick_exit|terminate)\s*\(")
+UNFINISHED = re.compile(r"\b(" + "|".join(["TO" "DO", "FIX" "ME", "X" "XX"]) + r")\b")
+COMMENT_OR_TEXT = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'|//[^\n]*|/\*.*?\*/', re.S)
+
+
+def read_tree(root):
+    """All files that the rules look at."""
+    root = pathlib.Path(root)
+    paths = [path for folder in FOLDERS if (root / folder).is_dir() for path in (root / folder).rglob("*")]
+    return {path.relative_to(root).as_posix(): path.read_text(encoding="utf-8", errors="replace")
+            for path in paths if path.is_file() and (path.suffix in CHECKED or path.name == "CMakeLists.txt")}
+
+
+def without_comments(text):
+    return COMMENT_OR_TEXT.sub(lambda match: " " if match[0].startswith("/") else match[0], text)
+
+
+def without_texts(text):
+    return COMMENT_OR_TEXT.sub(lambda match: " " if match[0].startswith("/") else '""', text)
+
+
+def includes(text):
+    """[(name, quoted)]"""
+    return [(name, mark == '"') for mark, name in INCLUDE.findall(without_comments(text))]
+
+
+def code(tree):
+    return {path: text for path, text in tree.items() if path.endswith(CODE)}
+
+
+def product(tree):
+    return {path: text for path, text in code(tree).items() if not path.startswith("tests/")}
+
+
+def within(path, prefix):
+    return path == prefix or path.startswith(prefix + "/")
+
+
+def folder(path):
+    return path.rpartition("/")[0]
+
+
+def door_of(name):
+    return next((door for door in DOORS if re.search(door.headers, name)), None)
+
+
+def area_of(path):
+    fitting = [area for area in AREAS if within(path, area)]
+    return max(fitting, key=len, default=None)
+
+
+# ---- rules ----
+
+def layering(tree):
+    for path, text in product(tree).items():
+        area = area_of(path)
+        for name, quoted in includes(text):
+            target = area_of(name) if quoted else None
+            if target is None or target == area:
+                continue
+            allowed = AREAS.get(area, [])
+            if not any(entry in (target, name) or entry.endswith("/*") and within(name, entry[:-2]) for entry in allowed):
+                yield f"{path} includes {name}: {area} may include only {', '.join([area, *allowed])}"
+
+
+def quoted_includes_exist(tree):
+    for path, text in code(tree).items():
+        for name, quoted in includes(text):
+            if quoted and name not in tree and not GENERATED.match(name) and not name.endswith(".inc"):
+                yield f'{path} includes "{name}", which is no file seen from the root'
+
+
+def include_cycles(tree):
+    graph = {path: [name for name, quoted in includes(text) if quoted and name in tree] for path, text in code(tree).items()}
+    done, cycles = set(), []
+
+    def visit(path, trail):
+        if path in trail:
+            cycles.append(" -> ".join(trail[trail.index(path):] + [path]))
+        elif path not in done:
+            for name in graph.get(path, []):
+                visit(name, trail + [path])
+            done.add(path)
+
+    for path in graph:
+        visit(path, [])
+    yield from (f"headers include each other: {cycle}" for cycle in cycles)
+
+
+def doors(tree):
+    for path, text in product(tree).items():
+        for name, _ in includes(text):
+            for door in DOORS:
+                if re.search(door.headers, name) and not re.search(door.files, path):
+                    yield f"{path} includes {name}: {door.library}'s one door is {door.why}"
+
+
+def library_types_stay_behind_their_doors(tree):
+    """A header that lets a library in is private: only .cpp files of its own folder see it, or of the library's door."""
+    files = product(tree)
+    names = {path: [name for name, _ in includes(text)] for path, text in files.items()}
+    heavy = {}  # header -> the door whose library it shows, itself or through another
+    while True:
+        found = {path: door for path in names if path.endswith(".h") and path not in heavy
+                 for name in names[path] for door in [heavy.get(name) or door_of(name)] if door}
+        if not found:
+            break
+        heavy.update(found)
+    for path, name in ((path, name) for path in names for name in names[path] if name in heavy):
+        door = heavy[name]
+        at_home = folder(path) == folder(name) or (door.files != EVERYWHERE and re.search(door.files, path))
+        if not at_home:
+            yield f"{path} includes {name}, which brings {door.library} along"
+
+
+def headers_are_guarded(tree):
+    for path, text in code(tree).items():
+        if path.endswith(".h") and "#pragma once" not in text:
+            yield f"{path} has no #pragma once"
+
+
+def short_files(tree):
+    for path, text in tree.items():
+        lines = text.count("\n")
+        if lines > MAX_LINES and path not in LONG_FILES:
+            yield f"{path} has {lines} lines; split it by subject at {MAX_LINES}, or list it with a reason"
+        if path in LONG_FILES and lines <= MAX_LINES:
+            yield f"{path} is short enough now: take it off the list of long files"
+
+
+def nothing_unfinished(tree):
+    for path, text in tree.items():
+        for match in UNFINISHED.finditer(text):
+            yield f"{path}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}: finish it, or open an issue"
+
+
+def clock_is_injected(tree):
+    for path, text in code(tree).items():
+        reads = NOW.search(without_texts(text)) is not None
+        if reads and not CLOCK_READERS.search(path) and path not in CLOCK_EXCEPTIONS:
+            yield f"{path} reads a clock; take a Clock or a time point instead"
+        if path in CLOCK_EXCEPTIONS and not reads:
+            yield f"{path} reads no clock any more: take it off the exceptions"
+
+
+def tests_do_not_sleep(tree):
+    for path, text in tree.items():
+        if not path.startswith("tests/"):
+            continue
+        pattern = SHELL_SLEEP if path.endswith(".sh") else SLEEP
+        seen = without_texts(text) if path.endswith(CODE) else re.sub(r"#[^\n]*", "", text) if path.endswith(".py") else text
+        if not path.startswith("tests/unit/architecture/") and pattern.search(seen):
+            yield f"{path} sleeps; wait for what it waits for"
+
+
+def nobody_exits(tree):
+    for path, text in product(tree).items():
+        ends = EXIT.search(without_texts(text)) is not None
+        if ends and not EXIT_CALLERS.search(path) and path not in EXIT_EXCEPTIONS:
+            yield f"{path} ends the process; return an Error, or CHECK for a bug"
+        if path in EXIT_EXCEPTIONS and not ends:
+            yield f"{path} ends no process any more: take it off the exceptions"
+
+
+def exceptions_are_files(tree):
+    for path in [*LONG_FILES, *CLOCK_EXCEPTIONS, *EXIT_EXCEPTIONS]:
+        if path not in tree:
+            yield f"the exception for {path} is for a file that is not there"
+
+
+RULES = [layering, quoted_includes_exist, include_cycles, doors, library_types_stay_behind_their_doors, headers_are_guarded,
+         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, nobody_exits, exceptions_are_files]

@@ -1,0 +1,139 @@
+"""The tree keeps its rules (architecture.py), every rule catches what it is for, and the binaries link what they should.
+
+Run by ctest, or by hand: python3 tests/unit/architecture/architecture_test.py [folder of the executables]
+"""
+import pathlib
+import subprocess
+import sys
+import unittest
+
+import architecture
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+BIN = None  # folder of the built executables
+
+HEADER = "#pragma once\n"
+
+
+class Tree(unittest.TestCase):
+    def test_keeps_every_rule(self):
+        tree = architecture.read_tree(ROOT)
+        self.assertGreater(len(tree), 100, f"this is not the tree: {ROOT}")
+        for rule in architecture.RULES:
+            with self.subTest(rule=rule.__name__):
+                violations = sorted(set(rule(tree)))
+                self.assertEqual(violations, [], "\n  " + "\n  ".join(violations))
+
+
+class Rules(unittest.TestCase):
+    """Each rule on small made-up trees: what it must find, and what it must leave alone."""
+
+    def assert_finds(self, rule, tree, *fragments):
+        found = list(rule(tree))
+        self.assertEqual(len(found), len(fragments), found)
+        for fragment in fragments:
+            self.assertTrue(any(fragment in text for text in found), f"{fragment!r} not in {found}")
+
+    def test_layering(self):
+        self.assert_finds(architecture.layering, {
+            "common/a.cpp": '#include "worker/link.h"\n',
+            "worker/agent/a.cpp": '#include "coordinator/service.h"\n',
+            "coordinator/a.cpp": '  #  include "worker/link.h"\n#include "coordinator/http/server.h"\n',
+            "coordinator/domain/a.cpp": '#include "coordinator/store/job_store.h"\n',
+            "coordinator/store/a.cpp": '#include "coordinator/rpc/server.h"\n#include "coordinator/views.h"\n',
+            "worker/render/a.cpp": '#include "worker/link.h"\n',
+            "worker/agent/b.cpp": '#include "proto/farm.pb.h"\n',
+        }, "common/a.cpp", "worker/agent/a.cpp", "worker/link.h", "coordinator/http/server.h", "coordinator/domain/a.cpp",
+            "coordinator/rpc/server.h", "coordinator/views.h", "worker/render/a.cpp", "worker/agent/b.cpp")
+
+    def test_layering_allows_what_is_drawn(self):
+        self.assert_finds(architecture.layering, {
+            "worker/agent/a.cpp": '#include "common/base/id.h"\n#include "worker/render/render.h"\n#include "worker/link.h"\n// #include "coordinator/service.h"\n',
+            "coordinator/http/a.cpp": '#include "coordinator/service.h"\n#include "coordinator/domain/farm.h"\n#include "coordinator/views.h"\n',
+            "coordinator/main.cpp": '#include "coordinator/http/server.h"\n#include "coordinator/rpc/server.h"\n',
+            "cli/render.cpp": '#include "coordinator/service.h"\n#include "worker/agent/agent.h"\n#include "coordinator/assemble/merge.h"\n',
+            "coordinator/rpc/a.cpp": '#include "proto/farm.pb.h"\n',
+            "tests/unit/a_test.cpp": '#include "coordinator/http/server.h"\n#include "worker/link.h"\n',
+        })
+
+    def test_quoted_includes(self):
+        self.assert_finds(architecture.quoted_includes_exist, {
+            "common/a.cpp": '#include "common/b.h"\n#include "a.h"\n#include "proto/farm.pb.h"\n', "common/b.h": HEADER}, '"a.h"')
+
+    def test_cycles(self):
+        self.assert_finds(architecture.include_cycles, {
+            "common/a.h": '#include "common/b.h"\n', "common/b.h": '#include "common/c.h"\n', "common/c.h": '#include "common/a.h"\n'},
+            "common/a.h -> common/b.h -> common/c.h -> common/a.h")
+
+    def test_doors(self):
+        self.assert_finds(architecture.doors, {
+            "worker/render/world.cpp": "#include <embree3/rtcore.h>\n",
+            "worker/render/accel.cpp": "#include <embree3/rtcore.h>\n",
+            "coordinator/rpc/a.cpp": "#include <boost/asio.hpp>\n#include <grpcpp/grpcpp.h>\n",
+            "coordinator/http/a.cpp": "#include <sqlite3.h>\n",
+            "common/scene/a.cpp": "#include <ImfHeader.h>\n#include <pugixml.hpp>\n#include <Imath/ImathVec.h>\n",
+            "coordinator/store/redis.cpp": "#include <hiredis/hiredis.h>\n",
+            "common/base/error.cpp": "#include <spdlog/spdlog.h>\n",
+            "tests/unit/x_test.cpp": "#include <ImfHeader.h>\n",
+        }, "worker/render/world.cpp", "boost/asio.hpp", "sqlite3.h", "ImfHeader.h", "hiredis", "spdlog")
+
+    def test_library_types(self):
+        self.assert_finds(architecture.library_types_stay_behind_their_doors, {
+            "coordinator/http/json.h": HEADER + "#include <nlohmann/json.hpp>\n",
+            "coordinator/http/a.cpp": '#include "coordinator/http/json.h"\n',
+            "coordinator/main.cpp": '#include "coordinator/http/json.h"\n#include "coordinator/http/open.h"\n',
+            "coordinator/http/open.h": HEADER + '#include "coordinator/http/json.h"\n',
+        }, "coordinator/main.cpp includes coordinator/http/json.h", "coordinator/main.cpp includes coordinator/http/open.h")
+
+    def test_guards(self):
+        self.assert_finds(architecture.headers_are_guarded, {"common/a.h": "int x;\n", "common/b.h": HEADER}, "common/a.h")
+
+    def test_lengths(self):
+        self.assert_finds(architecture.short_files, {"web/a.js": "\n" * 401, "web/b.js": "\n" * 400}, "web/a.js has 401")
+
+    def test_unfinished(self):
+        word = "TO" + "DO"
+        self.assert_finds(architecture.nothing_unfinished, {"cli/a.cpp": f"\n// {word}: later\n", "cli/b.cpp": "f(\"tmp.XX" + "XXXX\")"}, "cli/a.cpp:2")
+
+    def test_clock(self):
+        reading = "auto t = std::chrono::steady_clock::now();"
+        tree = {path: reading for path in ("coordinator/domain/a.cpp", "tests/unit/a_test.cpp", "common/base/clock.h", "cli/main.cpp", *architecture.CLOCK_EXCEPTIONS)}
+        self.assert_finds(architecture.clock_is_injected, {**tree, "cli/b.cpp": "// steady_clock::now() is not for us"}, "coordinator/domain/a.cpp", "tests/unit/a_test.cpp")
+
+    def test_clock_exception_that_is_not_needed(self):
+        self.assert_finds(architecture.clock_is_injected, {next(iter(architecture.CLOCK_EXCEPTIONS)): "int x;"}, "off the exceptions")
+
+    def test_sleeps(self):
+        self.assert_finds(architecture.tests_do_not_sleep, {
+            "tests/a_test.cpp": "std::this_thread::sleep_for(1ms);", "tests/b.py": "time.sleep(1)", "tests/c.sh": "run & sleep 3\n",
+            "tests/d.py": "# no time.sleep here\n", "deploy/demo.sh": "sleep 1\n"}, "tests/a_test.cpp", "tests/b.py", "tests/c.sh")
+
+    def test_exits(self):
+        self.assert_finds(architecture.nobody_exits, {
+            "cli/a.cpp": "if (bad) std::exit(1);", "worker/b.cpp": "  abort();", "coordinator/c.cpp": "::_exit(3);",
+            "cli/main.cpp": "std::exit(2);", "worker/d.cpp": "job.abort(); stream->terminate(); on_exit(); // exit()\n"}, "cli/a.cpp", "worker/b.cpp", "coordinator/c.cpp")
+
+
+    def test_exceptions_for_files_that_went(self):
+        excepted = {**architecture.LONG_FILES, **architecture.CLOCK_EXCEPTIONS, **architecture.EXIT_EXCEPTIONS}
+        self.assert_finds(architecture.exceptions_are_files, {path: "" for path in list(excepted)[1:]}, next(iter(excepted)))
+
+
+class Binaries(unittest.TestCase):
+    def libraries(self, name):
+        path = BIN / name if BIN else None
+        if path is None or not path.exists():
+            self.skipTest(f"{name} is not built here")
+        return subprocess.run(["ldd", path], capture_output=True, text=True, check=True).stdout
+
+    def test_coordinator_links_no_renderer(self):
+        self.assertNotRegex(self.libraries("lightshaft-coordinator"), "libembree|libopenvdb")
+
+    def test_worker_maps_openvdb_only_on_demand(self):
+        self.assertNotRegex(self.libraries("lightshaft-worker"), "libopenvdb")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1 and not sys.argv[1].startswith("-"):
+        BIN = pathlib.Path(sys.argv.pop(1))
+    unittest.main()
