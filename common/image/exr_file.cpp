@@ -6,17 +6,15 @@
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfPartType.h>
-#include <ImfTileDescription.h>
 
 #include <fstream>
 #include <optional>
 
+#include "common/image/exr_headers.h"
 #include "common/image/exr_memory.h"
 
 namespace ls {
 namespace {
-
-constexpr int kMaxTileSide = 16384;
 
 struct Source {
   int part = 0;
@@ -50,15 +48,8 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
           name));
 }
 
-Result<FrameSize> check_size(const Imath::Box2i& window, const std::string& name, const ExrLimits& limits) {
-  const std::int64_t w = std::int64_t{window.max.x} - window.min.x + 1,
-                     h = std::int64_t{window.max.y} - window.min.y + 1;
-  if (w < 1 || h < 1) return fail(Errc::invalid_argument, fmt::format("{}: the image is empty", name));
-  if (w > limits.max_side || h > limits.max_side || static_cast<std::uint64_t>(w * h) > limits.max_pixels)
-    return fail(Errc::resource_exhausted,
-                fmt::format("{}: {} x {} pixels; the limits are {} a side and {} in all", name, w, h,
-                            limits.max_side, limits.max_pixels));
-  return FrameSize{static_cast<int>(w), static_cast<int>(h)};
+FrameSize size_of(const Imath::Box2i& window) {
+  return {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1};
 }
 
 // Row bands are appended as they are read, so a small file that only claims to be large costs little memory.
@@ -96,18 +87,12 @@ Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::strin
                 fmt::format("{}: {} bytes, the limit is {}", name, bytes.size(), limits.max_bytes));
   return exr::guarded(
       Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<RgbImage> {
+        if (const auto ok = exr::check_headers(bytes, name, limits); !ok) return tl::unexpected(ok.error());
         exr::MemoryReader in(bytes, name);
         Imf::MultiPartInputFile file(in, /*numThreads=*/0, /*reconstructChunkOffsetTable=*/false);
         const auto source = find_colour(file, name);
         if (!source) return tl::unexpected(source.error());
-        const Imf::Header& header = file.header(source->part);
-        const auto size = check_size(header.dataWindow(), name, limits);
-        if (!size) return tl::unexpected(size.error());
-        if (header.hasTileDescription() &&
-            (header.tileDescription().xSize > kMaxTileSide || header.tileDescription().ySize > kMaxTileSide))
-          return fail(Errc::resource_exhausted,
-                      fmt::format("{}: its tiles are larger than {}", name, kMaxTileSide));
-        return read_part(file, *source, *size);
+        return read_part(file, *source, size_of(file.header(source->part).dataWindow()));
       });
 }
 

@@ -1,7 +1,7 @@
-// Pixels of the fake renderer: a pure function of the unit, for tests of everything around the renderer. A sample is
-// hash(scene, settings, pixel, sample) / 256 with an integer numerator below 256 plus a gradient of the pixel, so that
-// float sums of up to 2^15 samples are exact: sums over [a,b) and [b,c) of one half add up to those over [a,c), bit for
-// bit, and a test may compare any two groupings.
+// Pixels of the fake renderer: a pure function of the unit, for tests of everything around the renderer. A
+// sample is hash(scene, settings, pixel, sample) / 256 with an integer numerator below 256 plus a gradient of
+// the pixel, so that float sums of up to 2^15 samples are exact: sums over [a,b) and [b,c) of one half add up
+// to those over [a,c), bit for bit, and a test may compare any two groupings.
 #pragma once
 
 #include <array>
@@ -30,7 +30,8 @@ inline std::uint64_t fake_seed(const UnitHeader& header) {
 
 // One sample: R, G, B in [0, 2), multiples of 1/256.
 inline std::array<float, 3> fake_sample(std::uint64_t seed, int x, int y, std::uint64_t sample) {
-  const auto place = static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32 | static_cast<std::uint32_t>(x);
+  const auto place =
+      static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32 | static_cast<std::uint32_t>(x);
   const std::uint64_t h = fake_mix(fake_mix(seed ^ fake_mix(place)) + sample);
   std::array<float, 3> rgb{};
   for (int c = 0; c < 3; ++c) {

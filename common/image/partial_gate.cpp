@@ -6,58 +6,23 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <string_view>
 
+#include "common/image/byte_cursor.h"
+
 namespace ls {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "EXR is little endian");
-
 constexpr std::int32_t kMaxSide = 65536;
 constexpr std::int32_t kMaxUnitJson = 1024;
+constexpr std::size_t kMaxNameBytes = 31;  // the format's limit without the long-names flag
 
 tl::unexpected<Error> refuse(std::string what) {
   return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
 }
-
-class Cursor {
- public:
-  explicit Cursor(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  std::size_t position() const { return position_; }
-  std::size_t left() const { return bytes_.size() - position_; }
-
-  std::optional<std::span<const std::byte>> take(std::size_t n) {
-    if (n > left()) return std::nullopt;
-    position_ += n;
-    return bytes_.subspan(position_ - n, n);
-  }
-  template <class T>
-  std::optional<T> value() {
-    const auto raw = take(sizeof(T));
-    if (!raw) return std::nullopt;
-    T v;
-    std::memcpy(&v, raw->data(), sizeof(T));
-    return v;
-  }
-  // Zero-terminated, at most 31 characters (the format's limit for names without the long-names flag).
-  std::optional<std::string_view> name() {
-    const std::size_t most = std::min<std::size_t>(left(), 32);
-    const auto* begin = reinterpret_cast<const char*>(bytes_.data() + position_);
-    const void* end = std::memchr(begin, 0, most);
-    if (!end) return std::nullopt;
-    const auto length = static_cast<std::size_t>(static_cast<const char*>(end) - begin);
-    position_ += length + 1;
-    return std::string_view(begin, length);
-  }
-
- private:
-  std::span<const std::byte> bytes_;
-  std::size_t position_ = 0;
-};
 
 struct Shape {
   std::optional<PixelRect> data, display;
@@ -75,7 +40,7 @@ constexpr Attribute kAttributes[] = {
     {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4}, {kUnitAttribute, "string", 0},
 };
 
-Result<void> check_magic(Cursor& in) {
+Result<void> check_magic(ByteCursor& in) {
   const auto magic = in.value<std::uint32_t>(), version = in.value<std::uint32_t>();
   if (!magic || !version) return refuse("the file ends in its first 8 bytes");
   if (*magic != 20000630u) return refuse("not an EXR file (wrong magic number)");
@@ -88,10 +53,10 @@ Result<void> check_magic(Cursor& in) {
 }
 
 Result<void> check_channels(std::span<const std::byte> raw) {
-  Cursor in(raw);
+  ByteCursor in(raw);
   for (const int plane : kFileOrder) {
     const std::string_view want = kPartialChannelNames[static_cast<std::size_t>(plane)];
-    const auto name = in.name();
+    const auto name = in.name(kMaxNameBytes);
     if (!name || *name != want)
       return refuse(fmt::format("channel '{}' stands where '{}' belongs (A.B A.G A.R B.B B.G B.R, no others)",
                                 name.value_or("?"), want));
@@ -102,7 +67,7 @@ Result<void> check_channels(std::span<const std::byte> raw) {
     if (*xs != 1 || *ys != 1)
       return refuse(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", want, *xs, *ys));
   }
-  const auto end = in.name();
+  const auto end = in.name(kMaxNameBytes);
   if (!end || !end->empty() || in.left() != 0)
     return refuse("more than the six channels A.B A.G A.R B.B B.G B.R");
   return {};
@@ -147,15 +112,15 @@ Result<const Attribute*> find_attribute(std::string_view name, std::string_view 
 }
 
 Result<Shape> read_shape(std::span<const std::byte> exr) {
-  Cursor in(exr);
+  ByteCursor in(exr);
   if (const auto ok = check_magic(in); !ok) return tl::unexpected(ok.error());
   Shape shape;
   std::uint32_t seen = 0;
   while (true) {
-    const auto name = in.name();
+    const auto name = in.name(kMaxNameBytes);
     if (!name) return refuse("the header is cut off or has an over-long name");
     if (name->empty()) break;
-    const auto type = in.name();
+    const auto type = in.name(kMaxNameBytes);
     const auto size = in.value<std::int32_t>();
     if (!type || !size) return refuse(fmt::format("the header is cut off at attribute '{}'", *name));
     const auto attribute = find_attribute(*name, *type, *size);
@@ -190,7 +155,8 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
     return refuse(fmt::format("{} bytes, but tile {} needs exactly {}", exr.size(), show(t), want));
 
   std::vector<float> sums(width * height * kPartialChannels);
-  Cursor table(exr.subspan(shape.pixels_at, height * 8)), lines(exr.subspan(shape.pixels_at + height * 8));
+  ByteCursor table(exr.subspan(shape.pixels_at, height * 8)),
+      lines(exr.subspan(shape.pixels_at + height * 8));
   for (std::size_t y = 0; y < height; ++y) {
     const std::uint64_t at = shape.pixels_at + height * 8 + y * (8 + line);
     if (table.value<std::uint64_t>() != at) return refuse(fmt::format("line table: entry {} is wrong", y));

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -130,7 +131,7 @@ TEST(ExrRead, RefusesWhatItDoesNotUnderstandNamingTheFile) {
   EXPECT_THAT(refusal({.channels = {"X", "G", "B"}}), HasSubstr("sky.exr: no flat part"));
   EXPECT_THAT(refusal({.channels = {"Y", "RY", "BY"}}), HasSubstr("no flat part"));
   EXPECT_THAT(read_exr_rgb(std::vector<std::byte>(1000), "sky.exr").error().message,
-              HasSubstr("sky.exr: cannot read"));
+              HasSubstr("sky.exr: cannot read this EXR: not an EXR file"));
   EXPECT_FALSE(read_exr_rgb(std::vector<std::byte>{}, "sky.exr"));
 }
 
@@ -142,6 +143,29 @@ TEST(ExrRead, KeepsItsLimits) {
   EXPECT_EQ(read_exr_rgb(exr, "a", {.max_side = 69}).error().code, Errc::resource_exhausted);
   EXPECT_TRUE(
       read_exr_rgb(exr, "a", {.max_bytes = exr.size(), .max_pixels = kWidth * kHeight, .max_side = 70}));
+}
+
+// Small files that claim to be large must be refused before anything of that size is allocated.
+TEST(ExrRead, DoesNotBelieveLargeClaims) {
+  const ExrLimits wide{.max_pixels = std::uint64_t{1} << 32, .max_side = 1 << 30};
+  const auto claim = [&](const Foreign& f, std::string_view attribute, std::size_t skip,
+                         std::vector<std::int32_t> values) {
+    auto exr = write(f);
+    const std::string_view text(reinterpret_cast<const char*>(exr.data()), exr.size());
+    const auto at = text.find(attribute);
+    EXPECT_NE(at, std::string_view::npos);
+    std::memcpy(exr.data() + at + attribute.size() + skip, values.data(), values.size() * 4);
+    const auto got = read_exr_rgb(exr, "claim", wide);
+    return got ? "accepted" : got.error().message;
+  };
+  // After the attribute's name: its zero, its type and zero, its size.
+  EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 0, 99'999'999}), HasSubstr("ends too early"));
+  EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {-2147483647, -2147483647, 2147483646, 2147483646}),
+              HasSubstr("limits"));
+  EXPECT_THAT(claim({.tiled = true}, "tiles", 1 + 9 + 4, {1, 1}), HasSubstr("ends too early"));
+  EXPECT_THAT(claim({.tiled = true}, "tiles", 1 + 9 + 4, {1 << 30, 1 << 30}), HasSubstr("needs more than"));
+  EXPECT_THAT(claim({}, "channels", 1 + 7, {2147483647}), HasSubstr("more than the file has"));
+  EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 99'999'999, 15}), HasSubstr("needs more than"));
 }
 
 TEST(ExrRead, SurvivesEveryTruncation) {
