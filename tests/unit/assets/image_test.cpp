@@ -1,0 +1,201 @@
+#include "common/assets/image.h"
+
+#include <gmock/gmock.h>
+#include <png.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include <jpeglib.h>
+
+#include "common/image/exr_file.h"
+#include "tests/unit/assets/hostile.h"
+
+namespace ls {
+namespace {
+
+using test::bytes_of;
+using testing::Each;
+using testing::ElementsAre;
+using testing::FloatEq;
+using testing::HasSubstr;
+
+// `format`: PNG_FORMAT_... of libpng's simple interface; `pixels` as that wants them.
+std::string png(std::uint32_t width, std::uint32_t height, std::uint32_t format, const void* pixels) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = width;
+  image.height = height;
+  image.format = format;
+  png_alloc_size_t size = 0;
+  EXPECT_TRUE(png_image_write_to_memory(&image, nullptr, &size, 0, pixels, 0, nullptr));
+  std::string out(size, '\0');
+  EXPECT_TRUE(png_image_write_to_memory(&image, out.data(), &size, 0, pixels, 0, nullptr));
+  return out;
+}
+const std::uint8_t kRgb[] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 10, 20, 30};
+const std::uint8_t kRgba[] = {255, 0, 0, 128, 0, 255, 0, 255};
+
+std::string jpeg(int width, int height, int channels, std::uint8_t value) {
+  jpeg_compress_struct c{};
+  jpeg_error_mgr errors;
+  c.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&c);
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&c, &bytes, &size);
+  c.image_width = static_cast<JDIMENSION>(width);
+  c.image_height = static_cast<JDIMENSION>(height);
+  c.input_components = channels;
+  c.in_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&c);
+  jpeg_start_compress(&c, TRUE);
+  std::vector<std::uint8_t> row(static_cast<std::size_t>(width * channels), value);
+  for (int y = 0; y < height; ++y) {
+    unsigned char* p = row.data();
+    jpeg_write_scanlines(&c, &p, 1);
+  }
+  jpeg_finish_compress(&c);
+  std::string out(reinterpret_cast<char*>(bytes), size);
+  jpeg_destroy_compress(&c);
+  std::free(bytes);
+  return out;
+}
+
+// 8 x 2: the first row in runs, the second plain.
+std::string hdr() {
+  std::string s = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n";
+  s += std::string("\x02\x02\x00\x08", 4);
+  s += std::string("\x88\x80", 2);                                   // red: a run of 8 x 128
+  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);       // green: 8 as they are
+  s += std::string("\x84\x10\x84\x20", 4) + std::string("\x88\x81", 2);  // blue: two runs; exponent 129: times 2 / 256
+  for (int x = 0; x < 8; ++x) s += std::string("\x80\x40\x20\x80", 4);
+  return s;
+}
+
+void expect_sound(const ImageData& i) {
+  const std::size_t n = std::size_t{i.width} * i.height * i.channels;
+  EXPECT_GT(n, 0u);
+  EXPECT_TRUE((i.u8.size() == n && i.f32.empty()) || (i.f32.size() == n && i.u8.empty()));
+}
+
+TEST(Png, ReadsColourGreyAndAlpha) {
+  const auto rgb = decode_image("a.png", bytes_of(png(2, 2, PNG_FORMAT_RGB, kRgb)));
+  ASSERT_TRUE(rgb) << rgb.error().message;
+  EXPECT_EQ(rgb->channels, 3u);
+  EXPECT_TRUE(rgb->srgb);
+  EXPECT_EQ(rgb->u8, std::vector<std::uint8_t>(std::begin(kRgb), std::end(kRgb)));
+
+  const auto rgba = decode_png("a.png", bytes_of(png(2, 1, PNG_FORMAT_RGBA, kRgba)));
+  ASSERT_TRUE(rgba) << rgba.error().message;
+  EXPECT_EQ(rgba->channels, 4u);
+  EXPECT_EQ(rgba->u8, std::vector<std::uint8_t>(std::begin(kRgba), std::end(kRgba)));
+
+  const auto grey = decode_png("a.png", bytes_of(png(3, 1, PNG_FORMAT_GRAY, "\x00\x80\xff")));
+  ASSERT_TRUE(grey) << grey.error().message;
+  EXPECT_EQ(grey->channels, 1u);
+  EXPECT_THAT(grey->u8, ElementsAre(0, 128, 255));
+}
+
+// 16 bits: raw chunks are written with the full interface, since the simple one would convert.
+std::string png16(const std::vector<std::uint16_t>& grey) {
+  std::string out;
+  png_structp p = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(p);
+  png_set_write_fn(p, &out, [](png_structp w, png_bytep data, png_size_t n) {
+    static_cast<std::string*>(png_get_io_ptr(w))->append(reinterpret_cast<char*>(data), n);
+  }, [](png_structp) {});
+  png_set_IHDR(p, info, static_cast<png_uint_32>(grey.size()), 1, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(p, info);
+  png_set_swap(p);
+  png_write_row(p, reinterpret_cast<png_const_bytep>(grey.data()));
+  png_write_end(p, nullptr);
+  png_destroy_write_struct(&p, &info);
+  return out;
+}
+
+TEST(Png, KeepsAllSixteenBits) {
+  const auto i = decode_png("a.png", bytes_of(png16({0, 1, 32768, 65535})));
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_THAT(i->f32, ElementsAre(0, FloatEq(1 / 65535.f), FloatEq(32768 / 65535.f), 1));
+  EXPECT_TRUE(i->srgb);
+}
+
+TEST(Png, NeverAcceptsATruncatedFileAndSurvivesMutations) {
+  for (const std::string& file : {png(2, 2, PNG_FORMAT_RGB, kRgb), png16({0, 1, 2})}) {
+    EXPECT_EQ(test::accepted_truncations(file, decode_png), 0);
+    test::survive_mutations(file, decode_png, expect_sound);
+  }
+}
+
+TEST(Jpeg, ReadsColourAndGrey) {
+  const auto rgb = decode_image("a.jpg", bytes_of(jpeg(16, 8, 3, 200)));
+  ASSERT_TRUE(rgb) << rgb.error().message;
+  EXPECT_EQ(rgb->channels, 3u);
+  EXPECT_THAT(rgb->u8, Each(200));  // a flat image survives its discrete cosine transform
+  const auto grey = decode_jpeg("a.jpg", bytes_of(jpeg(9, 9, 1, 100)));
+  ASSERT_TRUE(grey) << grey.error().message;
+  EXPECT_EQ(grey->channels, 1u);
+  EXPECT_EQ(grey->u8.size(), 81u);
+}
+
+TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
+  const std::string file = jpeg(32, 32, 3, 77);
+  EXPECT_LE(test::accepted_truncations(file, decode_jpeg), 2);  // all pixels are there when only the end marker is cut
+  test::survive_mutations(file, decode_jpeg, expect_sound);
+}
+
+TEST(Exr, ReadsColourAsLinearFloats) {
+  ExrPicture picture;
+  picture.size = {2, 1};
+  picture.channels["R"] = ExrFloat{{1, 2}};
+  picture.channels["G"] = ExrFloat{{3, 4}};
+  picture.channels["B"] = ExrFloat{{5, 1e6f}};
+  const auto file = write_exr(picture);
+  ASSERT_TRUE(file) << file.error().message;
+
+  const auto i = decode_image("a.exr", *file);
+
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_THAT(i->f32, ElementsAre(1, 3, 5, 2, 4, 1e6f));
+  EXPECT_FALSE(i->srgb);
+  EXPECT_FALSE(decode_image("a.exr", std::span(*file).first(file->size() / 2)));
+}
+
+TEST(Hdr, ReadsRunsAndPlainRows) {
+  const auto i = decode_image("a.hdr", bytes_of(hdr()));
+
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_EQ(i->width, 8u);
+  EXPECT_EQ(i->height, 2u);
+  EXPECT_FALSE(i->srgb);
+  EXPECT_EQ(i->f32[0], 1);       // 128 x 2^(129 - 136)
+  EXPECT_EQ(i->f32[3 + 1], .25f);  // 32 / 128
+  EXPECT_EQ(i->f32[2], .125f);
+  EXPECT_EQ(i->f32[24], .5f);  // second row
+  EXPECT_EQ(i->f32[26], .125f);
+}
+
+TEST(Hdr, NeverAcceptsATruncatedFileAndSurvivesMutations) {
+  EXPECT_EQ(test::accepted_truncations(hdr(), decode_hdr), 0);
+  test::survive_mutations(hdr(), decode_hdr, expect_sound);
+}
+
+TEST(Hdr, RefusesSizesThatTheFileCannotHold) {
+  std::string s = hdr();
+  s.replace(s.find("-Y 2 +X 8"), 9, "-Y 30000 +X 8");
+  const auto i = decode_hdr("a.hdr", bytes_of(s));
+  ASSERT_FALSE(i);
+  EXPECT_THAT(i.error().message, HasSubstr("too short for its size"));
+}
+
+TEST(Image, NamesTheFileWhenItIsOfNoKnownKind) {
+  const auto i = decode_image("a.gif", bytes_of("GIF89a"));
+  ASSERT_FALSE(i);
+  EXPECT_THAT(i.error().message, HasSubstr("'a.gif'"));
+  EXPECT_FALSE(load_image("/nonexistent/a.png", "a.png"));
+}
+
+}  // namespace
+}  // namespace ls
