@@ -42,6 +42,7 @@ struct JobView {
   std::string stopped;  // "spp", "error", "time", "user" once done
   double progress = 0;  // 0..1
   std::uint64_t spp = 0;  // asked
+  std::optional<double> target_error;  // relMSE, asked
   double spp_done = 0;    // mean over pixels
   std::optional<ErrorFigures> error_now;
   std::optional<double> eta_seconds;

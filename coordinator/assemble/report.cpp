@@ -1,0 +1,80 @@
+#include "coordinator/assemble/report.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+
+// 64 rather than 64.0 where all pixels have the same.
+json spp_value(double spp) {
+  if (spp == std::floor(spp) && spp >= 0 && spp < 1e15) return static_cast<std::uint64_t>(spp);
+  return number(spp);
+}
+
+json point(const ConvergencePoint& p) {
+  return {{"seconds", number(p.seconds)},
+          {"core_seconds", number(p.core_seconds)},
+          {"spp", spp_value(p.spp)},
+          {"rmse", number(p.error.rmse)},
+          {"relmse", number(p.error.relmse)},
+          {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
+}
+
+}  // namespace
+
+ErrorFigures figures_of(const ImageError& e) { return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi}; }
+
+std::string report_json(const ReportFacts& facts) {
+  const StoredJob& job = facts.job;
+  const JobTotals& totals = job.totals;
+  json curve = json::array();
+  for (const auto& p : facts.convergence) curve.push_back(point(p));
+  json j{{"job", job.id.value},
+         {"scene", job.scene.hex()},
+         {"state", to_string(job.state)},
+         {"size", {job.settings.size.width, job.settings.size.height}},
+         {"seed", job.settings.seed},
+         {"integrator", job.settings.integrator},
+         {"spp", spp_value(totals.spp_done)},
+         {"samples", facts.samples},
+         {"load_seconds", number(totals.load_seconds)},
+         {"render_seconds", number(totals.render_seconds)},
+         {"core_seconds", number(totals.core_seconds)},
+         {"peak_rss_bytes", totals.peak_rss_bytes},
+         {"nonfinite_samples", totals.health.nonfinite},
+         {"negative_samples", totals.health.negative},
+         {"majorant_violations", totals.health.majorant_violations},
+         {"clamped_values", facts.clamped_values},
+         {"pixels_sha256", facts.pixels.hex()},
+         {"features_used", job.features_used},
+         {"features_left_out", job.features_left_out},
+         {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
+         {"build", job.build},
+         {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
+         {"warnings", job.warnings},
+         {"convergence", std::move(curve)}};
+  const bool known = facts.error.has_value();
+  const ImageError e = facts.error.value_or(ImageError{});
+  j["rmse"] = known ? number(e.rmse) : json();
+  j["rmse_ci95"] = known ? json{number(e.rmse_lo), number(e.rmse_hi)} : json();
+  j["relmse"] = known ? number(e.relmse) : json();
+  j["relmse_ci95"] = known ? json{number(e.relmse_lo), number(e.relmse_hi)} : json();
+  j["trusted"] = known && e.trusted;
+  j["verdict"] = e.verdict;
+  // Error reached per second of wall clock; per core second for comparisons between farms.
+  const double wall = e.relmse * totals.render_seconds, cores = e.relmse * totals.core_seconds;
+  j["efficiency"] = known && wall > 0 ? number(1 / wall) : json();
+  j["efficiency_per_core"] = known && cores > 0 ? number(1 / cores) : json();
+  if (job.stopped == StopReason::error)
+    j["note"] = "stopped at a target error: such an image carries a small bias; images by samples carry none";
+  if (job.stopped == StopReason::time)
+    j["note"] = "stopped by time: another run may end with other samples, so its pixels may differ";
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace ls::coordinator

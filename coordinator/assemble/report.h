@@ -1,0 +1,26 @@
+// The report of a job, as JSON: DESIGN's contract, plus what helps a person.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/image/error_estimate.h"
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+
+struct ReportFacts {
+  StoredJob job;  // with totals as of now
+  std::uint64_t samples = 0;
+  std::optional<ImageError> error;  // of the image as it is; nothing: no sample yet
+  Digest pixels;
+  std::uint64_t clamped_values = 0;  // in the final EXR
+  std::vector<ConvergencePoint> convergence;
+};
+std::string report_json(const ReportFacts& facts);
+
+ErrorFigures figures_of(const ImageError& error);
+
+}  // namespace ls::coordinator

@@ -1,0 +1,108 @@
+#include "coordinator/assemble/round_errors.h"
+
+#include <algorithm>
+#include <cstring>
+#include <type_traits>
+
+namespace ls::coordinator {
+
+void RoundErrors::folded(TileIndex tile, RoundIndex round, const TileError& error) {
+  Tile& t = tiles_[tile];
+  while (!t.rounds.empty() && t.rounds.back().first >= round) t.rounds.pop_back();
+  t.rounds.emplace_back(round, error);
+  if (!keep_relative_) return;
+  t.relative.resize(round + 1);
+  t.relative[round] = error.relative.squares;
+}
+
+TileError RoundErrors::at(RoundIndex round) const {
+  TileError sum;
+  for (const Tile& t : tiles_) {
+    const TileError* last = nullptr;
+    for (const auto& [r, error] : t.rounds)
+      if (r <= round) last = &error;
+    if (last) sum.add(*last);
+  }
+  return sum;
+}
+
+void RoundErrors::checkpoint_taken(RoundIndex round) {
+  for (Tile& t : tiles_) {
+    const auto later = std::find_if(t.rounds.begin(), t.rounds.end(), [&](const auto& r) { return r.first > round; });
+    if (later - t.rounds.begin() > 1) t.rounds.erase(t.rounds.begin(), later - 1);  // the last one up to `round` stays
+  }
+}
+
+std::vector<std::vector<double>> RoundErrors::relative() const {
+  std::size_t rounds = 0;
+  for (const Tile& t : tiles_) rounds = std::max(rounds, t.relative.size());
+  std::vector<std::vector<double>> all(rounds, std::vector<double>(tiles_.size()));
+  for (std::size_t i = 0; i < tiles_.size(); ++i)
+    for (std::size_t r = 0; r < tiles_[i].relative.size(); ++r) all[r][i] = tiles_[i].relative[r];
+  return all;
+}
+
+namespace {
+static_assert(std::is_trivially_copyable_v<TileError>);
+
+template <class T>
+void put(std::vector<std::byte>& out, const T& value) {
+  const auto raw = std::as_bytes(std::span(&value, 1));
+  out.insert(out.end(), raw.begin(), raw.end());
+}
+
+// Whatever the bytes say, no more is allocated than they hold.
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  template <class T>
+  bool get(T& value) {
+    if (bytes_.size() < sizeof(T)) return false;
+    std::memcpy(&value, bytes_.data(), sizeof(T));
+    bytes_ = bytes_.subspan(sizeof(T));
+    return true;
+  }
+  bool holds(std::uint64_t count, std::size_t size) const { return count <= bytes_.size() / size; }
+  bool empty() const { return bytes_.empty(); }
+
+ private:
+  std::span<const std::byte> bytes_;
+};
+}  // namespace
+
+// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Written and read by the same build only: the
+// snapshot names its build and is left aside by another one.
+std::vector<std::byte> RoundErrors::save() const {
+  std::vector<std::byte> out;
+  for (const Tile& t : tiles_) {
+    put(out, static_cast<std::uint32_t>(t.rounds.size()));
+    for (const auto& [round, error] : t.rounds) {
+      put(out, round);
+      put(out, error);
+    }
+    put(out, static_cast<std::uint32_t>(t.relative.size()));
+    for (const double r : t.relative) put(out, r);
+  }
+  return out;
+}
+
+Result<RoundErrors> RoundErrors::load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative) {
+  const auto damaged = [] { return fail(Errc::invalid_argument, "saved error figures are damaged"); };
+  RoundErrors loaded(tiles, keep_relative);
+  Reader in(bytes);
+  for (Tile& t : loaded.tiles_) {
+    std::uint32_t count = 0;
+    if (!in.get(count) || !in.holds(count, sizeof(RoundIndex) + sizeof(TileError))) return damaged();
+    t.rounds.resize(count);
+    for (auto& [round, error] : t.rounds)
+      if (!in.get(round) || !in.get(error)) return damaged();
+    if (!in.get(count) || !in.holds(count, sizeof(double))) return damaged();
+    t.relative.resize(count);
+    for (double& r : t.relative)
+      if (!in.get(r)) return damaged();
+  }
+  if (!in.empty()) return damaged();
+  return loaded;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,44 @@
+// The error sums of every tile after every fold, as far as they are still needed: a checkpoint of round r sums over all
+// tiles what each said at r, or at its last round before r, though some are ahead already. So the figures of a checkpoint
+// do not depend on the order of arrival.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/image/error_estimate.h"
+
+namespace ls::coordinator {
+
+class RoundErrors {
+ public:
+  // `keep_relative`: also keep each fold's relative error sum for good, which the farm's stopping needs after a restart.
+  RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
+
+  // Rounds of a tile in order; a round given again (a cut one, now in full) replaces what was said of it.
+  void folded(TileIndex tile, RoundIndex round, const TileError& error);
+  TileError at(RoundIndex round) const;  // summed in tile order
+  void checkpoint_taken(RoundIndex round);  // at() will not be asked for rounds before this one again
+
+  // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.
+  std::vector<std::vector<double>> relative() const;
+
+  std::vector<std::byte> save() const;
+  static Result<RoundErrors> load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative);
+  bool operator==(const RoundErrors&) const = default;
+
+ private:
+  struct Tile {
+    std::vector<std::pair<RoundIndex, TileError>> rounds;  // ascending
+    std::vector<double> relative;                          // by round
+    bool operator==(const Tile&) const = default;
+  };
+  std::vector<Tile> tiles_;
+  bool keep_relative_ = false;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,25 @@
+// From a submission to a job that can be rendered: the scene read and checked, everything that was left open resolved.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "coordinator/domain/farm.h"
+#include "coordinator/service.h"
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+
+struct Intake {
+  StoredJob job;  // without id and time
+  std::string scene_json;  // canonical; its digest is job.scene
+};
+
+// Reads the scene with the request's assets as its only files, so a scene can never reach a path of this machine. Only
+// assets that the scene uses go into the job; each must be in `blobs`. Nothing is stored.
+tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs);
+
+// The farm's view of a stored job.
+JobPlan plan_of(const StoredJob& job);
+
+}  // namespace ls::coordinator

@@ -1,0 +1,51 @@
+// Every bound of the coordinator's service, store and assembler, in one place.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "common/base/clock.h"
+
+namespace ls::coordinator::limits {
+
+// ---- blobs ----
+inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;    // one file of a scene: 64 GiB
+inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;   // in one read()
+inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
+
+// ---- submission ----
+inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
+inline constexpr std::size_t kMaxAssets = 100'000;       // named by one request
+inline constexpr std::size_t kMaxWarnings = 100;         // kept with a job
+inline constexpr std::size_t kMaxNameBytes = 256;        // of a job or worker
+inline constexpr std::size_t kMaxJobs = 100'000;
+inline constexpr int kMaxFrameSide = 32768;
+inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;  // 67 million: 3.2 GB of film sums
+inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
+inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
+inline constexpr int kMaxPriority = 1'000'000;
+
+// ---- results ----
+inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg
+inline constexpr std::uint32_t kMaxSegments = 1u << 20;
+inline constexpr std::size_t kMaxResultsWaiting = std::size_t{256} << 20;   // bytes not yet durable; then receive() waits
+inline constexpr std::size_t kMaxPendingPartials = std::size_t{1} << 30;    // decoded, waiting for an earlier round; then
+                                                                            // they are read again from the segments
+inline constexpr std::size_t kMaxCommitBatch = 256;                         // results that share one fdatasync
+inline constexpr int kVerifyThreads = 2;
+
+// ---- workers ----
+inline constexpr std::size_t kMaxWorkers = 16'384;
+inline constexpr std::size_t kMaxTags = 64;
+
+// ---- snapshots: whichever comes first ----
+inline constexpr std::uint64_t kSnapshotUnits = 8192;  // folded since the last: about 2 s of folding again
+inline constexpr double kSnapshotSeconds = 60;
+
+// ---- events ----
+inline constexpr std::size_t kEventsKept = 16'384;
+inline constexpr std::uint64_t kEventIdBlock = 1'000'000;  // reserved on disk at once
+inline constexpr double kProgressSeconds = .25;            // between two progress events of one job
+inline constexpr std::size_t kLogLinesKept = 10'000;       // per job
+
+}  // namespace ls::coordinator::limits

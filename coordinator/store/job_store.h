@@ -1,0 +1,81 @@
+// What the coordinator remembers of jobs besides their pixels. Two real ones: SQLite, and memory (`lightshaft render`).
+// Thread-safe. What a put or add returned for survives kill -9 and power loss (SQLite).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/base/id.h"
+#include "common/job/settings.h"
+#include "common/protocol/messages.h"
+#include "coordinator/domain/job_state.h"
+#include "coordinator/service.h"
+
+namespace ls::coordinator {
+
+// What a job came to; written when it ends, so that a restart need not read its partials.
+struct JobTotals {
+  double render_seconds = 0;  // first ray to last fold
+  double core_seconds = 0;
+  double load_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+  double spp_done = 0;
+  std::uint64_t units = 0;
+  UnitHealth health;
+  bool operator==(const JobTotals&) const = default;
+};
+
+struct StoredJob {
+  JobId id;
+  std::string name;  // scene file name
+  double submitted_unix = 0;
+  Digest scene;      // blob
+  RenderSettings settings;
+  JobSpec spec;                         // as asked; spp as last extended
+  std::optional<std::uint64_t> spp;     // resolved; nothing: until target or time
+  std::vector<BlobRef> assets;
+  std::vector<std::string> warnings;
+  std::vector<std::string> features_used, features_left_out;
+  JobState state = JobState::queued;
+  std::optional<StopReason> stopped;
+  std::string error;
+  std::optional<Digest> numeric_class;
+  std::string build;  // of the worker that the job was pinned with
+  JobTotals totals;
+  bool operator==(const StoredJob&) const = default;
+};
+std::string to_json(const StoredJob& job);
+Result<StoredJob> parse_stored_job(std::string_view json);
+
+struct LogLine {
+  double unix_time = 0;
+  std::string text;
+};
+
+class JobStore {
+ public:
+  virtual ~JobStore() = default;
+  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
+  virtual Result<std::vector<StoredJob>> jobs() const = 0;  // in order of first put
+
+  virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
+  virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
+
+  virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;  // the oldest beyond kLogLinesKept go
+  virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
+
+  // Adds `amount` to a named counter and returns its value before; durable. For ids that must never come twice.
+  virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
+};
+
+Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file);
+std::unique_ptr<JobStore> make_memory_job_store();
+
+}  // namespace ls::coordinator

@@ -1,0 +1,69 @@
+#include <deque>
+#include <map>
+#include <mutex>
+
+#include "coordinator/limits.h"
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+namespace {
+
+class MemoryJobStore final : public JobStore {
+ public:
+  Result<void> put_job(const StoredJob& job) override {
+    const std::lock_guard lock(mutex_);
+    for (auto& known : jobs_)
+      if (known.id == job.id) {
+        known = job;
+        return {};
+      }
+    jobs_.push_back(job);
+    return {};
+  }
+  Result<std::vector<StoredJob>> jobs() const override {
+    const std::lock_guard lock(mutex_);
+    return jobs_;
+  }
+  Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
+    const std::lock_guard lock(mutex_);
+    points_[job].push_back(point);
+    return {};
+  }
+  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = points_.find(job);
+    return found == points_.end() ? std::vector<ConvergencePoint>{} : found->second;
+  }
+  Result<void> add_log(const JobId& job, const LogLine& line) override {
+    const std::lock_guard lock(mutex_);
+    auto& lines = log_[job];
+    lines.push_back(line);
+    if (lines.size() > limits::kLogLinesKept) lines.pop_front();
+    return {};
+  }
+  Result<std::vector<LogLine>> log(const JobId& job) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = log_.find(job);
+    if (found == log_.end()) return std::vector<LogLine>{};
+    return std::vector<LogLine>(found->second.begin(), found->second.end());
+  }
+  Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
+    const std::lock_guard lock(mutex_);
+    auto& value = counters_[counter];
+    value += amount;
+    return value - amount;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<StoredJob> jobs_;
+  std::map<JobId, std::vector<ConvergencePoint>> points_;
+  std::map<JobId, std::deque<LogLine>> log_;
+  std::map<std::string, std::uint64_t> counters_;
+};
+
+}  // namespace
+
+std::unique_ptr<JobStore> make_memory_job_store() { return std::make_unique<MemoryJobStore>(); }
+
+}  // namespace ls::coordinator

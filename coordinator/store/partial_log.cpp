@@ -1,0 +1,193 @@
+#include "coordinator/store/partial_log.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <optional>
+
+#include "common/base/log.h"
+#include "common/protocol/limits.h"
+#include "coordinator/limits.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr std::uint32_t kMagic = 0x3150534c;  // "LSP1"
+
+// As on disk; little endian like every machine we run on.
+struct RawHeader {
+  std::uint32_t magic = kMagic, bytes = 0;
+  std::uint32_t tile = 0, round = 0;
+  std::uint64_t s0 = 0, s1 = 0;
+  std::array<std::uint8_t, 32> digest{};
+  double cpu_seconds = 0, at_seconds = 0;
+  std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
+  std::array<char, ls::limits::kIdBytes> worker{};
+  std::uint64_t payload_check = 0;
+  std::uint64_t header_check = 0;  // over all before it
+};
+static_assert(sizeof(RawHeader) == 184);
+
+std::uint64_t check_of(std::span<const std::byte> bytes) {
+  const Digest digest = sha256(bytes);
+  std::uint64_t check = 0;
+  std::memcpy(&check, digest.bytes.data(), sizeof check);
+  return check;
+}
+
+std::uint64_t header_check(const RawHeader& raw) {
+  return check_of(std::as_bytes(std::span(&raw, 1)).first(offsetof(RawHeader, header_check)));
+}
+
+RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr) {
+  RawHeader raw;
+  raw.bytes = static_cast<std::uint32_t>(exr.size());
+  raw.tile = record.tile;
+  raw.round = record.round;
+  raw.s0 = record.samples.s0;
+  raw.s1 = record.samples.s1;
+  raw.digest = record.digest.bytes;
+  raw.cpu_seconds = record.cpu_seconds;
+  raw.at_seconds = record.at_seconds;
+  raw.nonfinite = record.health.nonfinite;
+  raw.negative = record.health.negative;
+  raw.majorant_violations = record.health.majorant_violations;
+  std::memcpy(raw.worker.data(), record.worker.value.data(), std::min(record.worker.value.size(), raw.worker.size()));
+  raw.payload_check = check_of(exr);
+  raw.header_check = header_check(raw);
+  return raw;
+}
+
+PartialRecord unpack(const RawHeader& raw) {
+  PartialRecord record;
+  record.tile = raw.tile;
+  record.round = raw.round;
+  record.samples = {raw.s0, raw.s1};
+  record.digest.bytes = raw.digest;
+  record.cpu_seconds = raw.cpu_seconds;
+  record.at_seconds = raw.at_seconds;
+  record.health = {raw.nonfinite, raw.negative, raw.majorant_violations};
+  record.worker.value.assign(raw.worker.data(), strnlen(raw.worker.data(), raw.worker.size()));
+  return record;
+}
+
+// The header at `offset` if a whole record of a file of `size` bytes stands there.
+std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
+                                   const std::filesystem::path& path) {
+  if (size - offset < sizeof(RawHeader)) return std::nullopt;
+  const auto bytes = read_at(file, offset, sizeof(RawHeader), path);
+  if (!bytes) return std::nullopt;
+  RawHeader raw;
+  std::memcpy(&raw, bytes->data(), sizeof raw);
+  if (raw.magic != kMagic || raw.header_check != header_check(raw)) return std::nullopt;
+  if (raw.bytes > ls::limits::kPartialBytes || raw.bytes > size - offset - sizeof raw) return std::nullopt;
+  return raw;
+}
+
+}  // namespace
+
+std::filesystem::path PartialLog::segment_path(std::uint32_t segment) const {
+  return folder_ / fmt::format("partials-{:03}.seg", segment);
+}
+
+Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
+  if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
+  std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
+  std::uint32_t count = 0;
+  while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
+  for (std::uint32_t i = 0; i < count; ++i)
+    if (auto done = log->scan(i, i + 1 == count); !done) return tl::unexpected(done.error());
+  if (auto started = log->start_segment(count == 0 ? 0 : count - 1); !started) return tl::unexpected(started.error());
+  return log;
+}
+
+Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
+  const auto path = segment_path(segment);
+  auto file = File::open(path, O_RDWR);
+  if (!file) return tl::unexpected(file.error());
+  struct stat info {};
+  if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  std::uint64_t at = 0;
+  while (at < size) {
+    const auto raw = header_at(*file, at, size, path);
+    if (!raw) break;
+    if (last) {
+      const auto exr = read_at(*file, at + sizeof(RawHeader), raw->bytes, path);
+      if (!exr || check_of(*exr) != raw->payload_check) break;
+    }
+    found_.push_back({unpack(*raw), {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
+    at += sizeof(RawHeader) + raw->bytes;
+  }
+  if (at == size) return {};
+  // In an older segment this is damage of the disk: what follows is rendered again, the bytes stay for whoever looks.
+  cut_bytes_ += size - at;
+  log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
+           last ? "cut a torn record" : "left out damaged records; their units are rendered again");
+  if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)
+    return tl::unexpected(errno_error("truncate", path));
+  return {};
+}
+
+Result<void> PartialLog::start_segment(std::uint32_t segment) {
+  if (segment >= limits::kMaxSegments)
+    return fail(Errc::resource_exhausted, fmt::format("{} holds too many segments", folder_.string()));
+  const auto path = segment_path(segment);
+  auto file = File::open(path, O_RDWR | O_CREAT | O_APPEND);
+  if (!file) return tl::unexpected(file.error());
+  if (auto synced = sync_folder(folder_); !synced) return synced;
+  struct stat info {};
+  if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
+  current_ = std::move(*file);
+  segment_ = segment;
+  size_ = static_cast<std::uint64_t>(info.st_size);
+  return {};
+}
+
+Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::span<const std::byte> exr) {
+  if (exr.size() > ls::limits::kPartialBytes)
+    return fail(Errc::invalid_argument,
+                fmt::format("a partial of {} bytes is larger than {}", exr.size(), ls::limits::kPartialBytes));
+  if (size_ > 0 && size_ + sizeof(RawHeader) + exr.size() > limits::kMaxSegmentBytes) {
+    if (auto done = sync(); !done) return tl::unexpected(done.error());
+    if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
+  }
+  const RawHeader raw = pack(record, exr);
+  const auto path = segment_path(segment_);
+  auto written = write_all(current_, std::as_bytes(std::span(&raw, 1)), path);
+  if (written) written = write_all(current_, exr, path);
+  if (!written) {
+    // Half a record must not stand before the next one; where it cannot be cut the next one opens a new segment.
+    if (::ftruncate(current_.fd(), static_cast<off_t>(size_)) != 0) size_ = limits::kMaxSegmentBytes;
+    return tl::unexpected(written.error());
+  }
+  const Place place{segment_, size_ + sizeof raw, raw.bytes, raw.payload_check};
+  size_ += sizeof raw + exr.size();
+  unsynced_ = true;
+  return place;
+}
+
+Result<void> PartialLog::sync() {
+  if (!unsynced_) return {};
+  if (auto done = sync_data(current_, segment_path(segment_)); !done) return done;
+  unsynced_ = false;
+  return {};
+}
+
+Result<std::vector<std::byte>> PartialLog::read(const Place& place) const {
+  const auto path = segment_path(place.segment);
+  auto file = File::open(path, O_RDONLY);
+  if (!file) return tl::unexpected(file.error());
+  auto bytes = read_at(*file, place.offset, place.bytes, path);
+  if (bytes && check_of(*bytes) != place.check)
+    return fail(Errc::unavailable, fmt::format("{} is damaged at byte {}", path.string(), place.offset));
+  return bytes;
+}
+
+}  // namespace ls::coordinator

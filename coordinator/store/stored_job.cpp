@@ -1,0 +1,111 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+json to_value(const JobTotals& t) {
+  return {{"render_seconds", t.render_seconds}, {"core_seconds", t.core_seconds},
+          {"load_seconds", t.load_seconds},     {"peak_rss_bytes", t.peak_rss_bytes},
+          {"spp_done", t.spp_done},             {"units", t.units},
+          {"nonfinite", t.health.nonfinite},    {"negative", t.health.negative},
+          {"majorant_violations", t.health.majorant_violations}};
+}
+
+JobTotals totals_of(const json& j) {
+  JobTotals t;
+  t.render_seconds = j.at("render_seconds");
+  t.core_seconds = j.at("core_seconds");
+  t.load_seconds = j.at("load_seconds");
+  t.peak_rss_bytes = j.at("peak_rss_bytes");
+  t.spp_done = j.at("spp_done");
+  t.units = j.at("units");
+  t.health = {j.at("nonfinite"), j.at("negative"), j.at("majorant_violations")};
+  return t;
+}
+
+Digest digest_from(const json& j) {
+  const auto digest = Digest::parse(j.get_ref<const std::string&>());
+  if (!digest) throw std::invalid_argument("a digest is not 64 hexadecimal digits");
+  return *digest;
+}
+
+template <class Enum>
+Enum enum_from(const json& j, std::initializer_list<Enum> all) {
+  const auto& word = j.get_ref<const std::string&>();
+  for (const Enum e : all)
+    if (to_string(e) == word) return e;
+  throw std::invalid_argument("unknown word '" + word + "'");
+}
+
+template <class T>
+T required(Result<T> parsed) {
+  if (!parsed) throw std::invalid_argument(parsed.error().message);
+  return std::move(*parsed);
+}
+
+StoredJob stored_from(const json& j) {
+  StoredJob job;
+  job.id.value = j.at("id");
+  job.name = j.at("name");
+  job.submitted_unix = j.at("submitted_unix");
+  job.scene = digest_from(j.at("scene"));
+  job.settings = required(parse_render_settings(j.at("settings").get<std::string>()));
+  job.spec = required(parse_job_spec(j.at("spec").get<std::string>()));
+  if (!j.at("spp").is_null()) job.spp = j.at("spp").get<std::uint64_t>();
+  for (const auto& a : j.at("assets")) job.assets.push_back({digest_from(a.at("digest")), a.at("bytes"), a.at("name")});
+  job.warnings = j.at("warnings");
+  job.features_used = j.at("features_used");
+  job.features_left_out = j.at("features_left_out");
+  job.state = enum_from(j.at("state"), {JobState::queued, JobState::running, JobState::paused, JobState::done,
+                                        JobState::failed, JobState::cancelled});
+  if (!j.at("stopped").is_null())
+    job.stopped = enum_from(j.at("stopped"),
+                            {StopReason::spp, StopReason::error, StopReason::time, StopReason::user});
+  job.error = j.at("error");
+  if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
+  job.build = j.at("build");
+  job.totals = totals_of(j.at("totals"));
+  return job;
+}
+
+}  // namespace
+
+std::string to_json(const StoredJob& job) {
+  json assets = json::array();
+  for (const auto& a : job.assets) assets.push_back({{"digest", a.digest.hex()}, {"bytes", a.bytes}, {"name", a.name}});
+  json j{{"id", job.id.value},
+         {"name", job.name},
+         {"submitted_unix", job.submitted_unix},
+         {"scene", job.scene.hex()},
+         {"settings", canonical_json(job.settings)},
+         {"spec", canonical_json(job.spec)},
+         {"spp", job.spp ? json(*job.spp) : json()},
+         {"assets", std::move(assets)},
+         {"warnings", job.warnings},
+         {"features_used", job.features_used},
+         {"features_left_out", job.features_left_out},
+         {"state", to_string(job.state)},
+         {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
+         {"error", job.error},
+         {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
+         {"build", job.build},
+         {"totals", to_value(job.totals)}};
+  // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.
+  return j.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+Result<StoredJob> parse_stored_job(std::string_view text) {
+  try {
+    return stored_from(json::parse(text));
+  } catch (const std::exception& e) {
+    return fail(Errc::internal, fmt::format("the record of a job is damaged: {}", e.what()));
+  }
+}
+
+}  // namespace ls::coordinator

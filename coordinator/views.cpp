@@ -1,0 +1,122 @@
+#include "coordinator/views.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
+// Names come from strangers: what is not UTF-8 is replaced.
+std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+// ls_domain has to_string; the views must link without it.
+std::string_view state_word(JobState state) {
+  switch (state) {
+    case JobState::queued: return "queued";
+    case JobState::running: return "running";
+    case JobState::paused: return "paused";
+    case JobState::done: return "done";
+    case JobState::failed: return "failed";
+    case JobState::cancelled: return "cancelled";
+  }
+  return "";
+}
+
+json to_value(const JobView& v) {
+  json j{{"id", v.id.value},
+         {"name", v.name},
+         {"state", state_word(v.state)},
+         {"stopped", text_or_null(v.stopped)},
+         {"progress", number(v.progress)},
+         {"spp", v.spp},
+         {"spp_done", number(v.spp_done)},
+         {"target_error", v.target_error ? number(*v.target_error) : json()},
+         {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
+         {"error", text_or_null(v.error)},
+         {"warnings", v.warnings},
+         {"size", {v.size.width, v.size.height}},
+         {"tile", v.tile},
+         {"priority", v.priority},
+         {"units_done", v.units_done},
+         {"units_total", v.units_total},
+         {"elapsed_seconds", number(v.elapsed_seconds)},
+         {"core_seconds", number(v.core_seconds)},
+         {"submitted_unix", number(v.submitted_unix)},
+         {"health",
+          {{"nonfinite", v.health.nonfinite},
+           {"negative", v.health.negative},
+           {"majorant_violations", v.health.majorant_violations}}}};
+  j["rmse"] = v.error_now ? number(v.error_now->rmse) : json();
+  j["relmse"] = v.error_now ? number(v.error_now->relmse) : json();
+  j["relmse_ci95"] = v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
+  return j;
+}
+
+json to_value(const WorkerView& v) {
+  return {{"id", v.id.value},
+          {"name", v.name},
+          {"build", v.build},
+          {"numeric_class", v.numeric_class.hex()},
+          {"threads", v.threads},
+          {"tags", v.tags},
+          {"state", v.state},
+          {"activity", v.activity},
+          {"job", text_or_null(v.job)},
+          {"units_done", v.units_done},
+          {"cpu_seconds", number(v.cpu_seconds)},
+          {"rss_bytes", v.rss_bytes},
+          {"last_seen_seconds", number(v.last_seen_seconds)}};
+}
+
+template <class View>
+std::string listed(const char* key, const std::vector<View>& views) {
+  json all = json::array();
+  for (const auto& v : views) all.push_back(to_value(v));
+  return dump(json{{key, std::move(all)}});
+}
+
+}  // namespace
+
+std::string job_json(const JobView& job) { return dump(to_value(job)); }
+std::string jobs_json(const std::vector<JobView>& jobs) { return listed("jobs", jobs); }
+std::string worker_json(const WorkerView& worker) { return dump(to_value(worker)); }
+std::string workers_json(const std::vector<WorkerView>& workers) { return listed("workers", workers); }
+
+std::string tiles_json(const std::vector<TileView>& tiles) {
+  json all = json::array();
+  for (const auto& t : tiles)
+    all.push_back({{"tile", t.tile},
+                   {"rect", {t.rect.x0, t.rect.y0, t.rect.x1, t.rect.y1}},
+                   {"rounds", t.rounds_folded},
+                   {"spp", t.spp},
+                   {"workers", t.workers}});
+  return dump(json{{"tiles", std::move(all)}});
+}
+
+std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
+  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi\n";
+  for (const auto& p : points)
+    csv += fmt::format("{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse,
+                       p.error.relmse_lo, p.error.relmse_hi);
+  return csv;
+}
+
+std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& rect, std::string_view state,
+                            std::uint64_t spp, std::string_view worker) {
+  return dump(json{{"job", job.value},
+                   {"tile", tile},
+                   {"rect", {rect.x0, rect.y0, rect.x1, rect.y1}},
+                   {"state", state},
+                   {"spp", spp},
+                   {"worker", worker}});
+}
+
+std::string worker_gone_json(const WorkerId& worker) { return dump(json{{"id", worker.value}, {"state", "gone"}}); }
+
+}  // namespace ls::coordinator
