@@ -1,5 +1,5 @@
-// Vectors, frames and the few formulas that every part of the renderer shares. All of it is branch-light float32 code;
-// whatever needs more than float32 says so where it is used.
+// Vectors, frames and the few formulas that every part of the renderer shares. All of it is branch-light
+// float32 code; whatever needs more than float32 says so where it is used.
 #pragma once
 
 #include <Imath/ImathVec.h>
@@ -47,7 +47,8 @@ inline float mean_component(const C3& c) { return (c.x + c.y + c.z) * (1.f / 3);
 inline bool is_black(const C3& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline bool is_finite(const V3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// (1 - e^-x) / x, continued to 1 at x = 0; right for every x, negative ones too: the mean of e^-t over [0, x].
+// (1 - e^-x) / x, continued to 1 at x = 0; right for every x, negative ones too: the mean of e^-t over [0,
+// x].
 inline float phi(float x) {
   if (std::abs(x) < 1e-4f) return 1 - x * (.5f - x * (1.f / 6));  // next term x^3/24: below 5e-14
   return -std::expm1(-x) / x;
@@ -57,7 +58,8 @@ inline double phi(double x) {
   return -std::expm1(-x) / x;
 }
 
-// Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+// Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis,
+// Revisited").
 struct Frame {
   V3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
 
@@ -80,8 +82,9 @@ struct Frame {
   V3 to_world(const V3& l) const { return s * l.x + t * l.y + n * l.z; }
 };
 
-// ---- sample transformations: u in [0, 1)^2 --------------------------------------------------------------------------
-// Uniform in the unit disk, continuous and of low distortion (Shirley and Chiu 1997); the centre maps to the origin.
+// ---- sample transformations: u in [0, 1)^2
+// -------------------------------------------------------------------------- Uniform in the unit disk,
+// continuous and of low distortion (Shirley and Chiu 1997); the centre maps to the origin.
 inline V2 concentric_disk(const V2& u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
   if (x == 0 && y == 0) return {0, 0};

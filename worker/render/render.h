@@ -23,10 +23,10 @@ class World;
 // Where the bytes of the scene's assets lie on this machine.
 using AssetFiles = std::map<Digest, std::filesystem::path>;
 
-// Builds BVH, grids and light tables. invalid_argument: the scene or one of its files is at fault, and the message says
-// which and why; resource_exhausted: a limit. Deterministic for any `threads`.
-Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings, const AssetFiles& files,
-                                                 int threads);
+// Builds BVH, grids and light tables. invalid_argument: the scene or one of its files is at fault, and the
+// message says which and why; resource_exhausted: a limit. Deterministic for any `threads`.
+Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
+                                                 const AssetFiles& files, int threads);
 
 struct Health {
   std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
@@ -47,6 +47,12 @@ struct TileResult {
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
+// The integrator variants that cover the world, cheapest first, and rendering with one of them: all give the
+// same bits.
+std::vector<std::string> covering_variants(const World& world);
+TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
+                          SampleRange samples);
+
 // One sample of one pixel: its radiance, for replay.
 struct SampleValue {
   double rgb[3];
@@ -58,7 +64,7 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
 struct WorldReport {
   std::vector<std::string> used, left_out;
   std::vector<std::pair<std::string, std::uint64_t>> bytes;
-  std::string variant;  // the integrator instantiation
+  std::string variant;               // the integrator instantiation
   std::uint64_t clamped_inputs = 0;  // negative densities set to 0, degenerate triangles dropped, ...
 };
 WorldReport describe(const World& world);

@@ -1,0 +1,67 @@
+#include "worker/render/camera.h"
+
+#include <cmath>
+
+namespace ls::render {
+namespace {
+
+// Tangent of half the horizontal field of view.
+double tan_half_x(const Sensor& s, double aspect) {
+  const double t = std::tan(s.fov * (3.14159265358979323846 / 360));
+  switch (s.fov_axis) {
+    case FovAxis::x:
+      return t;
+    case FovAxis::y:
+      return t * aspect;
+    case FovAxis::smaller:
+      return aspect > 1 ? t * aspect : t;
+    case FovAxis::larger:
+      return aspect > 1 ? t : t * aspect;
+    case FovAxis::diagonal:
+      return t * aspect / std::sqrt(1 + aspect * aspect);
+  }
+  return t;
+}
+
+}  // namespace
+
+Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale) {
+  const auto& m = s.to_world.m;
+  axis_x_ = V3d(m[0], m[4], m[8]);
+  axis_y_ = V3d(m[1], m[5], m[9]);
+  axis_z_ = V3d(m[2], m[6], m[10]);
+  origin_ = V3((V3d(m[3], m[7], m[11]) - center) * scale);
+  const double aspect = static_cast<double>(size.width) / size.height;
+  const double tx = tan_half_x(s, aspect), ty = tx / aspect;
+  // Film position (fx, fy) in pixels -> ndc in [0,1] -> camera space, x to the left and y up. The principal
+  // point moves the image by a fraction of the film.
+  const double ox = s.principal_point_offset[0], oy = s.principal_point_offset[1];
+  x0_ = tx * (1 + 2 * ox);
+  dx_ = -2 * tx / size.width;
+  y0_ = ty * (1 + 2 * oy);
+  dy_ = -2 * ty / size.height;
+  aperture_ = static_cast<float>(s.aperture_radius);
+  focus_ = static_cast<float>(s.focus_distance);
+  near_ = static_cast<float>(s.near_clip * scale);
+  far_ = static_cast<float>(s.far_clip * scale);
+  lens_scale_ = static_cast<float>(scale);
+}
+
+CameraRay Camera::ray(double fx, double fy, V2 lens) const {
+  const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;
+  V3d local(x, y, 1);
+  V3 o = origin_;
+  if (has_lens()) {
+    const V2 p = concentric_disk(lens) * aperture_;
+    // The point in focus is unmoved by the choice of the lens point.
+    local = V3d(x * focus_ - p.x, y * focus_ - p.y, focus_);
+    o = origin_ + V3((axis_x_ * p.x + axis_y_ * p.y) * lens_scale_);
+  }
+  const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
+  const V3 d = V3(along.normalized());
+  // Clip planes are measured along the axis; the ray starts at the near one.
+  const auto per_depth = static_cast<float>(local.length() / local.z);
+  return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
+}
+
+}  // namespace ls::render

@@ -1,0 +1,19 @@
+// What a scene needs of the integrator. A variant may remove code, never change random-number use or
+// arithmetic order, so every variant that covers a scene gives the same bits (DESIGN section 6).
+#pragma once
+
+namespace ls::render {
+
+struct Features {
+  bool media = false;      // any participating medium
+  bool grids = false;      // heterogeneous media
+  bool chromatic = false;  // extinction that differs between channels
+  bool operator==(const Features&) const = default;
+
+  constexpr bool covers(const Features& need) const {
+    return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic);
+  }
+};
+inline constexpr Features kEverything{.media = true, .grids = true, .chromatic = true};
+
+}  // namespace ls::render

@@ -1,0 +1,167 @@
+#include "worker/render/geometry.h"
+
+#include <cmath>
+#include <limits>
+
+namespace ls::render {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+struct Barycentric {
+  double t, u, v;  // p = v0 + u (v1 - v0) + v (v2 - v0)
+};
+
+// Plain division in double (never the processor's reciprocal estimates: their bits differ between makers).
+bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, const V3d& d, Barycentric& b) {
+  const V3d p = d.cross(e2);
+  const double det = e1.dot(p);
+  if (det == 0) return false;
+  const V3d s = o - v0;
+  const V3d q = s.cross(e1);
+  b = {e2.dot(q) / det, s.dot(p) / det, d.dot(q) / det};
+  return std::isfinite(b.t) && std::isfinite(b.u) && std::isfinite(b.v);
+}
+
+// The BVH decides which triangle is met with float32 arithmetic; near an edge exact arithmetic may place the
+// point just outside. Such points are moved onto the triangle.
+void clamp_to_triangle(Barycentric& b) {
+  b.u = std::max(b.u, 0.);
+  b.v = std::max(b.v, 0.);
+  if (const double sum = b.u + b.v; sum > 1) {
+    b.u /= sum;
+    b.v /= sum;
+  }
+}
+
+bool complete_triangle(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+  const std::uint32_t* idx = &g.indices[3 * i];
+  const V3d v0(g.positions[idx[0]]), v1(g.positions[idx[1]]), v2(g.positions[idx[2]]);
+  const V3d e1 = v1 - v0, e2 = v2 - v0;
+  Barycentric b;
+  if (!meet_triangle(v0, e1, e2, V3d(o), V3d(d), b)) return false;
+  clamp_to_triangle(b);
+  hit.t = static_cast<float>(b.t);
+  hit.p = V3(v0 + e1 * b.u + e2 * b.v);
+  hit.surface = g.triangle_surface[i];
+  const SurfaceInfo& s = g.surfaces[hit.surface];
+  const V3d n = e1.cross(e2);
+  hit.ng = V3(n * (s.orientation / n.length()));
+  const auto u = static_cast<float>(b.u), v = static_cast<float>(b.v), w = 1 - u - v;
+  V3 tangent(e1);
+  if (s.uvs) {
+    const V2 a = g.uvs[idx[0]], du = g.uvs[idx[1]] - a, dv = g.uvs[idx[2]] - a;
+    hit.uv = a + du * u + dv * v;
+    const float det = du.x * dv.y - du.y * dv.x;
+    if (det != 0) tangent = V3(e1 * (dv.y / det) - e2 * (du.y / det));
+  } else {
+    hit.uv = {u, v};
+  }
+  V3 ns = hit.ng;
+  if (s.normals) {
+    const V3 m = g.normals[idx[0]] * w + g.normals[idx[1]] * u + g.normals[idx[2]] * v;
+    if (dot(m, m) > 0) ns = normalize(m) * s.orientation;
+  }
+  hit.shading = Frame::from_tangent(ns, tangent);
+  return true;
+}
+
+bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+  const Sphere& s = g.spheres[i];
+  const double t = intersect(s, V3d(o), V3d(d), 0, kInf);
+  if (t == kInf) return false;
+  hit.t = static_cast<float>(t);
+  V3d n = V3d(o) + V3d(d) * t - s.center;
+  const double l = n.length();
+  if (!(l > 0)) return false;
+  n /= l;
+  hit.p = V3(s.center + n * s.radius);
+  hit.surface = s.surface;
+  const float sign = g.surfaces[s.surface].orientation;
+  hit.ng = V3(n) * sign;
+  const auto* r = s.to_local;
+  const V3d q(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
+              r[6] * n.x + r[7] * n.y + r[8] * n.z);
+  double angle = std::atan2(q.y, q.x);
+  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  hit.uv = {static_cast<float>(angle) * kInvTwoPi,
+            static_cast<float>(std::acos(std::clamp(q.z, -1., 1.))) * kInvPi};
+  // Tangent along increasing azimuth about the local z axis.
+  const V3d dpdu(-q.y * r[0] + q.x * r[3], -q.y * r[1] + q.x * r[4], -q.y * r[2] + q.x * r[5]);
+  hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
+  return true;
+}
+
+bool complete_disk(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+  const Disk& s = g.disks[i];
+  const double den = s.n.dot(V3d(d));
+  if (den == 0) return false;
+  const double t = s.n.dot(s.center - V3d(o)) / den;
+  if (!std::isfinite(t)) return false;
+  hit.t = static_cast<float>(t);
+  const V3d q = V3d(o) + V3d(d) * t - s.center;
+  const double uu = s.u.dot(s.u), vv = s.v.dot(s.v), uv = s.u.dot(s.v), det = uu * vv - uv * uv;
+  double a = (q.dot(s.u) * vv - q.dot(s.v) * uv) / det, b = (q.dot(s.v) * uu - q.dot(s.u) * uv) / det;
+  if (const double r2 = a * a + b * b; r2 > 1) {
+    a /= std::sqrt(r2);
+    b /= std::sqrt(r2);
+  }
+  hit.p = V3(s.center + s.u * a + s.v * b);
+  hit.surface = s.surface;
+  hit.ng = V3(s.n) * g.surfaces[s.surface].orientation;
+  double angle = std::atan2(b, a);
+  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  hit.uv = {static_cast<float>(std::sqrt(a * a + b * b)), static_cast<float>(angle) * kInvTwoPi};
+  hit.shading = Frame::from_tangent(hit.ng, V3(s.u * a + s.v * b));
+  return true;
+}
+
+}  // namespace
+
+bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+  hit.primitive = id;
+  switch (id.kind) {
+    case PrimitiveId::Kind::triangle:
+      return complete_triangle(*this, id.index, o, d, hit);
+    case PrimitiveId::Kind::sphere:
+      return complete_sphere(*this, id.index, o, d, hit);
+    case PrimitiveId::Kind::disk:
+      return complete_disk(*this, id.index, o, d, hit);
+  }
+  return false;
+}
+
+double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max) {
+  // Relative to the point nearest to the centre: no cancellation for distant or grazing rays.
+  const V3d f = o - s.center;
+  const double a = d.dot(d), b = -f.dot(d);
+  const V3d foot = f + d * (b / a);
+  const double disc = s.radius * s.radius - foot.dot(foot);
+  if (!(disc >= 0)) return kInf;
+  const double c = f.dot(f) - s.radius * s.radius, q = b + std::copysign(std::sqrt(a * disc), b);
+  double t0 = q != 0 ? c / q : 0, t1 = q / a;
+  if (t0 > t1) std::swap(t0, t1);
+  if (t0 > t_min && t0 < t_max) return t0;
+  if (t1 > t_min && t1 < t_max) return t1;
+  return kInf;
+}
+
+double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max) {
+  const double den = s.n.dot(d);
+  if (den == 0) return kInf;
+  const double t = s.n.dot(s.center - o) / den;
+  if (!(t > t_min && t < t_max)) return kInf;
+  const V3d q = o + d * t - s.center;
+  const double uu = s.u.dot(s.u), vv = s.v.dot(s.v), uv = s.u.dot(s.v), det = uu * vv - uv * uv;
+  const double a = (q.dot(s.u) * vv - q.dot(s.v) * uv) / det, b = (q.dot(s.v) * uu - q.dot(s.u) * uv) / det;
+  return a * a + b * b <= 1 ? t : kInf;
+}
+
+std::uint64_t Geometry::bytes() const {
+  return positions.size() * sizeof(V3) + normals.size() * sizeof(V3) + uvs.size() * sizeof(V2) +
+         indices.size() * sizeof(std::uint32_t) + triangle_surface.size() * sizeof(std::uint32_t) +
+         spheres.size() * sizeof(Sphere) + disks.size() * sizeof(Disk) +
+         surfaces.size() * sizeof(SurfaceInfo);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,187 @@
+#include "worker/render/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ls::render {
+namespace {
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+// Interpolating eight float32 numbers can exceed their maximum by a few units in the last place (STABILITY
+// N9).
+constexpr float kInflate = 1 + 4 * 0x1p-23f;
+
+// The part of [t0, t1] inside the box; empty if the ends are in the wrong order. A ray parallel to a face and
+// outside of it has an empty part, one inside is not limited by it.
+struct Interval {
+  double t0, t1;
+};
+Interval clip(const V3d& lo, const V3d& hi, const V3d& o, const V3d& d, double t0, double t1) {
+  for (int k = 0; k < 3; ++k) {
+    if (d[k] == 0) {
+      if (o[k] < lo[k] || o[k] > hi[k]) return {1, 0};
+      continue;
+    }
+    double a = (lo[k] - o[k]) / d[k], b = (hi[k] - o[k]) / d[k];
+    if (a > b) std::swap(a, b);
+    t0 = std::max(t0, a);
+    t1 = std::min(t1, b);
+  }
+  return {t0, t1};
+}
+
+}  // namespace
+
+Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
+           V3d domain_hi, double density_to_sigma)
+    : size_(size), values_(std::move(values)), lo_(domain_lo), hi_(domain_hi), exact_(world_to_index) {
+  for (int k = 0; k < 3; ++k) {
+    last_[k] = std::max(0, size[k] - 2);
+    top_[k] = static_cast<float>(size[k] - 1);
+  }
+  // An axis of one node has no neighbour: stepping by 0 reads the node itself.
+  step_ = {size[0] > 1 ? std::size_t{1} : 0, size[1] > 1 ? static_cast<std::size_t>(size[0]) : 0,
+           size[2] > 1 ? static_cast<std::size_t>(size[0]) * size[1] : 0};
+  for (int i = 0; i < 9; ++i) a_[i] = static_cast<float>(world_to_index.a[i]);
+  b_ = V3(world_to_index.b);
+  for (float v : values_) max_value_ = std::max(max_value_, v);
+  build_macro_cells(density_to_sigma);
+}
+
+void Grid::build_macro_cells(double density_to_sigma) {
+  // Wanted: majorant x cell diagonal about 1.44 (Fong et al. 2017, section 3.3), between 4 and 16 voxels:
+  // smaller cells cost more steps than the null collisions they save, larger ones bound nothing.
+  const Affine inverse = exact_.inverse();
+  const double voxel = inverse.vector({1, 1, 1}).length();
+  const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
+  cell_size_ = wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+  for (int k = 0; k < 3; ++k) {
+    cells_[k] = std::max(1, static_cast<int>(std::ceil((hi_[k] - lo_[k]) / static_cast<float>(cell_size_))));
+  }
+  macro_.resize(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2]);
+  std::size_t i = 0;
+  for (int z = 0; z < cells_[2]; ++z)
+    for (int y = 0; y < cells_[1]; ++y)
+      for (int x = 0; x < cells_[0]; ++x) macro_[i++] = bound_cell(x, y, z);
+}
+
+MacroCell Grid::bound_cell(int x, int y, int z) const {
+  // Every node that interpolation inside the cell can touch: one more on each side than the cell covers,
+  // because the walk's positions are rounded.
+  int a[3], b[3];
+  const int c[3] = {x, y, z};
+  for (int k = 0; k < 3; ++k) {
+    const float lo = lo_[k] + static_cast<float>(c[k] * cell_size_), hi = lo + static_cast<float>(cell_size_);
+    a[k] = std::clamp(static_cast<int>(std::floor(lo - .01f)), 0, size_[k] - 1);
+    b[k] = std::clamp(static_cast<int>(std::ceil(hi + .01f)), 0, size_[k] - 1);
+  }
+  float mn = kInf, mx = 0;
+  double sum = 0;
+  std::uint64_t n = 0;
+  for (int k = a[2]; k <= b[2]; ++k)
+    for (int j = a[1]; j <= b[1]; ++j) {
+      const float* row = values_.data() + (static_cast<std::size_t>(k) * size_[1] + j) * size_[0];
+      for (int i = a[0]; i <= b[0]; ++i) {
+        mn = std::min(mn, row[i]);
+        mx = std::max(mx, row[i]);
+        sum += row[i];
+        ++n;
+      }
+    }
+  MacroCell m;
+  m.hi = mx * kInflate;
+  // Constant cells need no residual at all: rounding in the interpolation of equal numbers is nil.
+  m.control = mn == mx ? mn : std::clamp(static_cast<float>(sum / static_cast<double>(n)), mn, mx);
+  m.residual = std::max(m.hi - m.control, m.control - mn) * kInflate;
+  if (mn == mx) m.residual = 0;
+  return m;
+}
+
+CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1)
+    : grid_(grid), lo_(grid.domain_lo()), size_(static_cast<float>(grid.cell_size())) {
+  origin_ = grid.to_index(o);
+  direction_ = grid.linear(d);
+  const Interval part =
+      clip(V3d(grid.domain_lo()), V3d(grid.domain_hi()), V3d(origin_), V3d(direction_), t0, t1);
+  begin_ = end_ = static_cast<float>(part.t0);
+  stop_ = static_cast<float>(part.t1);
+  if (!(begin_ < stop_)) {
+    stop_ = begin_;
+    return;
+  }
+  const V3 start = index(begin_);
+  const auto cells = grid.cells();
+  for (int k = 0; k < 3; ++k) {
+    count_[k] = cells[k];
+    at_[k] = std::clamp(static_cast<int>(std::floor((start[k] - lo_[k]) / size_)), 0, cells[k] - 1);
+    // A component too small to cross a cell within the ray counts as parallel.
+    if (std::abs(direction_[k]) < 1e-20f) {
+      step_[k] = 0;
+      exit_[k] = kInf;
+      inverse_[k] = 0;
+    } else {
+      step_[k] = direction_[k] > 0 ? 1 : -1;
+      inverse_[k] = 1 / direction_[k];
+      exit_[k] = boundary(k);
+    }
+  }
+}
+
+bool CellWalk::next() {
+  if (!(end_ < stop_)) return false;
+  if (started_) {
+    const int k = exit_[0] < exit_[1] ? (exit_[0] < exit_[2] ? 0 : 2) : (exit_[1] < exit_[2] ? 1 : 2);
+    at_[k] += step_[k];
+    if (step_[k] == 0 || at_[k] < 0 || at_[k] >= count_[k]) return false;
+    exit_[k] = boundary(k);
+  }
+  started_ = true;
+  begin_ = end_;
+  end_ = std::max(begin_, std::min(stop_, std::min(exit_[0], std::min(exit_[1], exit_[2]))));
+  return true;
+}
+
+double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) const {
+  const V3d oi = exact_.point(o), di = exact_.vector(d);
+  const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
+  if (!(part.t0 < part.t1)) return 0;
+  // Every crossing of a node plane, in order; within two of them the field is one trilinear patch.
+  std::vector<double> cuts{part.t0, part.t1};
+  for (int k = 0; k < 3; ++k) {
+    if (di[k] == 0) continue;
+    for (int i = 0; i < size_[k]; ++i) {
+      const double t = (i - oi[k]) / di[k];
+      if (t > part.t0 && t < part.t1) cuts.push_back(t);
+    }
+  }
+  std::sort(cuts.begin(), cuts.end());
+  const auto at = [&](double t) {
+    const V3d q = oi + di * t;
+    double v = 0;
+    int c[3];
+    double f[3];
+    for (int k = 0; k < 3; ++k) {
+      const double x = std::clamp(q[k], 0., static_cast<double>(size_[k] - 1));
+      c[k] = std::min(static_cast<int>(x), last_[k]);
+      f[k] = x - c[k];
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+      const int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
+      const double w = (i ? f[0] : 1 - f[0]) * (j ? f[1] : 1 - f[1]) * (k ? f[2] : 1 - f[2]);
+      const std::size_t at = (static_cast<std::size_t>(c[2]) * size_[1] + c[1]) * size_[0] + c[0] +
+                             i * step_[0] + j * step_[1] + k * step_[2];
+      v += w * values_[at];
+    }
+    return v;
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double h = cuts[i + 1] - cuts[i], m = (cuts[i] + cuts[i + 1]) / 2, g = h / (2 * std::sqrt(3.));
+    sum += h / 2 * (at(m - g) + at(m + g));
+  }
+  return sum;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,147 @@
+#include "worker/render/grid_load.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "common/assets/vol.h"
+#include "common/base/overloaded.h"
+#include "worker/render/vdb_module.h"
+
+namespace ls::render {
+namespace {
+
+bool is_vdb(std::string_view name) { return name.size() > 4 && name.substr(name.size() - 4) == ".vdb"; }
+
+// World to index, given scene to index.
+Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
+  return scene_to_index * Affine::scale_translate(1 / scale, center);
+}
+
+Result<LoadedVolume> constant_volume(const ConstVolume& v, V3d center, double scale, double to_sigma) {
+  // As in Mitsuba, a volume without a file fills the unit cube.
+  LoadedVolume out;
+  for (int c = 0; c < 3; ++c) {
+    out.channels.emplace_back(std::array<int, 3>{1, 1, 1}, std::vector<float>{static_cast<float>(v.value[c])},
+                              from_world(Affine(), center, scale), V3d(0, 0, 0), V3d(1, 1, 1), to_sigma);
+  }
+  if (v.value[0] == v.value[1] && v.value[1] == v.value[2]) out.channels.resize(1);
+  return out;
+}
+
+Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
+                              double to_sigma) {
+  auto path = files.path(v.file);
+  if (!path) return tl::unexpected(path.error());
+  auto data = load_vol(*path, files.name(v.file));
+  if (!data) return tl::unexpected(data.error());
+  // Values sit at cell centres of the unit cube; the cube is the file's box first, if asked for, then moved.
+  Affine unit_to_scene(v.to_world);
+  if (v.use_grid_bbox) {
+    const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
+        hi(data->bbox_max[0], data->bbox_max[1], data->bbox_max[2]);
+    Affine box;
+    box.a = {hi.x - lo.x, 0, 0, 0, hi.y - lo.y, 0, 0, 0, hi.z - lo.z};
+    box.b = lo;
+    unit_to_scene = unit_to_scene * box;
+  }
+  if (!unit_to_scene.finite() || unit_to_scene.determinant() == 0) {
+    return fail(Errc::invalid_argument,
+                fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
+  }
+  const int n[3] = {static_cast<int>(data->nx), static_cast<int>(data->ny), static_cast<int>(data->nz)};
+  Affine to_nodes;
+  to_nodes.a = {static_cast<double>(n[0]), 0, 0, 0, static_cast<double>(n[1]), 0, 0, 0,
+                static_cast<double>(n[2])};
+  to_nodes.b = V3d(-.5);
+  const Affine world_to_index = from_world(to_nodes * unit_to_scene.inverse(), center, scale);
+  LoadedVolume out;
+  out.clamped = data->negatives;
+  const std::size_t count = static_cast<std::size_t>(n[0]) * n[1] * n[2];
+  for (std::uint32_t c = 0; c < data->channels; ++c) {
+    std::vector<float> values;
+    if (data->channels == 1) {
+      values = std::move(data->values);
+    } else {
+      values.resize(count);
+      for (std::size_t i = 0; i < count; ++i) values[i] = data->values[data->channels * i + c];
+    }
+    out.channels.emplace_back(std::array<int, 3>{n[0], n[1], n[2]}, std::move(values), world_to_index,
+                              V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), to_sigma);
+  }
+  return out;
+}
+
+struct VdbModule {
+  decltype(&ls_vdb_read) read = nullptr;
+  decltype(&ls_vdb_free) free = nullptr;
+  std::string error;
+};
+
+// Beside the executable, in ../lib of it, or where the loader looks.
+VdbModule open_vdb_module() {
+  constexpr char kName[] = "liblightshaft_vdb.so";
+  std::error_code ec;
+  const auto exe = std::filesystem::read_symlink("/proc/self/exe", ec);
+  VdbModule m;
+  for (const auto& candidate : {exe.parent_path() / kName, exe.parent_path().parent_path() / "lib" / kName,
+                                std::filesystem::path(kName)}) {
+    void* lib = dlopen(candidate.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (!lib) {
+      m.error = dlerror();
+      continue;
+    }
+    m.read = reinterpret_cast<decltype(m.read)>(dlsym(lib, "ls_vdb_read"));
+    m.free = reinterpret_cast<decltype(m.free)>(dlsym(lib, "ls_vdb_free"));
+    if (m.read && m.free) return m;
+  }
+  return m;
+}
+
+Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
+                              double to_sigma) {
+  static const VdbModule module = open_vdb_module();
+  if (!module.read)
+    return fail(Errc::internal, fmt::format("the OpenVDB module is missing: {}", module.error));
+  auto path = files.path(v.file);
+  if (!path) return tl::unexpected(path.error());
+  const std::string& name = files.name(v.file);
+  LsVdbGrid raw{};
+  char error[512] = {};
+  const int rc = module.read(path->c_str(), v.grid_name.c_str(), kMaxGridValues, &raw, error, sizeof error);
+  if (rc != 0)
+    return fail(rc == 2 ? Errc::resource_exhausted : Errc::invalid_argument,
+                fmt::format("{}: {}", name, error));
+  const std::unique_ptr<LsVdbGrid, decltype(module.free)> guard(&raw, module.free);
+  Transform t;
+  std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
+  const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);
+  if (!nodes_to_scene.finite() || nodes_to_scene.determinant() == 0) {
+    return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform has no inverse", name));
+  }
+  const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
+  std::vector<float> values(raw.values, raw.values + static_cast<std::size_t>(size[0]) * size[1] * size[2]);
+  LoadedVolume out;
+  out.clamped = raw.negatives;
+  // Interpolation falls to the background within one voxel of the active ones, and the grid ends there.
+  out.channels.emplace_back(size, std::move(values), from_world(nodes_to_scene.inverse(), center, scale),
+                            V3d(0), V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma);
+  return out;
+}
+
+}  // namespace
+
+Result<LoadedVolume> load_volume(const Volume& volume, const AssetLoader& files, V3d center, double scale,
+                                 double to_sigma) {
+  return std::visit(
+      overloaded{[&](const ConstVolume& v) { return constant_volume(v, center, scale, to_sigma); },
+                 [&](const GridVolume& v) {
+                   return is_vdb(files.name(v.file)) ? vdb_file(v, files, center, scale, to_sigma)
+                                                     : vol_file(v, files, center, scale, to_sigma);
+                 }},
+      volume);
+}
+
+}  // namespace ls::render

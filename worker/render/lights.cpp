@@ -1,0 +1,195 @@
+#include "worker/render/lights.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/medium.h"
+
+namespace ls::render {
+namespace {
+
+// The part of the sphere's surface seen from x, as 1 - cos of the half angle, without cancellation (STABILITY
+// N26).
+struct Cone {
+  float one_minus_cos;  // 2 means x is inside: the whole sphere of directions
+};
+Cone cone_of(const Sphere& s, const V3& x) {
+  const V3d f = s.center - V3d(x);
+  const double d2 = f.dot(f), sin2 = s.radius * s.radius / d2;
+  if (!(sin2 < 1)) return {2};
+  return {static_cast<float>(sin2 / (1 + std::sqrt(1 - sin2)))};
+}
+
+}  // namespace
+
+LightChoice Lights::choose(float u_select, V2 u) const {
+  const auto it = std::upper_bound(cdf_.begin(), cdf_.end() - 1, u_select);
+  LightChoice c;
+  c.light = static_cast<std::uint32_t>(it - cdf_.begin());
+  const Light& l = lights_[c.light];
+  c.probability = l.probability;
+  c.u = u;
+  c.has_place = l.kind != Kind::directional;
+  switch (l.kind) {
+    case Kind::point:
+    case Kind::spot:
+      c.pivot = l.position;
+      break;
+    case Kind::sphere:
+      c.pivot = V3(geometry_->spheres[l.primitive].center);
+      break;
+    case Kind::parallelogram:
+    case Kind::mesh:
+    case Kind::disk:
+      c.pivot = area_point(l, u).p;
+      break;
+    case Kind::directional:
+      break;
+  }
+  return c;
+}
+
+Lights::Point Lights::area_point(const Light& l, V2 u) const {
+  if (l.kind == Kind::parallelogram) {
+    return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y};
+  }
+  if (l.kind == Kind::disk) {
+    const V2 q = concentric_disk(u);
+    float angle = std::atan2(q.y, q.x);
+    if (angle < 0) angle += kTwoPi;
+    return {l.position + l.axis_u * q.x + l.axis_v * q.y,
+            l.normal,
+            {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi}};
+  }
+  // Mesh: the first number chooses the triangle and is stretched to be used again.
+  const double target = u.x * l.cdf.back();
+  const auto it = std::upper_bound(l.cdf.begin(), l.cdf.end() - 1, target);
+  const auto k = static_cast<std::uint32_t>(it - l.cdf.begin());
+  const double before = k ? l.cdf[k - 1] : 0, width = l.cdf[k] - before;
+  const auto r = static_cast<float>(std::clamp((target - before) / width, 0., 1.));
+  const float root = std::sqrt(r), b0 = 1 - root, b1 = u.y * root, b2 = 1 - b0 - b1;
+  const std::uint32_t tri = l.primitive + k, *idx = &geometry_->indices[std::size_t{3} * tri];
+  const V3 v0 = geometry_->positions[idx[0]], v1 = geometry_->positions[idx[1]],
+           v2 = geometry_->positions[idx[2]];
+  Point y;
+  y.p = v0 * b0 + v1 * b1 + v2 * b2;
+  y.n = normalize(cross(v1 - v0, v2 - v0)) * l.sign;
+  y.uv = {b1, b2};
+  if (!geometry_->uvs.empty() && geometry_->surfaces[geometry_->triangle_surface[tri]].uvs) {
+    y.uv = geometry_->uvs[idx[0]] * b0 + geometry_->uvs[idx[1]] * b1 + geometry_->uvs[idx[2]] * b2;
+  }
+  return y;
+}
+
+std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, const V3& x) const {
+  const V3 target = offset_point(y.p, y.n, y.n);  // just in front of the light: the shadow ray ends before it
+  const V3 f = target - x;
+  const float d2 = dot(f, f);
+  if (!(d2 > 0)) return std::nullopt;
+  const float d = std::sqrt(d2);
+  LightSample s;
+  s.direction = f / d;
+  s.distance = d;
+  s.target = target;
+  const float cosine = -dot(s.direction, y.n);
+  if (!(cosine > 0)) return std::nullopt;
+  s.radiance = area_radiance(l, y.uv);
+  s.pdf = static_cast<float>(d2 / (cosine * l.area)) * l.probability;
+  if (!std::isfinite(s.pdf)) return std::nullopt;
+  return s;
+}
+
+std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3& x) const {
+  const Sphere& sphere = geometry_->spheres[l.primitive];
+  const Cone cone = cone_of(sphere, x);
+  const bool inside = cone.one_minus_cos == 2;
+  if (inside != (l.sign < 0)) return std::nullopt;  // the emitting side is turned away
+  const V3 axis = normalize(V3(sphere.center - V3d(x)));
+  const float one_minus = cone.one_minus_cos * u.x, cosine = 1 - one_minus;
+  const float sine = std::sqrt(std::max(0.f, one_minus * (2 - one_minus)));
+  const float angle = kTwoPi * u.y;
+  LightSample s;
+  const Frame frame = dot(axis, axis) > 0 ? Frame(axis) : Frame(V3(0, 0, 1));
+  s.direction = normalize(frame.to_world({sine * std::cos(angle), sine * std::sin(angle), cosine}));
+  const double t = intersect(sphere, V3d(x), V3d(s.direction), 0, std::numeric_limits<double>::infinity());
+  // At the rim rounding may miss the sphere: the nearest point of the ray stands for it.
+  const double reach = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
+  const V3d n = (V3d(x) + V3d(s.direction) * reach - sphere.center).normalized();
+  const V3 p(sphere.center + n * sphere.radius);
+  const V3 target = offset_point(p, V3(n), V3(n) * l.sign), f = target - x;
+  s.distance = std::sqrt(dot(f, f));
+  s.target = target;
+  s.pdf = l.probability / (kTwoPi * cone.one_minus_cos);
+  s.radiance = area_radiance(l, {0, 0});
+  if (!(s.distance > 0) || !std::isfinite(s.pdf)) return std::nullopt;
+  return s;
+}
+
+C3 Lights::spot_radiance(const Light& l, const V3& towards) const {
+  const float z = dot(towards, l.normal);
+  if (z <= l.cos_cutoff) return {0, 0, 0};
+  C3 value = l.value;
+  if (z < l.cos_beam) value *= (l.cutoff - std::acos(std::min(z, 1.f))) * l.inv_transition;
+  if (l.textured) {
+    const float k = .5f / (z * l.tan_cutoff);
+    value *=
+        textures_->eval(l.radiance, {.5f + dot(towards, l.axis_u) * k, .5f + dot(towards, l.axis_v) * k});
+  }
+  return value;
+}
+
+std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) const {
+  const Light& l = lights_[c.light];
+  switch (l.kind) {
+    case Kind::parallelogram:
+    case Kind::mesh:
+    case Kind::disk:
+      return sample_area(l, area_point(l, c.u), x);
+    case Kind::sphere:
+      return sample_sphere(l, c.u, x);
+    case Kind::directional: {
+      return LightSample{-l.normal, kInfinity, V3(0), l.value, l.probability, true};
+    }
+    case Kind::point:
+    case Kind::spot:
+      break;
+  }
+  const V3 f = l.position - x;
+  const float d2 = dot(f, f);
+  if (!(d2 > 0)) return std::nullopt;
+  LightSample s;
+  s.distance = std::sqrt(d2);
+  s.direction = f / s.distance;
+  s.target = l.position;
+  s.radiance = (l.kind == Kind::spot ? spot_radiance(l, -s.direction) : l.value) / d2;
+  s.pdf = l.probability;
+  s.delta = true;
+  if (is_black(s.radiance) || !is_finite(s.radiance)) return std::nullopt;
+  return s;
+}
+
+C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
+  const std::uint32_t i = geometry_->surfaces[hit.surface].light;
+  if (i == kNone || !(dot(hit.ng, w) > 0)) return {0, 0, 0};
+  return area_radiance(lights_[i],
+                       lights_[i].kind == Kind::sphere && !lights_[i].textured ? V2(0, 0) : hit.uv);
+}
+
+float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction) const {
+  const Light& l = lights_[geometry_->surfaces[hit.surface].light];
+  if (l.kind == Kind::sphere) {
+    const Cone cone = cone_of(geometry_->spheres[l.primitive], x);
+    return l.probability / (kTwoPi * cone.one_minus_cos);
+  }
+  const V3 f = hit.p - x;
+  const float cosine = std::abs(dot(direction, hit.ng));
+  if (!(cosine > 0)) return 0;
+  return static_cast<float>(dot(f, f) / (cosine * l.area)) * l.probability;
+}
+
+V3 Lights::pivot(const SurfaceHit& hit) const {
+  const Light& l = lights_[geometry_->surfaces[hit.surface].light];
+  return l.kind == Kind::sphere ? V3(geometry_->spheres[l.primitive].center) : hit.p;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,175 @@
+// Scene emitters -> the light table, in world units: lengths shrink by the world's scale, so intensities
+// (power per solid angle) shrink by its square; radiance and irradiance do not change.
+#include <cmath>
+
+#include "common/base/overloaded.h"
+#include "worker/render/lights.h"
+#include "worker/render/transform.h"
+
+namespace ls::render {
+namespace {
+
+C3 color(const Rgb& c) {
+  return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+}
+
+}  // namespace
+
+void Lights::add_area(const Scene& scene, std::uint32_t shape, Geometry& g) {
+  const Shape& s = scene.shapes[shape];
+  Light l;
+  l.radiance = s.emitter->radiance;
+  l.textured = !textures_->is_constant(l.radiance);
+  l.sign = g.surfaces[shape].orientation;
+  std::uint32_t first = kNone, count = 0;
+  for (std::uint32_t i = 0; i < g.triangle_count(); ++i) {
+    if (g.triangle_surface[i] != shape) continue;
+    if (first == kNone) first = i;
+    ++count;
+  }
+  if (std::holds_alternative<SphereShape>(s.geometry)) {
+    l.kind = Kind::sphere;
+    for (std::uint32_t i = 0; i < g.spheres.size(); ++i) {
+      if (g.spheres[i].surface == shape) l.primitive = i;
+    }
+    l.area = 4 * 3.14159265358979323846 * sqr(g.spheres[l.primitive].radius);
+  } else if (std::holds_alternative<DiskShape>(s.geometry)) {
+    l.kind = Kind::disk;
+    for (const Disk& d : g.disks) {
+      if (d.surface != shape) continue;
+      l.position = V3(d.center);
+      l.axis_u = V3(d.u);
+      l.axis_v = V3(d.v);
+      l.normal = V3(d.n) * l.sign;
+      l.area = 3.14159265358979323846 * d.u.cross(d.v).length();
+    }
+  } else if (std::holds_alternative<RectangleShape>(s.geometry) && count == 2) {
+    l.kind = Kind::parallelogram;
+    const std::uint32_t* idx = &g.indices[std::size_t{3} * first];  // corners 0, 1, 2 of the rectangle
+    const V3 a = g.positions[idx[0]], b = g.positions[idx[1]], c = g.positions[idx[2]];
+    l.position = a;
+    l.axis_u = b - a;
+    l.axis_v = c - b;
+    const V3d n = V3d(l.axis_u).cross(V3d(l.axis_v));
+    l.area = n.length();
+    l.normal = V3(n / l.area) * l.sign;
+    l.uv0 = {0, 0};
+    l.uv_u = {1, 0};
+    l.uv_v = {0, 1};
+  } else {
+    l.kind = Kind::mesh;
+    l.primitive = first;
+    for (std::uint32_t i = first; i < first + count && first != kNone; ++i) {
+      const V3d e1 = V3d(g.vertex(i, 1)) - V3d(g.vertex(i, 0)),
+                e2 = V3d(g.vertex(i, 2)) - V3d(g.vertex(i, 0));
+      l.area += e1.cross(e2).length() / 2;
+      l.cdf.push_back(l.area);
+    }
+  }
+  if (!(l.area > 0) || is_black(textures_->mean(l.radiance))) {
+    ++left_out_;
+    return;
+  }
+  g.surfaces[shape].light = static_cast<std::uint32_t>(lights_.size());
+  lights_.push_back(std::move(l));
+}
+
+Result<void> Lights::add_emitter(const Emitter& emitter) {
+  const double s = geometry_->scale;
+  const auto place = [&](const V3d& p) { return V3((p - geometry_->center) * s); };
+  Light l;
+  std::visit(overloaded{[&](const ConstantEmitter& e) {
+                          environment_ += color(e.radiance);
+                          l.probability = -1;  // not a light to sample
+                        },
+                        [&](const DirectionalEmitter& e) {
+                          l.kind = Kind::directional;
+                          l.normal = V3(V3d(e.direction[0], e.direction[1], e.direction[2]).normalized());
+                          l.value = color(e.irradiance);
+                        },
+                        [&](const PointEmitter& e) {
+                          l.kind = Kind::point;
+                          l.position = place({e.position[0], e.position[1], e.position[2]});
+                          l.value = color(e.intensity) * static_cast<float>(s * s);
+                        },
+                        [&](const SpotEmitter& e) {
+                          l.kind = Kind::spot;
+                          const Affine m(e.to_world);
+                          l.position = place(m.b);
+                          l.normal = V3(m.vector({0, 0, 1}).normalized());
+                          l.axis_u = V3(m.vector({1, 0, 0}).normalized());
+                          l.axis_v = V3(m.vector({0, 1, 0}).normalized());
+                          l.value = color(e.intensity) * static_cast<float>(s * s);
+                          const double rad = 3.14159265358979323846 / 180, cutoff = e.cutoff_angle * rad,
+                                       beam = e.beam_width * rad;
+                          l.cutoff = static_cast<float>(cutoff);
+                          l.cos_cutoff = static_cast<float>(std::cos(cutoff));
+                          l.cos_beam = static_cast<float>(std::cos(beam));
+                          l.inv_transition = cutoff > beam ? static_cast<float>(1 / (cutoff - beam)) : 0.f;
+                          l.tan_cutoff = static_cast<float>(std::tan(cutoff));
+                          if (e.texture) {
+                            l.textured = true;
+                            l.radiance = *e.texture;
+                          }
+                        }},
+             emitter);
+  if (l.probability < 0) return {};
+  if (is_black(l.value)) {
+    ++left_out_;
+    return {};
+  }
+  lights_.push_back(std::move(l));
+  return {};
+}
+
+double Lights::power(const Light& l, float radius) const {
+  const double pi = 3.14159265358979323846;
+  switch (l.kind) {
+    case Kind::directional:
+      return luminance(l.value) * pi * radius * radius;
+    case Kind::point:
+      return luminance(l.value) * 4 * pi;
+    case Kind::spot:
+      return luminance(l.value) * 2 * pi * (1 - .5 * (l.cos_cutoff + l.cos_beam));
+    case Kind::parallelogram:
+    case Kind::mesh:
+    case Kind::sphere:
+    case Kind::disk:
+      break;
+  }
+  return luminance(textures_->mean(l.radiance)) * pi * l.area;
+}
+
+// Half by power, half uniform: no light that matters somewhere is rarer than 1/2n.
+void Lights::set_probabilities(float radius) {
+  std::vector<double> p;
+  double sum = 0;
+  for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l, radius)));
+  double acc = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const double share =
+        (sum > 0 ? .5 * p[i] / sum : .5 / static_cast<double>(p.size())) + .5 / static_cast<double>(p.size());
+    lights_[i].probability = static_cast<float>(share);
+    acc += share;
+    cdf_.push_back(static_cast<float>(acc));
+    any_with_place_ = any_with_place_ || lights_[i].kind != Kind::directional;
+  }
+  if (p.size() == 1) lights_[0].probability = 1;
+  if (!cdf_.empty()) cdf_.back() = 1;
+}
+
+Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures) {
+  Lights l;
+  l.geometry_ = &geometry;
+  l.textures_ = &textures;
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    if (scene.shapes[i].emitter) l.add_area(scene, i, geometry);
+  }
+  for (const Emitter& e : scene.emitters) {
+    if (auto ok = l.add_emitter(e); !ok) return tl::unexpected(ok.error());
+  }
+  l.set_probabilities(geometry.radius);
+  return l;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,357 @@
+// The path tracer: one sample of radiance along a camera ray.
+//
+// State of a path: `beta`, its weight relative to the hero channel, and `density`, each channel's sampling
+// density relative to the hero's (see medium.h). A contribution is beta * light / mean(density): the balance
+// heuristic over channels. Strategies of direct light, combined by the balance heuristic: (1) next-event
+// estimation at a vertex, (2) directions from BSDF or phase function that hit a light, (3) in homogeneous
+// media, vertices placed equi-angularly about the light. For a vertex at distance t of a segment, (1) and (2)
+// share the density f(t) of free flight and (3) has e(t); with p_l, p_s the solid-angle densities of light
+// and direction sampling the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only the
+// ratio e / f matters: `focus` below.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "worker/render/equiangular.h"
+#include "worker/render/sampler.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+
+// A scene that stacks more null boundaries than this in one path is cut off there, counted as a rejected
+// sample.
+inline constexpr int kMaxSegments = 1 << 16;
+// Beyond this depth roulette may end even paths that lost nothing: a closed white room has no other end.
+inline constexpr int kForcedRouletteDepth = 64;
+inline constexpr float kForcedSurvival = .97f;
+
+struct SampleOutcome {
+  C3 radiance{0, 0, 0};
+  bool cut_off = false;
+  std::uint64_t majorant_violations = 0;
+};
+
+template <Features F>
+class PathTracer {
+ public:
+  PathTracer(const World& world, const SampleStream& stream) : world_(world), stream_(stream) {}
+
+  SampleOutcome trace(const CameraRay& ray);
+
+ private:
+  struct Vertex {  // where the current ray was scattered from
+    V3 p{0, 0, 0};
+    float pdf = 0;      // of the direction
+    bool delta = true;  // chosen by a delta lobe or the camera: lights found are counted in full
+    // For a vertex in a medium whose segment was also sampled equi-angularly:
+    bool focused = false;
+    V3 o{0, 0, 0}, d{0, 0, 0};
+    float length = 0, t = 0, flight_pdf = 0;
+  };
+
+  bool scatter_in_medium(const Medium& medium, float t_max);
+  void focus_on_light(const Medium& medium, float t_max);
+  bool scatter_on_surface(const SurfaceHit& hit);
+  void pass_boundary(const SurfaceHit& hit);
+  void light_surface(const SurfaceHit& hit, const V3& wo);
+  void light_medium(const Medium& medium, const V3& p, const V3& d);
+  void add_emission(const SurfaceHit& hit);
+  void add_environment();
+  C3 unoccluded(const V3& p, const LightSample& light, std::uint32_t medium, RandomStream stream) const;
+  bool survives(float u);
+
+  void add(const C3& weighted) {
+    if constexpr (F.chromatic) {
+      outcome_.radiance += weighted / mean(density_);
+    } else {
+      outcome_.radiance += weighted;
+    }
+  }
+  static float mean(const C3& c) { return (c.x + c.y + c.z) / 3; }
+  void apply(const Flight& f) {
+    beta_ *= f.weight;
+    if constexpr (F.chromatic) density_ *= f.density;
+  }
+  // Density of the free flight ending at t, whichever channel were the hero.
+  float flight_pdf(const Medium& m, float t) const {
+    if constexpr (F.chromatic) {
+      float num = 0;
+      for (int c = 0; c < 3; ++c) num += density_[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * t));
+      return num / 3 / mean(density_);
+    } else {
+      const float s = m.sigma_t.x * std::exp(-m.sigma_t.x * t);
+      return (s + s + s) / 3;
+    }
+  }
+  // e / f for a light with this pivot.
+  float focus(const V3& pivot) const {
+    if (!last_.focused) return 0;
+    return EquiAngular(last_.o, last_.d, last_.length, pivot).pdf(last_.t) / last_.flight_pdf;
+  }
+  std::uint32_t medium_beyond(const SurfaceHit& hit, const V3& w, std::uint32_t current) const {
+    const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
+    if (!s.transition) return current;
+    return dot(w, hit.ng) > 0 ? s.exterior : s.interior;
+  }
+
+  const World& world_;
+  const SampleStream& stream_;
+  V3 o_{0, 0, 0}, d_{0, 0, 1};
+  C3 beta_{1, 1, 1}, density_{1, 1, 1};
+  float eta_scale_ = 1;  // undoes the radiance scaling of refraction in roulette decisions
+  int hero_ = 0;
+  int depth_ = 0;    // scatterings so far
+  int segment_ = 0;  // rays so far, null crossings included
+  std::uint32_t medium_ = kNone;
+  Vertex last_;
+  SampleOutcome outcome_;
+  MediumCounters counters_;
+};
+
+template <Features F>
+SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
+  o_ = ray.o;
+  d_ = ray.d;
+  last_.p = o_;
+  if constexpr (F.media) medium_ = world_.use_media ? world_.camera_medium : kNone;
+  if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
+  float t_max = ray.t_max;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(o_, d_, t_max);
+    const bool met = primitive && world_.geometry.complete(*primitive, o_, d_, hit);
+    if constexpr (F.media) {
+      if (medium_ != kNone) {
+        if (scatter_in_medium(world_.media[medium_], met ? hit.t : kInfinity)) {
+          if (!survives(stream_.group(depth_, Purpose::direction).u(3))) break;
+          continue;
+        }
+        if (!world_.depth_allows(depth_) || is_black(beta_)) break;
+      }
+    }
+    if (!met) {
+      add_environment();
+      break;
+    }
+    add_emission(hit);
+    if (world_.geometry.surfaces[hit.surface].null) {
+      pass_boundary(hit);
+      continue;
+    }
+    if (!scatter_on_surface(hit) || !survives(stream_.group(depth_, Purpose::direction).u(3))) break;
+  }
+  outcome_.cut_off = segment_ == kMaxSegments;
+  outcome_.majorant_violations = counters_.majorant_violations;
+  return outcome_;
+}
+
+// True: the path goes on from a vertex in the medium (or has ended there, with beta black). False: it reached
+// t_max.
+template <Features F>
+bool PathTracer<F>::scatter_in_medium(const Medium& medium, float t_max) {
+  const bool may_scatter = world_.depth_allows(depth_ + 1);
+  const bool focused = world_.equiangular && !medium.grid && std::isfinite(t_max) && may_scatter;
+  if (focused) focus_on_light(medium, t_max);
+  const Group numbers = stream_.group(segment_, Purpose::flight);
+  Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], o_, d_, t_max,
+                                 stream_.stream(segment_, Purpose::track_flight), counters_);
+  if (!flight.scattered) {
+    apply(flight);
+    return false;
+  }
+  if (!may_scatter) {
+    beta_ = C3(0);
+    return false;
+  }
+  // Not onto or through the surface that ends the segment.
+  flight.t = std::min(flight.t, t_max * (1 - 0x1p-20f));
+  last_ = Vertex{};
+  last_.p = o_ + d_ * flight.t;
+  last_.delta = false;
+  if (focused) {
+    last_.focused = true;
+    last_.o = o_;
+    last_.d = d_;
+    last_.length = t_max;
+    last_.t = flight.t;
+    last_.flight_pdf = flight_pdf(medium, flight.t);
+    if (!(last_.flight_pdf > 0)) last_.focused = false;
+  }
+  apply(flight);
+  ++depth_;
+  light_medium(medium, last_.p, d_);
+  const Group direction = stream_.group(depth_, Purpose::direction);
+  const PhaseSample s = medium.phase.sample(d_, {direction.u(0), direction.u(1)});
+  last_.pdf = s.pdf;
+  o_ = last_.p;
+  d_ = s.w;
+  return true;
+}
+
+// Strategy (3): light scattered once, from a vertex near the light.
+template <Features F>
+void PathTracer<F>::focus_on_light(const Medium& medium, float t_max) {
+  const Group g = stream_.group(segment_, Purpose::segment);
+  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  if (!choice.has_place || !(t_max > 0)) return;
+  const EquiAngular::Sample s = EquiAngular(o_, d_, t_max, choice.pivot).sample(g.u(3));
+  const auto light = world_.lights.sample(choice, s.p);
+  if (!light || !(s.pdf > 0)) return;
+  const float phase = medium.phase.value(d_, light->direction);
+  const float ratio = s.pdf / flight_pdf(medium, s.t);  // e / f; infinite where no flight gets to
+  const float share = light->delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
+  const float weight = light->delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f)
+                                    : (std::isfinite(ratio) ? share : 1.f);
+  const C3 arriving = unoccluded(s.p, *light, medium_, stream_.stream(segment_, Purpose::track_segment));
+  if (is_black(arriving)) return;
+  C3 in_scattered;
+  for (int c = 0; c < 3; ++c) in_scattered[c] = medium.sigma_s[c] * std::exp(-medium.sigma_t[c] * s.t);
+  add(beta_ * in_scattered * arriving * (phase * weight / (light->pdf * s.pdf)));
+}
+
+// Strategy (1) at a vertex in a medium; d is the direction of travel before the scattering.
+template <Features F>
+void PathTracer<F>::light_medium(const Medium& medium, const V3& p, const V3& d) {
+  if (!world_.lights.can_sample()) return;
+  const Group g = stream_.group(depth_, Purpose::light);
+  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  const auto light = world_.lights.sample(choice, p);
+  if (!light) return;
+  const float phase = medium.phase.value(d, light->direction);
+  const float with_focus = 1 + (choice.has_place ? focus(choice.pivot) : 0.f);
+  const float weight = light->delta ? 1 / with_focus : light->pdf / (light->pdf * with_focus + phase);
+  const C3 arriving = unoccluded(p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
+  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
+}
+
+// Strategy (1) at a surface.
+template <Features F>
+void PathTracer<F>::light_surface(const SurfaceHit& hit, const V3& wo) {
+  const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
+  if (!world_.lights.can_sample() || !world_.bsdfs.has_smooth(bsdf)) return;
+  const Group g = stream_.group(depth_, Purpose::light);
+  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  const auto light = world_.lights.sample(choice, hit.p);
+  if (!light) return;
+  const V3 wi = hit.shading.to_local(light->direction);
+  // The shading normal must not let light through a surface that the geometric one closes.
+  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0) && !world_.bsdfs.transmits(bsdf)) return;
+  const BsdfEval f = world_.bsdfs.eval(bsdf, hit.uv, wo, wi);
+  if (is_black(f.f_cos)) return;
+  const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
+  const V3 p = offset_point(hit.p, hit.ng, light->direction);
+  std::uint32_t medium = kNone;
+  if constexpr (F.media) medium = medium_beyond(hit, light->direction, medium_);
+  const C3 arriving = unoccluded(p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
+  if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
+}
+
+// False: absorbed, or too deep.
+template <Features F>
+bool PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
+  if (!world_.depth_allows(depth_ + 1)) return false;
+  ++depth_;
+  const V3 wo = hit.shading.to_local(-d_);
+  light_surface(hit, wo);
+  const Group g = stream_.group(depth_, Purpose::direction);
+  const auto s =
+      world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv, wo, g.u(2), {g.u(0), g.u(1)});
+  if (!s) return false;
+  const V3 w = normalize(hit.shading.to_world(s->wi));
+  if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return false;  // through the true surface: no such light
+  beta_ *= s->weight;
+  if (s->transmitted) eta_scale_ *= s->eta * s->eta;
+  last_ = Vertex{};
+  last_.p = hit.p;
+  last_.pdf = s->pdf;
+  last_.delta = s->delta;
+  o_ = offset_point(hit.p, hit.ng, w);
+  d_ = w;
+  if constexpr (F.media) {
+    if (s->transmitted) medium_ = medium_beyond(hit, w, medium_);
+  }
+  return true;
+}
+
+template <Features F>
+void PathTracer<F>::pass_boundary(const SurfaceHit& hit) {
+  o_ = offset_point(hit.p, hit.ng, d_);
+  if constexpr (F.media) medium_ = world_.use_media ? medium_beyond(hit, d_, medium_) : kNone;
+}
+
+template <Features F>
+void PathTracer<F>::add_emission(const SurfaceHit& hit) {
+  if (world_.geometry.surfaces[hit.surface].light == kNone || (depth_ == 0 && world_.hide_emitters)) return;
+  const C3 emitted = world_.lights.emitted(hit, -d_);
+  if (is_black(emitted)) return;
+  float weight = 1;
+  if (!last_.delta) {
+    const float p_l = world_.lights.pdf(hit, last_.p, d_);
+    weight = last_.pdf / (last_.pdf + p_l * (1 + focus(world_.lights.pivot(hit))));
+  }
+  add(beta_ * emitted * weight);
+}
+
+template <Features F>
+void PathTracer<F>::add_environment() {
+  if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  add(beta_ * world_.lights.environment());
+}
+
+// Light that gets from the sampled light to p, through null boundaries and media. p may have been moved off
+// its surface after the light was sampled from it: the ray is aimed anew, so that it ends in front of the
+// light and not on it.
+template <Features F>
+C3 PathTracer<F>::unoccluded(const V3& p, const LightSample& light, std::uint32_t medium,
+                             RandomStream stream) const {
+  V3 d = light.direction;
+  float left = light.distance;
+  if (std::isfinite(left)) {
+    const V3 f = light.target - p;
+    left = std::sqrt(dot(f, f));
+    if (!(left > 0)) return light.radiance;
+    d = f / left;
+  }
+  if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
+  C3 value = light.radiance;
+  if constexpr (F.media) {
+    if (!world_.use_media || (medium == kNone && !world_.accel.has_boundaries())) return value;
+    V3 o = p;
+    for (int i = 0; i < kMaxSegments; ++i) {
+      SurfaceHit hit;
+      const auto primitive = world_.accel.nearest_boundary(o, d, left);
+      const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
+      if (medium != kNone) {
+        const float t = met ? std::min(hit.t, left) : left;
+        value *= transmittance<F>(world_.media[medium], o, d, 0, t, RandomStream(stream.next()));
+        if (is_black(value)) return value;
+      }
+      if (!met) return value;
+      medium = medium_beyond(hit, d, medium);
+      const V3 next = offset_point(hit.p, hit.ng, d);
+      if (std::isfinite(left)) left -= dot(next - o, d);
+      o = next;
+      if (!(left > 0)) return value;
+    }
+    return {0, 0, 0};
+  }
+  return value;
+}
+
+// Russian roulette; false ends the path.
+template <Features F>
+bool PathTracer<F>::survives(float u) {
+  if (is_black(beta_)) return false;
+  if (depth_ < world_.rr_depth) return true;
+  float size = max_component(beta_) * eta_scale_;
+  if constexpr (F.chromatic) size /= mean(density_);
+  float q = std::min(1.f, size);
+  if (depth_ >= kForcedRouletteDepth) q = std::min(q, kForcedSurvival);
+  if (q >= 1) return true;
+  if (!(u < q)) return false;
+  beta_ /= q;
+  return true;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,178 @@
+#include "worker/render/render.h"
+
+#include <fmt/format.h>
+#include <immintrin.h>
+
+#include <cmath>
+
+#include "worker/render/path.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+namespace {
+
+// Denormals as zero while rays are traced, and only then: Embree wants it, and folding must not have it.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned saved_;
+};
+
+CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
+  const Group g = stream.group(0, Purpose::camera);
+  const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
+  return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
+}
+
+template <Features F>
+SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample) {
+  const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
+  return PathTracer<F>(w, stream).trace(camera_ray(w, stream, x, y));
+}
+
+using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t);
+struct Variant {
+  Features covers;
+  const char* name;
+  SampleFn sample;
+};
+template <Features F>
+constexpr Variant variant(const char* name) {
+  return {F, name, &sample_with<F>};
+}
+// Cheapest first; the last covers everything.
+constexpr Variant kVariants[] = {
+    variant<Features{}>("surfaces"),
+    variant<Features{.media = true}>("homogeneous grey media"),
+    variant<Features{.media = true, .chromatic = true}>("homogeneous chromatic media"),
+    variant<Features{.media = true, .grids = true}>("grey grids"),
+    variant<kEverything>("everything"),
+};
+static_assert(std::end(kVariants)[-1].covers == kEverything);
+
+const Variant& choose(const Features& need) {
+  for (const Variant& v : kVariants) {
+    if (v.covers.covers(need)) return v;
+  }
+  return std::end(kVariants)[-1];
+}
+
+bool finite(const C3& c) { return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z); }
+
+struct PixelSums {
+  double half[2][3] = {};
+};
+
+PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range, Health& health,
+                       Breadcrumb* crumb) {
+  PixelSums sums;
+  for (std::uint64_t s = range.s0; s < range.s1; ++s) {
+    if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
+    const SampleOutcome out = sample(w, x, y, s);
+    health.majorant_violations += out.majorant_violations;
+    // A sample that went wrong is counted, contributes zero and stays in N: never drawn again (STABILITY
+    // N54).
+    if (!finite(out.radiance) || out.cut_off) {
+      ++health.nonfinite;
+      continue;
+    }
+    if (out.radiance.x < 0 || out.radiance.y < 0 || out.radiance.z < 0) ++health.negative;
+    for (int c = 0; c < 3; ++c) sums.half[s & 1][c] += static_cast<double>(out.radiance[c]);
+  }
+  return sums;
+}
+
+// One rounding to float32; denormals become 0 here, where the mode of the process that folds can't matter any
+// more.
+float rounded(double sum) {
+  const auto f = static_cast<float>(sum);
+  return std::abs(f) < 0x1p-126f ? 0.f : f;
+}
+
+TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+                            const std::atomic<bool>* stop, Breadcrumb* crumb) {
+  const FlushDenormals mode;
+  TileResult r;
+  const auto pixels = static_cast<std::size_t>(tile.pixels());
+  r.sums.assign(6 * pixels, 0.f);
+  std::size_t i = 0;
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    if (stop && stop->load(std::memory_order_relaxed)) {
+      r.stopped = true;
+      return r;
+    }
+    for (int x = tile.x0; x < tile.x1; ++x, ++i) {
+      if (crumb) {
+        crumb->x.store(x, std::memory_order_relaxed);
+        crumb->y.store(y, std::memory_order_relaxed);
+      }
+      const PixelSums sums = render_pixel(w, sample, x, y, range, r.health, crumb);
+      for (std::size_t h = 0; h < 2; ++h)
+        for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
+    }
+  }
+  return r;
+}
+
+}  // namespace
+
+TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
+                       Breadcrumb* breadcrumb) {
+  return render_tile_with(world, choose(world.need).sample, tile, samples, stop, breadcrumb);
+}
+
+std::vector<std::string> covering_variants(const World& world) {
+  std::vector<std::string> names;
+  for (const Variant& v : kVariants) {
+    if (v.covers.covers(world.need)) names.emplace_back(v.name);
+  }
+  return names;
+}
+
+TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
+  for (const Variant& v : kVariants) {
+    if (name == v.name) return render_tile_with(world, v.sample, tile, samples, nullptr, nullptr);
+  }
+  return {};
+}
+
+SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
+  const FlushDenormals mode;
+  const SampleOutcome out = choose(world.need).sample(world, x, y, sample);
+  return {{out.radiance.x, out.radiance.y, out.radiance.z}, finite(out.radiance) && !out.cut_off};
+}
+
+WorldReport describe(const World& w) {
+  WorldReport r;
+  r.variant = choose(w.need).name;
+  const auto feature = [&](bool used, const std::string& text) {
+    (used ? r.used : r.left_out).push_back(text);
+  };
+  feature(w.need.media, "participating media");
+  feature(w.need.grids, "density grids, majorants and their trackers");
+  feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
+  feature(w.equiangular, "equi-angular sampling about lights");
+  feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
+  feature(w.lights.can_sample(), "next-event estimation");
+  feature(w.lights.count() > 1, "choice among lights");
+  feature(w.camera.has_lens(), "thin lens");
+  feature(w.textures.bytes() > 0, "image textures");
+  if (w.lights.left_out())
+    r.left_out.push_back(fmt::format("{} lights without power or area", w.lights.left_out()));
+  std::uint64_t grids = 0;
+  for (const Grid& g : w.grids) grids += g.bytes();
+  r.bytes = {{"geometry", w.geometry.bytes()},
+             {"bvh", w.accel.bytes()},
+             {"textures", w.textures.bytes()},
+             {"materials", w.bsdfs.bytes()},
+             {"grids", grids}};
+  r.clamped_inputs = w.clamped_inputs;
+  return r;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,160 @@
+#include "worker/render/vdb_module.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+#include <new>
+#include <string>
+#include <vector>
+
+namespace {
+
+struct Refused {
+  int code;
+  std::string text;
+};
+
+void initialize_once() {
+  static std::once_flag flag;
+  std::call_once(flag, [] { openvdb::initialize(); });
+}
+
+std::string names_of(const openvdb::io::File& file) {
+  std::string names;
+  for (auto it = file.beginName(); it != file.endName(); ++it)
+    names += (names.empty() ? "'" : ", '") + it.gridName() + "'";
+  return names.empty() ? "none" : names;
+}
+
+// The grid of this name; without one the only grid there is, or "density".
+std::string choose(const openvdb::io::File& file, const std::string& wanted) {
+  std::vector<std::string> names;
+  for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
+  if (names.empty()) throw Refused{1, "the file holds no grid"};
+  if (wanted.empty()) {
+    if (names.size() == 1) return names.front();
+    for (const auto& n : names) {
+      if (n == "density") return n;
+    }
+    throw Refused{1,
+                  "the file holds several grids and none is called 'density'; name one of " + names_of(file)};
+  }
+  for (const auto& n : names) {
+    if (n == wanted) return n;
+  }
+  throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(file)};
+}
+
+template <class GridType>
+void copy_values(const GridType& grid, const openvdb::CoordBBox& box, LsVdbGrid& out) {
+  auto access = grid.getConstAccessor();
+  const openvdb::Coord lo = box.min();
+  std::size_t i = 0;
+  openvdb::Coord c;
+  for (int z = 0; z < out.size[2]; ++z) {
+    for (int y = 0; y < out.size[1]; ++y) {
+      for (int x = 0; x < out.size[0]; ++x, ++i) {
+        c.reset(lo.x() + x, lo.y() + y, lo.z() + z);
+        const auto v = static_cast<float>(access.getValue(c));
+        if (!std::isfinite(v)) {
+          throw Refused{1, "voxel (" + std::to_string(c.x()) + ", " + std::to_string(c.y()) + ", " +
+                               std::to_string(c.z()) + ") of grid '" + grid.getName() +
+                               "' is not a finite number"};
+        }
+        out.negatives += v < 0;
+        out.values[i] = v < 0 ? 0.f : v;
+      }
+    }
+  }
+}
+
+void place(const openvdb::GridBase& grid, const openvdb::Coord& lo, LsVdbGrid& out) {
+  const auto& map = grid.transform();
+  if (!map.isLinear())
+    throw Refused{
+        1, "grid '" + grid.getName() + "' has a perspective transform; only linear ones can be rendered"};
+  const openvdb::Vec3d o = map.indexToWorld(lo.asVec3d());
+  for (int k = 0; k < 3; ++k) {
+    openvdb::Vec3d e = lo.asVec3d();
+    e[k] += 1;
+    const openvdb::Vec3d axis = map.indexToWorld(e) - o;
+    for (int r = 0; r < 3; ++r) out.index_to_scene[4 * r + k] = axis[r];
+  }
+  for (int r = 0; r < 3; ++r) out.index_to_scene[4 * r + 3] = o[r];
+  out.index_to_scene[15] = 1;
+}
+
+template <class GridType>
+void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdbGrid& out) {
+  const auto grid = openvdb::gridPtrCast<GridType>(base);
+  openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+  if (box.empty()) throw Refused{1, "grid '" + grid->getName() + "' is empty: it has no active voxel"};
+  box.expand(1);
+  std::uint64_t count = 1;
+  for (int k = 0; k < 3; ++k) {
+    const auto n = static_cast<std::int64_t>(box.max()[k]) - box.min()[k] + 1;
+    if (n <= 0 || n > (1 << 14))
+      throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(n) +
+                           " voxels along an axis; the limit is 16384"};
+    out.size[k] = static_cast<std::int32_t>(n);
+    count *= static_cast<std::uint64_t>(n);
+  }
+  if (count > max_values) {
+    throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(count) +
+                         " voxels; the limit is " + std::to_string(max_values)};
+  }
+  place(*grid, box.min(), out);
+  out.values = new float[count];
+  copy_values(*grid, box, out);
+}
+
+void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
+  initialize_once();
+  openvdb::io::File file(path);
+  file.open(false);  // no delayed loading: errors must show here
+  const openvdb::GridBase::Ptr base = file.readGrid(choose(file, wanted));
+  if (!base) throw Refused{1, "the grid cannot be read"};
+  if (base->getGridClass() == openvdb::GRID_LEVEL_SET) {
+    throw Refused{1,
+                  "grid '" + base->getName() + "' is a level set, not a density; convert it to a fog volume"};
+  }
+  if (base->isType<openvdb::FloatGrid>()) return convert<openvdb::FloatGrid>(base, max_values, out);
+  if (base->isType<openvdb::DoubleGrid>()) return convert<openvdb::DoubleGrid>(base, max_values, out);
+  throw Refused{1, "grid '" + base->getName() + "' has values of type " + base->valueType() +
+                       "; a density is float or double"};
+}
+
+}  // namespace
+
+extern "C" {
+
+int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
+                char* error, std::uint64_t error_size) {
+  *out = LsVdbGrid{};
+  const auto say = [&](int code, const std::string& text) {
+    std::snprintf(error, error_size, "%s", text.c_str());
+    ls_vdb_free(out);
+    return code;
+  };
+  try {
+    read(path, grid_name, max_values, *out);
+    return 0;
+  } catch (const Refused& r) {
+    return say(r.code, r.text);
+  } catch (const std::bad_alloc&) {
+    return say(2, "the grid does not fit into memory");
+  } catch (const std::exception& e) {
+    return say(1, std::string("not a readable OpenVDB file: ") + e.what());
+  } catch (...) {
+    return say(1, "not a readable OpenVDB file");
+  }
+}
+
+void ls_vdb_free(LsVdbGrid* grid) {
+  delete[] grid->values;
+  grid->values = nullptr;
+}
+}

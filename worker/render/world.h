@@ -1,0 +1,54 @@
+// A scene made ready to trace. Immutable once built and shared by all render threads.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "worker/render/accel.h"
+#include "worker/render/bsdf/bsdf.h"
+#include "worker/render/camera.h"
+#include "worker/render/features.h"
+#include "worker/render/geometry.h"
+#include "worker/render/lights.h"
+#include "worker/render/medium.h"
+#include "worker/render/pixel_filter.h"
+#include "worker/render/render.h"
+#include "worker/render/texture/texture.h"
+
+namespace ls::render {
+
+class World {
+ public:
+  World() = default;
+  World(const World&) = delete;  // parts point at each other
+  World& operator=(const World&) = delete;
+
+  Geometry geometry;
+  TextureTable textures;
+  BsdfTable bsdfs;
+  std::deque<Grid> grids;  // a deque: media point at its elements
+  std::vector<Medium> media;
+  Lights lights;
+  Accel accel;
+  Camera camera;
+  PixelFilter filter;
+
+  std::uint32_t camera_medium = kNone;
+  Features need;
+  bool use_media = true;     // false: the integrator `path`, which sees no media
+  bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too
+  bool hide_emitters = false;
+  int max_depth = -1;  // segments; -1: unlimited
+  int rr_depth = 5;
+  std::uint64_t seed = 0;
+  FrameSize size;
+
+  std::uint64_t clamped_inputs = 0;
+  std::vector<std::string> notes;  // for the report: what was left out and why
+
+  bool depth_allows(int scatterings) const { return max_depth < 0 || scatterings < max_depth; }
+};
+
+}  // namespace ls::render
