@@ -1,0 +1,114 @@
+// One client's connection, from accept to close, as a coroutine on the network thread. Includes Boost: only
+// the server loop's own files include this.
+#pragma once
+
+#include <array>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/buffer_body.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "coordinator/http/api.h"
+#include "coordinator/http/event_queue.h"
+
+namespace ls::http {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+using Tcp = net::ip::tcp;
+using SteadyClock = std::chrono::steady_clock;
+using Parser = beast::http::request_parser<beast::http::buffer_body>;
+
+inline SteadyClock::duration steady_seconds(double seconds) {
+  return std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
+}
+
+class Connection;
+
+// What all connections share. Everything but the pools is touched by the network thread only.
+struct Shared {
+  net::io_context& io;
+  net::thread_pool& quick;
+  net::thread_pool& slow;
+  Api& api;
+  std::set<Connection*> open;
+  std::size_t event_streams = 0;
+  std::uint64_t buffered = 0;  // bytes of request bodies in memory
+  bool stopping = false;
+};
+
+class Connection {
+ public:
+  Connection(Tcp::socket socket, Shared& shared);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  net::awaitable<void> serve();
+
+  bool idle() const { return idle_; }
+  void wind_down();  // the server stops: ends now if no request is under way, else after its answer
+  void cut();        // ends now
+
+ private:
+  enum class Read { ok, closed, too_slow, malformed, header_too_large };
+  // How reading a body ended. An answer: the body was refused, part of it may still be coming.
+  struct Body {
+    Read read = Read::ok;
+    std::optional<Response> answer;
+  };
+
+  // ---- connection.cpp ----
+  net::awaitable<bool> serve_one();  // false: close
+  net::awaitable<Read> read_header(Parser& parser);
+  net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
+  net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
+  net::awaitable<void> answer_failed_read(Read read);
+
+  // ---- body_reader.cpp ----
+  net::awaitable<Body> read_whole(Parser& parser, Request& request, std::uint64_t limit);
+  net::awaitable<Body> read_blob(Parser& parser, const Match& match, const Request& request);
+  net::awaitable<Body> read_into(Parser& parser, BodySink& sink);
+  net::awaitable<Read> read_portion(Parser& parser, std::string& into, SteadyClock::time_point began,
+                                    std::uint64_t& received);
+  net::awaitable<bool> send_continue(const Request& request);
+  bool charge(std::uint64_t bytes);  // against kMaxBuffered; false: too much at once
+
+  // ---- event_writer.cpp ----
+  net::awaitable<void> stream_events(const Request& request, const Response& response);
+  net::awaitable<void> write_events(EventQueue& queue);
+  void watch_reader();
+
+  // ---- socket_io.cpp ----
+  net::awaitable<Read> fill();  // more bytes into buffer_
+  net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
+  net::awaitable<void> linger();
+  void arm(SteadyClock::time_point deadline);
+  void disarm();
+  SteadyClock::time_point pace(SteadyClock::time_point began, std::uint64_t bytes) const;
+
+  Tcp::socket socket_;
+  Shared& shared_;
+  const Limits& limits_;
+  net::steady_timer watchdog_;
+  SteadyClock::time_point deadline_ = SteadyClock::time_point::max();
+  bool timed_out_ = false;
+  bool idle_ = true;
+  bool reader_gone_ = false;                  // of an event stream
+  net::steady_timer* events_wait_ = nullptr;  // set while an event stream runs
+  std::uint64_t charged_ = 0;
+  std::array<char, 64> discard_{};
+  beast::flat_buffer buffer_;
+  std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);  // callbacks look at it first
+};
+
+}  // namespace ls::http

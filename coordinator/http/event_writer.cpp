@@ -1,0 +1,121 @@
+// A connection that has become an event stream.
+#include <fmt/format.h>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "coordinator/http/connection.h"
+#include "coordinator/http/head_text.h"
+#include "coordinator/http/problem.h"
+#include "coordinator/http/run_on.h"
+
+namespace ls::http {
+namespace {
+
+using boost::system::error_code;
+
+// What must be undone however the stream ends, also when the server is destroyed around it.
+struct Undo {
+  Shared& shared;
+  net::steady_timer*& events_wait;
+  std::shared_ptr<EventQueue> queue;
+  ~Undo() {
+    events_wait = nullptr;
+    queue->close();
+    --shared.event_streams;
+    --shared.api.counters().event_streams;
+  }
+};
+
+struct Start {
+  std::uint64_t after = 0;
+  bool reset = false;  // the id that the reader knows was never told: another data folder
+};
+
+}  // namespace
+
+net::awaitable<void> Connection::stream_events(const Request& request, const Response& response) {
+  if (shared_.event_streams >= limits_.event_streams) {
+    co_await answer(request, problem(503, "too many event streams are open; close one or try again later"),
+                    false);
+    co_return;
+  }
+  const EventStream& wanted = *response.events;
+  auto& coordinator = shared_.api.coordinator();
+  auto find_start = [&coordinator, &wanted] {
+    const std::uint64_t last = coordinator.last_event_id();
+    const std::uint64_t after = wanted.after_id.value_or(last);
+    return after > last ? Start{last, true} : Start{after, false};
+  };
+  net::steady_timer wait(shared_.io);
+  ++shared_.event_streams;
+  ++shared_.api.counters().event_streams;
+  auto wake = [this, &io = shared_.io, alive = std::weak_ptr(alive_)] {
+    net::post(io, [this, alive] {
+      if (!alive.expired() && events_wait_ != nullptr) events_wait_->cancel();
+    });
+  };
+  const Start start = co_await run_on(shared_.quick, shared_.io, std::move(find_start));
+  const EventQueue::Bounds bounds{limits_.event_queue, limits_.event_queue_bytes};
+  auto queue = std::make_shared<EventQueue>(bounds, wanted.job, start.after, std::move(wake));
+  events_wait_ = &wait;
+  const Undo undo{shared_, events_wait_, queue};
+
+  shared_.api.counters().answered(request.method, response.status);
+  std::string head = head_text(response, {.streamed = true, .method = request.method}, system_unix_clock()());
+  if (request.method == Method::head) {
+    co_await write_all(head, {});
+    co_return;
+  }
+  // An id without data sets where a reconnecting browser goes on, without being an event.
+  head += fmt::format("retry: 1000\nid: {}\n\n", start.after);
+  if (start.reset)
+    head += fmt::format("event: reset\ndata: {{\"missed_from\":0,\"missed_to\":{}}}\n\n", start.after);
+  if (!co_await write_all(head, {})) co_return;
+
+  auto subscribe = [&coordinator, after = start.after, queue] {
+    return coordinator.subscribe(after,
+                                 [queue](const coordinator::StreamEvent& event) { queue->push(event); });
+  };
+  auto subscription = co_await run_on(shared_.quick, shared_.io, std::move(subscribe));
+  watch_reader();
+  co_await write_events(*queue);
+  queue->close();
+  auto unsubscribe = [handle = std::move(subscription)]() mutable {
+    handle.reset();  // on the pool: it may wait for a callback that is under way
+    return true;
+  };
+  co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
+}
+
+net::awaitable<void> Connection::write_events(EventQueue& queue) {
+  while (!shared_.stopping && !reader_gone_) {
+    const bool last = queue.overflowed();
+    const std::string text = queue.take();
+    if (!text.empty()) {
+      if (!co_await write_all(text, {})) co_return;
+      continue;
+    }
+    if (last) {
+      ++shared_.api.counters().events_dropped;
+      co_return;
+    }
+    error_code ec;
+    events_wait_->expires_after(steady_seconds(limits_.heartbeat_seconds));
+    co_await events_wait_->async_wait(net::redirect_error(net::use_awaitable, ec));
+    if (!ec && !co_await write_all(":\n\n", {})) co_return;
+  }
+}
+
+// A reader says nothing more: whatever comes, its goodbye above all, ends the stream.
+void Connection::watch_reader() {
+  socket_.async_read_some(net::buffer(discard_),
+                          [this, alive = std::weak_ptr(alive_)](error_code, std::size_t) {
+                            if (alive.expired()) return;
+                            reader_gone_ = true;
+                            if (events_wait_ != nullptr) events_wait_->cancel();
+                          });
+}
+
+}  // namespace ls::http

@@ -1,0 +1,37 @@
+// One function per route: request -> response. Called on the route's lane; may be called by several threads
+// at once.
+#pragma once
+
+#include "coordinator/http/routes.h"
+
+namespace ls::http {
+
+// handlers_system.cpp
+Response get_healthz(Api&, const Request&, const Params&);
+Response get_readyz(Api&, const Request&, const Params&);
+Response get_metrics(Api&, const Request&, const Params&);
+Response get_openapi(Api&, const Request&, const Params&);
+Response post_session(Api&, const Request&, const Params&);
+Response delete_session(Api&, const Request&, const Params&);
+Response get_workers(Api&, const Request&, const Params&);
+Response get_events(Api&, const Request&, const Params&);
+Response get_job_events(Api&, const Request&, const Params&);
+
+// handlers_jobs.cpp
+Response get_jobs(Api&, const Request&, const Params&);
+Response post_job(Api&, const Request&, const Params&);
+Response get_job(Api&, const Request&, const Params&);
+Response patch_job(Api&, const Request&, const Params&);
+Response delete_job(Api&, const Request&, const Params&);
+Response get_image_exr(Api&, const Request&, const Params&);
+Response get_image_png(Api&, const Request&, const Params&);
+Response get_report(Api&, const Request&, const Params&);
+Response get_convergence(Api&, const Request&, const Params&);
+Response get_tiles(Api&, const Request&, const Params&);
+Response get_log(Api&, const Request&, const Params&);
+
+// handlers_blobs.cpp; PUT is streamed: Api::open_upload
+Response post_blobs_missing(Api&, const Request&, const Params&);
+Response head_blob(Api&, const Request&, const Params&);
+
+}  // namespace ls::http

@@ -1,0 +1,135 @@
+#include <fmt/format.h>
+
+#include "coordinator/http/api.h"
+#include "coordinator/http/handlers.h"
+#include "coordinator/http/json_read.h"
+#include "coordinator/http/problem.h"
+
+namespace ls::http {
+namespace {
+
+using coordinator::BlobStore;
+
+Response stored(const Digest& digest, int status) {
+  Response response;
+  response.status = status;
+  response.headers.emplace_back("Location", "/api/v1/blobs/" + digest.hex());
+  return response;
+}
+
+std::optional<Response> over_limit(std::uint64_t received, std::uint64_t limit) {
+  if (received <= limit) return std::nullopt;
+  return problem(413, fmt::format("the blob has more than the {} bytes that are accepted", limit));
+}
+
+class StoreSink final : public BodySink {
+ public:
+  StoreSink(std::unique_ptr<BlobStore::Upload> upload, const Digest& digest, std::uint64_t limit)
+      : upload_(std::move(upload)), digest_(digest), limit_(limit) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    received_ += bytes.size();
+    if (auto refused = over_limit(received_, limit_)) return refused;
+    if (const auto done = upload_->append(bytes); !done) return problem(done.error());
+    return std::nullopt;
+  }
+  Response finish() override {
+    if (const auto done = upload_->finish(); !done) return problem(done.error());
+    return stored(digest_, 201);
+  }
+
+ private:
+  std::unique_ptr<BlobStore::Upload> upload_;
+  Digest digest_;
+  std::uint64_t limit_, received_ = 0;
+};
+
+// The blob is there already: nothing is written, but a body that isn't it is still told so.
+class CompareSink final : public BodySink {
+ public:
+  CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    received_ += bytes.size();
+    if (auto refused = over_limit(received_, limit_)) return refused;
+    sha_.update(bytes);
+    return std::nullopt;
+  }
+  Response finish() override {
+    const Digest got = sha_.finish();
+    if (got != digest_)
+      return problem(400,
+                     fmt::format("the body's SHA-256 is {}, the address says {}", got.hex(), digest_.hex()));
+    return stored(digest_, 204);
+  }
+
+ private:
+  Sha256 sha_;
+  Digest digest_;
+  std::uint64_t limit_, received_ = 0;
+};
+
+std::variant<Response, std::unique_ptr<BodySink>> open_sink(Api& api, const Match& match,
+                                                            const Request& request) {
+  const auto digest = read_digest(std::string_view(match.params[0]), "the last part of the address");
+  if (!digest) return problem(digest.error());
+  if (!request.header("content-range").empty())
+    return problem(501,
+                   "uploads in parts (Content-Range) are not taken yet: PUT the whole blob in one request");
+  if (!request.header("content-encoding").empty())
+    return problem(415, "send the blob as it is: Content-Encoding is not decoded");
+  auto& blobs = api.coordinator().blobs();
+  if (blobs.has(*digest)) {
+    // One who waits for '100 Continue' has sent nothing yet and need not.
+    if (!request.header("expect").empty()) return stored(*digest, 204);
+    return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
+  }
+  auto upload = blobs.begin_upload(*digest);
+  if (!upload) return problem(upload.error());
+  return std::make_unique<StoreSink>(std::move(*upload), *digest, api.limits().blob_bytes);
+}
+
+}  // namespace
+
+std::variant<Response, std::unique_ptr<BodySink>> Api::open_upload(const Match& match,
+                                                                   const Request& request) {
+  return open_sink(*this, match, request);
+}
+
+Response head_blob(Api& api, const Request&, const Params& params) {
+  const auto digest = read_digest(std::string_view(params[0]), "the last part of the address");
+  if (!digest) return problem(digest.error());
+  auto& blobs = api.coordinator().blobs();
+  Response response;
+  std::uint64_t offset = 0;
+  const bool complete = blobs.has(*digest);
+  if (complete) {
+    const auto size = blobs.size(*digest);
+    if (!size) return problem(size.error());
+    offset = *size;
+  } else {
+    response.status = 404;
+  }
+  response.headers.emplace_back("Upload-Offset", std::to_string(offset));
+  response.headers.emplace_back("Upload-Complete", complete ? "?1" : "?0");
+  return response;
+}
+
+Response post_blobs_missing(Api& api, const Request& request, const Params&) {
+  const auto body = read_object(request.body, {"digests"});
+  if (!body) return problem(body.error());
+  const auto list = body->find("digests");
+  if (list == body->end() || !list->is_array())
+    return problem(400, "the body must be {\"digests\": [SHA256, ...]}");
+  if (list->size() > kMaxDigests)
+    return problem(400, fmt::format("more than {} digests in one request", kMaxDigests));
+  auto missing = nlohmann::ordered_json::array();
+  for (const auto& item : *list) {
+    const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
+    if (!digest) return problem(digest.error());
+    if (!api.coordinator().blobs().has(*digest)) missing.push_back(digest->hex());
+  }
+  return json_response(200, write_json({{"missing", std::move(missing)}}));
+}
+
+}  // namespace ls::http

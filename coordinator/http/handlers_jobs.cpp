@@ -1,0 +1,234 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "coordinator/http/api.h"
+#include "coordinator/http/handlers.h"
+#include "coordinator/http/json_read.h"
+#include "coordinator/http/problem.h"
+#include "coordinator/http/spec_query.h"
+#include "coordinator/views.h"
+
+namespace ls::http {
+namespace {
+
+using coordinator::SubmitRequest;
+using nlohmann::json;
+
+constexpr std::string_view kDefaultName = "scene.xml";
+
+tl::unexpected<Error> bad(std::string message) { return fail(Errc::invalid_argument, std::move(message)); }
+
+Result<std::map<std::string, Digest>> read_assets(const json& body) {
+  std::map<std::string, Digest> assets;
+  const auto found = body.find("assets");
+  if (found == body.end()) return assets;
+  if (!found->is_object()) return bad("'assets' must be an object {name: SHA256}");
+  if (found->size() > kMaxAssets) return bad(fmt::format("'assets' names more than {} files", kMaxAssets));
+  for (const auto& item : found->items()) {
+    if (item.key().empty() || item.key().size() > kMaxAssetName)
+      return bad(fmt::format("an asset's name must have 1 to {} characters", kMaxAssetName));
+    const auto digest = read_digest(item.value(), fmt::format("the digest of asset '{}'", item.key()));
+    if (!digest) return tl::unexpected(digest.error());
+    assets.emplace(item.key(), *digest);
+  }
+  return assets;
+}
+
+Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
+  auto& blobs = api.coordinator().blobs();
+  if (!blobs.has(digest))
+    return fail(Errc::failed_precondition,
+                fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
+  const auto size = blobs.size(digest);
+  if (!size) return tl::unexpected(size.error());
+  if (*size > kMaxSceneXml)
+    return bad(fmt::format("the scene file has {} bytes; at most {} are accepted", *size, kMaxSceneXml));
+  const auto bytes = blobs.read(digest, 0, *size);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+}
+
+Result<SubmitRequest> from_json(Api& api, const Request& request) {
+  const auto body = read_object(request.body, {"scene", "assets", "spec", "name"});
+  if (!body) return tl::unexpected(body.error());
+  SubmitRequest submit;
+  submit.scene_name = kDefaultName;
+  if (const auto name = body->find("name"); name != body->end()) {
+    if (!name->is_string()) return bad("'name' must be a text");
+    submit.scene_name = name->get<std::string>().substr(0, kMaxAssetName);
+  }
+  const auto scene = body->find("scene");
+  if (scene == body->end()) return bad("the body names no 'scene' (SHA-256 of the scene file)");
+  const auto digest = read_digest(*scene, "'scene'");
+  if (!digest) return tl::unexpected(digest.error());
+  auto assets = read_assets(*body);
+  if (!assets) return tl::unexpected(assets.error());
+  submit.assets = std::move(*assets);
+  if (const auto spec = body->find("spec"); spec != body->end()) {
+    auto parsed = parse_job_spec(spec->dump());
+    if (!parsed) return tl::unexpected(parsed.error());
+    submit.spec = std::move(*parsed);
+  }
+  auto text = read_scene_blob(api, *digest);
+  if (!text) return tl::unexpected(text.error());
+  submit.scene_text = std::move(*text);
+  return submit;
+}
+
+Result<SubmitRequest> from_xml(const Request& request) {
+  SubmitRequest submit;
+  submit.scene_name = std::string(request.parameter("name").value_or(kDefaultName)).substr(0, kMaxAssetName);
+  auto spec = spec_from_query(request.query, "name");
+  if (!spec) return tl::unexpected(spec.error());
+  submit.spec = std::move(*spec);
+  submit.scene_text = request.body;
+  return submit;
+}
+
+// What a PATCH asks for, read as a whole before anything is changed.
+struct Change {
+  std::optional<std::string> state;
+  std::optional<int> priority;
+  std::optional<std::uint64_t> spp;
+};
+
+Result<Change> read_change(std::string_view text) {
+  const auto body = read_object(text, {"state", "priority", "spp", "target_error"});
+  if (!body) return tl::unexpected(body.error());
+  if (body->empty()) return bad("the body changes nothing; possible: state, priority, spp");
+  Change change;
+  if (body->contains("target_error"))
+    return fail(
+        Errc::failed_precondition,
+        "the target error of a submitted job can't be changed: tiles that have stopped were stopped by it. "
+        "Raise its samples (spp), or submit it again");
+  if (const auto state = body->find("state"); state != body->end()) {
+    if (*state != "paused" && *state != "running" && *state != "cancelled")
+      return bad("'state' must be \"paused\", \"running\" or \"cancelled\"");
+    change.state = state->get<std::string>();
+  }
+  if (const auto priority = body->find("priority"); priority != body->end()) {
+    if (!priority->is_number_integer() || std::abs(priority->get<double>()) > 1000)
+      return bad("'priority' must be a whole number from -1000 to 1000");
+    change.priority = priority->get<int>();
+  }
+  if (const auto spp = body->find("spp"); spp != body->end()) {
+    if (!spp->is_number_unsigned() || spp->get<std::uint64_t>() == 0)
+      return bad("'spp' must be a whole number: the new total per pixel");
+    change.spp = spp->get<std::uint64_t>();
+  }
+  return change;
+}
+
+Result<void> apply(coordinator::Coordinator& coordinator, const JobId& id, const Change& change) {
+  if (change.spp)
+    if (auto done = coordinator.extend(id, *change.spp); !done) return done;
+  if (change.priority)
+    if (auto done = coordinator.set_priority(id, *change.priority); !done) return done;
+  if (!change.state) return {};
+  if (*change.state == "paused") return coordinator.pause(id);
+  if (*change.state == "running") return coordinator.resume(id);
+  return coordinator.cancel(id);
+}
+
+Response no_such_job() { return problem(404, "there is no such job"); }
+
+Response file_response(std::string content_type, std::vector<std::byte> bytes, const std::string& name) {
+  Response response;
+  response.content_type = std::move(content_type);
+  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}\"", name));
+  response.body = std::move(bytes);
+  return response;
+}
+
+}  // namespace
+
+Response get_jobs(Api& api, const Request&, const Params&) {
+  return json_response(200, coordinator::jobs_json(api.coordinator().jobs()));
+}
+
+Response post_job(Api& api, const Request& request, const Params&) {
+  const bool is_json = media_type(request.header("content-type")) == "application/json";
+  auto submit = is_json ? from_json(api, request) : from_xml(request);
+  if (!submit) return problem(submit.error());
+  const auto id = api.coordinator().submit(std::move(*submit));
+  if (!id) return problem(id.error().error, id.error().diagnostics);
+  const std::string url = "/api/v1/jobs/" + id->value;
+  const auto job = api.coordinator().job(*id);
+  nlohmann::ordered_json body{{"id", id->value}, {"url", url}};
+  body["warnings"] = job ? job->warnings : std::vector<std::string>{};
+  Response response = json_response(201, write_json(body));
+  response.headers.emplace_back("Location", url);
+  return response;
+}
+
+Response get_job(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  const auto job = api.coordinator().job(JobId{params[0]});
+  return job ? json_response(200, coordinator::job_json(*job)) : problem(job.error());
+}
+
+Response patch_job(Api& api, const Request& request, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  const JobId id{params[0]};
+  if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
+  const auto change = read_change(request.body);
+  if (!change) return problem(change.error());
+  if (const auto done = apply(api.coordinator(), id, *change); !done) return problem(done.error());
+  return get_job(api, request, params);
+}
+
+Response delete_job(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  if (const auto done = api.coordinator().cancel(JobId{params[0]}); !done) return problem(done.error());
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+Response get_image_exr(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  auto image = api.coordinator().image_exr(JobId{params[0]});
+  return image ? file_response("image/x-exr", std::move(*image), params[0] + ".exr") : problem(image.error());
+}
+
+Response get_image_png(Api& api, const Request& request, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  double exposure = 0;
+  if (const auto text = request.parameter("exposure")) {
+    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), exposure);
+    if (error != std::errc{} || end != text->data() + text->size() || !(std::abs(exposure) <= kMaxExposure))
+      return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
+  }
+  auto image = api.coordinator().image_png(JobId{params[0]}, exposure);
+  return image ? file_response("image/png", std::move(*image), params[0] + ".png") : problem(image.error());
+}
+
+Response get_report(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  auto report = api.coordinator().report_json(JobId{params[0]});
+  return report ? json_response(200, std::move(*report)) : problem(report.error());
+}
+
+Response get_convergence(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  const auto points = api.coordinator().convergence(JobId{params[0]});
+  return points ? text_response(200, "text/csv; charset=utf-8", coordinator::convergence_csv(*points))
+                : problem(points.error());
+}
+
+Response get_tiles(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  const auto tiles = api.coordinator().tiles(JobId{params[0]});
+  return tiles ? json_response(200, coordinator::tiles_json(*tiles)) : problem(tiles.error());
+}
+
+Response get_log(Api& api, const Request&, const Params& params) {
+  if (!plausible_id(params[0])) return no_such_job();
+  auto log = api.coordinator().job_log(JobId{params[0]});
+  return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
+}
+
+}  // namespace ls::http

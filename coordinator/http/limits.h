@@ -1,0 +1,58 @@
+// Every bound that the HTTP door sets on a stranger, in one place. Sizes in bytes, times in seconds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ls::http {
+
+// ---- bodies, per route ----
+inline constexpr std::uint64_t kMaxSceneXml = 32u << 20;  // POST /jobs with application/xml
+inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
+inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
+inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
+inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
+
+// ---- what is inside ----
+inline constexpr std::size_t kMaxDigests = 100'000;  // in one POST /blobs/missing
+inline constexpr std::size_t kMaxAssets = 100'000;   // of one job
+inline constexpr std::size_t kMaxAssetName = 1024;   // characters
+inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
+inline constexpr std::size_t kMaxQueryParameters = 256;
+inline constexpr std::size_t kMaxIdLength = 64;  // of a job's id
+inline constexpr double kMaxExposure = 32;       // stops, either way
+
+// ---- buffers ----
+inline constexpr std::size_t kReadBuffer = 64u << 10;   // per connection
+inline constexpr std::size_t kBodyChunk = 256u << 10;   // handed to the disk at once
+inline constexpr std::size_t kWriteSlice = 256u << 10;  // between two looks at the clock
+inline constexpr std::uint64_t kMaxBuffered = 256u
+                                              << 20;  // request bodies in memory, all connections together
+inline constexpr std::uint64_t kLingerBytes = 16u << 20;  // read and thrown away after an early refusal
+
+inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
+inline constexpr std::size_t kMaxRevokedSessions = 10'000;
+
+// Those that tests and an operator's config file may change.
+struct Limits {
+  std::uint64_t blob_bytes = std::uint64_t{64} << 30;  // PUT /blobs/SHA256
+  std::size_t header_bytes = 16u << 10;
+  std::size_t connections = 512;
+  std::size_t event_streams = 128;  // of the connections; the rest stays free for requests
+  std::size_t event_queue = 4096;   // events waiting for one reader
+  std::size_t event_queue_bytes = 4u << 20;
+  double header_seconds = 10;  // from a request's first byte to the end of its header
+  double idle_seconds = 60;    // of a kept connection between two requests
+  // A body (either way) is cut when it is slower than this: allowed seconds = grace + bytes so far /
+  // min_rate. So the whole takes at most grace + length / min_rate, and one that stalls is cut after grace,
+  // whatever it had announced.
+  double body_grace_seconds = 15;
+  double min_rate = 8u << 10;     // bytes per second
+  double heartbeat_seconds = 15;  // comments on a silent event stream
+  double linger_seconds = 3;      // reading on after an early refusal, so that the answer arrives
+  double stop_seconds = 5;        // for requests under way when the coordinator stops
+  int quick_threads = 2;          // for answers out of memory
+  int slow_threads = 4;           // for reading scenes, writing images and blobs
+};
+
+}  // namespace ls::http

@@ -1,0 +1,37 @@
+// What /metrics says, in Prometheus' text format.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "coordinator/http/message.h"
+#include "coordinator/service.h"
+
+namespace ls::http {
+
+// Counted by the server loop. Thread-safe.
+class Counters {
+ public:
+  void answered(Method method, int status);
+  std::map<std::pair<Method, int>, std::uint64_t> requests() const;
+
+  std::atomic<std::uint64_t> connections{0};     // open now
+  std::atomic<std::uint64_t> event_streams{0};   // open now
+  std::atomic<std::uint64_t> events_dropped{0};  // readers sent away because they were too slow
+  std::atomic<std::uint64_t> body_bytes{0};      // received
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::pair<Method, int>, std::uint64_t> requests_;
+};
+
+std::string metrics_text(std::span<const coordinator::JobView> jobs,
+                         std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
+                         const Counters& counters);
+
+}  // namespace ls::http

@@ -1,0 +1,76 @@
+#include "coordinator/http/token_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/rand.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "common/base/digest.h"
+
+namespace ls::http {
+namespace {
+
+constexpr std::size_t kMinToken = 16, kMaxToken = 1024;
+
+std::string why() { return std::strerror(errno); }
+
+struct Descriptor {
+  int fd = -1;
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+};
+
+Result<std::string> read_token(int fd, const std::filesystem::path& file) {
+  struct stat info {};
+  if (::fstat(fd, &info) != 0)
+    return fail(Errc::internal, fmt::format("cannot stat '{}': {}", file.string(), why()));
+  if ((info.st_mode & 077) != 0)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' may be read by others: chmod 600 it, or delete it to get a new one",
+                            file.string()));
+  std::array<char, kMaxToken + 1> buffer{};
+  const ssize_t n = ::read(fd, buffer.data(), buffer.size());
+  if (n < 0) return fail(Errc::internal, fmt::format("cannot read '{}': {}", file.string(), why()));
+  std::string token(buffer.data(), static_cast<std::size_t>(n));
+  while (!token.empty() && static_cast<unsigned char>(token.back()) <= ' ') token.pop_back();
+  if (token.size() < kMinToken || token.size() > kMaxToken)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' holds no token of {} to {} characters: delete it to get a "
+                            "new one",
+                            file.string(), kMinToken, kMaxToken));
+  return token;
+}
+
+Result<std::string> make_token(const std::filesystem::path& file) {
+  Digest random;
+  if (RAND_bytes(random.bytes.data(), static_cast<int>(random.bytes.size())) != 1)
+    return fail(Errc::internal, "the system's random numbers failed");
+  const std::string token = random.hex();
+  const std::string line = token + "\n";
+  // Written aside and renamed: a crash leaves no half token.
+  const std::string aside = file.string() + ".new";
+  ::unlink(aside.c_str());
+  Descriptor out{::open(aside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
+  if (out.fd < 0 || ::write(out.fd, line.data(), line.size()) != static_cast<ssize_t>(line.size()) ||
+      ::fsync(out.fd) != 0 || ::rename(aside.c_str(), file.c_str()) != 0)
+    return fail(Errc::resource_exhausted, fmt::format("cannot write '{}': {}", file.string(), why()));
+  return token;
+}
+
+}  // namespace
+
+Result<std::string> read_or_make_token(const std::filesystem::path& file) {
+  const Descriptor in{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (in.fd >= 0) return read_token(in.fd, file);
+  if (errno != ENOENT)
+    return fail(Errc::failed_precondition, fmt::format("cannot open '{}': {}", file.string(), why()));
+  return make_token(file);
+}
+
+}  // namespace ls::http
