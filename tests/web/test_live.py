@@ -81,6 +81,30 @@ def test_what_was_missed_while_the_stream_was_down_is_there_afterwards(farm, das
     assert farm.asked("GET", "/api/v1/events") == 2
 
 
+def test_a_slow_list_does_not_undo_what_an_event_said_meanwhile(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+    page.evaluate("""void (() => {
+      const real = fetch;
+      window.released = new Promise((resolve) => { window.release = resolve; });
+      window.fetch = async (...request) => {
+        const response = await real(...request);
+        if (request[0].endsWith("/jobs")) { window.held = true; await window.released; }
+        return response;
+      };
+    })()""")
+
+    farm.emit("reset", {"missed_from": 1, "missed_to": 2})
+    page.wait("window.held")
+    farm.change("j-1", state="done", progress=1)
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'done'")
+    page.evaluate("window.released.then(() => new Promise(requestAnimationFrame)), window.release()")
+    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+
+    assert page.text("[data-job] .pill") == "done"
+
+
 def test_events_that_are_kept_no_longer_lead_to_fresh_lists(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()

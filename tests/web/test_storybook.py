@@ -115,10 +115,21 @@ def test_pointing_at_the_plot_names_the_nearest_point(open_page, farm):
     page.wait("document.querySelector('.plot-reading').innerText.includes('1.8 s')")
 
 
+def test_the_arrow_keys_walk_along_the_plot(open_page, farm):
+    page = open_page(f"{farm.url}/demo.html?view=job")
+    page.wait("document.querySelector('.plot svg')")
+
+    page.evaluate("document.querySelector('.plot svg').focus()")
+    page.key("ArrowLeft", virtual=37)
+
+    page.wait("document.querySelector('.plot-reading').innerText.startsWith('1.9 min')")
+    assert "1.9 min" in page.evaluate("document.querySelector('.plot svg').getAttribute('aria-valuetext')")
+
+
 def test_everything_can_be_reached_with_the_tab_key(open_page, farm):
     page = open_page(f"{farm.url}/demo.html?view=job")
     page.wait("document.querySelector('.plot')")
-    wanted = page.evaluate("[...document.querySelectorAll('a[href], button, input')].length")
+    wanted = page.evaluate("[...document.querySelectorAll('a[href], button, input, [tabindex=\"0\"]')].length")
 
     seen = set()
     for _ in range(wanted):

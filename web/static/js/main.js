@@ -81,11 +81,25 @@ function signedOut(message = null) {
 
 // ---- events ----
 
+const recordings = new Set();
+
+/** Puts a fetched list under the events that came meanwhile: its answer may be older than they are. */
+async function snapshot(fetch, apply) {
+  const events = [];
+  recordings.add(events);
+  try {
+    const answer = await fetch();
+    if (answer !== undefined) set(events.reduce((next, [type, data]) => withEvent(next, type, data), apply(state, answer)));
+  } finally {
+    recordings.delete(events);
+  }
+}
+
 async function onOpen() {
   set({ ...state, link: "live" });
-  const [jobs, workers] = await Promise.all([attempt(api.jobs), attempt(api.workers)]);
-  if (jobs) set(withJobs(state, jobs));
-  if (workers) set(withWorkers(state, workers));
+  await Promise.all([
+    snapshot(() => attempt(api.jobs), withJobs),
+    snapshot(() => attempt(api.workers), withWorkers)]);
   await refreshOpen();
 }
 
@@ -95,6 +109,7 @@ function onLost(closed) {
 }
 
 function onEvent(type, data) {
+  for (const events of recordings) events.push([type, data]);
   set(withEvent(state, type, data));
   if (type === "job" && data.id === state.open?.id && !reportTimer) {
     reportTimer = setTimeout(refreshReport, kReportPauseMs);
@@ -113,10 +128,11 @@ async function refreshOpen() {
   const id = state.open?.id;
   if (!id) return;
   try {
-    const [job, tiles] = await Promise.all([api.job(id), api.tiles(id)]);
-    if (state.open?.id !== id) return;
-    set(withTiles(withJob(state, job), tiles));
-    set(withOpen(state, { folds: state.open.folds + 1, problem: null }));
+    await snapshot(() => Promise.all([api.job(id), api.tiles(id)]), (now, [job, tiles]) => {
+      if (now.open?.id !== id) return now;
+      const next = withTiles(withJob(now, job), tiles);
+      return withOpen(next, { folds: next.open.folds + 1, problem: null });
+    });
     await refreshReport();
   } catch (error) {
     if (error.status === 401) signedOut();

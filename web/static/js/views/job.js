@@ -31,7 +31,8 @@ function heading(state, job, actions) {
     h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id)),
     h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), jobActions(state, job, actions, true)),
     progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
-    h("p", { class: "sub", "aria-live": "polite" }, sentence(job)));
+    h("p", { class: "unseen", role: "status" }, stateWord(job)), // said aloud when it changes, unlike the figures
+    h("p", { class: "sub" }, sentence(job)));
 }
 
 function sentence(job) {

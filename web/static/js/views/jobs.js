@@ -2,7 +2,7 @@
 import { h } from "../dom.js";
 import { jobsInOrder } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
-import { jobActions, progressBar, statePill, stateWord } from "./pieces.js";
+import { jobActions, progressBar, safeClass, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
   if (state.jobs === null) return h("p", { class: "waiting", key: "waiting" }, "Fetching the jobs …");
@@ -22,12 +22,12 @@ function tally(jobs) {
 }
 
 function row(state, job, actions) {
-  return h("tr", { key: job.id, class: `is-${job.state}`, "data-job": job.id },
+  return h("tr", { key: job.id, class: `is-${safeClass(job.state)}`, "data-job": job.id },
     h("td", { class: "name" },
       h("a", { href: `#/jobs/${encodeURIComponent(job.id)}` }, jobName(job)),
       h("small", null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
     h("td", { "data-label": "State" }, statePill(job)),
-    h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${job.state}`), h("span", { class: "number" }, percent(job.progress))),
+    h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),
     figureCell("relMSE", figure(job.relmse)),
     figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null)),

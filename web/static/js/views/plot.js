@@ -17,8 +17,10 @@ export function errorPlot({ convergence, target, picked, onPick }) {
   const chosen = points[picked] ? picked : points.length - 1;
   return h("figure", { class: "plot" },
     h("svg", {
-      viewBox: `0 0 ${kWidth} ${kHeight}`, role: "img", "aria-label": summary(points, target),
+      viewBox: `0 0 ${kWidth} ${kHeight}`, "aria-label": summary(points, target), tabindex: 0,
+      role: "slider", "aria-valuemin": 1, "aria-valuemax": points.length, "aria-valuenow": chosen + 1, "aria-valuetext": spoken(points[chosen]),
       onpointermove: (event) => onPick(nearest(event, points, frame)), onpointerleave: () => onPick(null),
+      onkeydown: (event) => onPick(stepped(event, chosen, points.length)), onblur: () => onPick(null),
     },
       grid(frame), band(points, frame), targetLine(target, frame), prediction(points, target, frame),
       series(points, frame, "relmse", "plot-line"), series(points, frame, "true_relmse", "plot-true"),
@@ -89,11 +91,21 @@ function nearest(event, points, { x }) {
   return points.reduce((best, p, i) => (distance(p) < distance(points[best]) ? i : best), 0);
 }
 
+/** The arrow keys walk along the points. */
+function stepped(event, chosen, count) {
+  const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key] ?? 0;
+  if (step) event.preventDefault();
+  return Math.min(count - 1, Math.max(0, chosen + step));
+}
+
+const spoken = (point) => `relMSE ${figure(point.relmse)} after ${duration(point.seconds)}`;
+
 function reading(point) {
   const ci = interval(point.relmse_ci95);
   return [
     h("span", { key: "t" }, h("b", null, duration(point.seconds)), " after the first ray"),
     h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), ci ? ` (95 %: ${ci})` : null),
+    point.true_relmse > 0 ? h("span", { key: "r", class: "true" }, "against the reference ", h("b", null, figure(point.true_relmse))) : null,
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 
