@@ -6,12 +6,14 @@
 
 namespace ls {
 
-Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name, std::uint64_t limit) {
+Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name,
+                                          std::uint64_t limit) {
   std::error_code ec;
   const std::uint64_t size = std::filesystem::file_size(path, ec);
   if (ec) return fail(Errc::not_found, fmt::format("'{}': cannot be read: {}", name, ec.message()));
   if (size > limit)
-    return fail(Errc::resource_exhausted, fmt::format("'{}': {} bytes, more than the limit of {}", name, size, limit));
+    return fail(Errc::resource_exhausted,
+                fmt::format("'{}': {} bytes, more than the limit of {}", name, size, limit));
   std::vector<std::byte> bytes(size);
   std::ifstream in(path, std::ios::binary);
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));

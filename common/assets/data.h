@@ -1,5 +1,5 @@
-// What the decoders return, and the limits that hold for every file a scene names. Every size is checked against a limit
-// and against the bytes that are really there before anything is allocated.
+// What the decoders return, and the limits that hold for every file a scene names. Every size is checked
+// against a limit and against the bytes that are really there before anything is allocated.
 #pragma once
 
 #include <array>
@@ -23,19 +23,20 @@ inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 inline constexpr std::uint32_t kMaxGridSide = 1 << 13;
 inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 
-// A triangle mesh. Three floats a vertex in positions and (if the file has any) normals, two in uvs; three indices a
-// triangle, all below vertex_count(). uvs are as in the file.
+// A triangle mesh. Three floats a vertex in positions and (if the file has any) normals, two in uvs; three
+// indices a triangle, all below vertex_count(). uvs are as in the file.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
-  std::uint64_t dropped_triangles = 0;  // of zero area or with a vertex that is not finite; none of them in indices
+  std::uint64_t dropped_triangles =
+      0;  // of zero area or with a vertex that is not finite; none of them in indices
 
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t triangle_count() const { return indices.size() / 3; }
 };
 
-// An image, row by row from the top. Exactly one of `u8` (codes 0..255) and `f32` is filled, channels interleaved.
-// channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
+// An image, row by row from the top. Exactly one of `u8` (codes 0..255) and `f32` is filled, channels
+// interleaved. channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
 struct ImageData {
   std::uint32_t width = 0, height = 0, channels = 0;
   std::vector<std::uint8_t> u8;

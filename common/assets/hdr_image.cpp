@@ -31,7 +31,8 @@ std::optional<HdrSize> resolution(std::string_view line) {
   s.height = count(next_word(line));
   if (next_word(line) != "+X") return std::nullopt;
   s.width = count(next_word(line));
-  if (s.width == 0 || s.height == 0 || std::uint64_t{s.width} * s.height > kMaxImagePixels) return std::nullopt;
+  if (s.width == 0 || s.height == 0 || std::uint64_t{s.width} * s.height > kMaxImagePixels)
+    return std::nullopt;
   return s;
 }
 

@@ -24,8 +24,9 @@ Result<ImageData> load_image(const std::filesystem::path& path, std::string_view
 }
 
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file) {
-  auto image = read_exr_rgb(file, std::string(name),
-                            ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = kMaxImagePixels, .max_side = kMaxImageSide});
+  auto image = read_exr_rgb(
+      file, std::string(name),
+      ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = kMaxImagePixels, .max_side = kMaxImageSide});
   if (!image) return tl::unexpected(image.error());
   ImageData out;
   out.width = static_cast<std::uint32_t>(image->size.width);

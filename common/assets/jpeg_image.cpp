@@ -68,7 +68,8 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   const auto bad = [&](const char* text) {
     return fail(Errc::invalid_argument, fmt::format("'{}': broken JPEG: {}", name, text));
   };
-  if (!read_header(d, reinterpret_cast<const unsigned char*>(file.data()), file.size())) return bad(d.failure.message);
+  if (!read_header(d, reinterpret_cast<const unsigned char*>(file.data()), file.size()))
+    return bad(d.failure.message);
   ImageData image;
   image.width = d.info.image_width;
   image.height = d.info.image_height;
@@ -77,10 +78,12 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   const std::uint64_t pixels = std::uint64_t{image.width} * image.height;
   if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
     return bad("its size is not believable");
-  if (pixels / 64 / 64 > file.size())  // an 8 x 8 block takes at least two bits, shared by up to 4 blocks of chroma
+  if (pixels / 64 / 64 >
+      file.size())  // an 8 x 8 block takes at least two bits, shared by up to 4 blocks of chroma
     return bad("it is too short for its size");
   image.u8.resize(pixels * image.channels);
-  if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels)) return bad(d.failure.message);
+  if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))
+    return bad(d.failure.message);
   return image;
 }
 

@@ -10,13 +10,14 @@
 
 namespace ls {
 
-// v, vt, vn and f; indices may be negative (counted back from the last). Grouping, material and smoothing statements,
-// points, lines and comments mean nothing to us. A corner is one vertex for each distinct (v, vt, vn). Normals and uvs are
-// kept if any face uses them (0 where a corner has none).
+// v, vt, vn and f; indices may be negative (counted back from the last). Grouping, material and smoothing
+// statements, points, lines and comments mean nothing to us. A corner is one vertex for each distinct (v, vt,
+// vn). Normals and uvs are kept if any face uses them (0 where a corner has none).
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file);
 
-// ascii, binary_little_endian and binary_big_endian 1.0; element vertex with x y z, maybe nx ny nz and (u v | s t |
-// texture_u texture_v); element face with the list vertex_indices or vertex_index; everything else is skipped over.
+// ascii, binary_little_endian and binary_big_endian 1.0; element vertex with x y z, maybe nx ny nz and (u v |
+// s t | texture_u texture_v); element face with the list vertex_indices or vertex_index; everything else is
+// skipped over.
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
 
 // By the first bytes: "ply" is PLY, everything else OBJ.

@@ -53,10 +53,11 @@ class ObjReader {
     if (key == "vt") return numbers<2>(line, vt_, 1);
     if (key == "vn") return numbers<3>(line, vn_, 3);
     if (key == "f") return face(line);
-    for (const std::string_view known : {"g", "o", "s", "usemtl", "mtllib", "p", "l", "vp", "mg", "usemap", "maplib", "lod",
-                                         "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp", "cstype", "deg", "curv",
-                                         "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "fo", "bmat",
-                                         "step", "ctech", "stech"})
+    for (const std::string_view known :
+         {"g",      "o",      "s",     "usemtl",     "mtllib",    "p",     "l",        "vp",       "mg",
+          "usemap", "maplib", "lod",   "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp", "cstype",
+          "deg",    "curv",   "curv2", "surf",       "parm",      "trim",  "hole",     "scrv",     "sp",
+          "end",    "con",    "fo",    "bmat",       "step",      "ctech", "stech"})
       if (key == known) return true;
     return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
   }
@@ -70,7 +71,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      if (ec == std::errc::result_out_of_range)  // too small is 0; too large leaves a triangle that is dropped
+      if (ec ==
+          std::errc::result_out_of_range)  // too small is 0; too large leaves a triangle that is dropped
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())
         return complain(fmt::format("expected {} numbers, found '{}'", needed, w.substr(0, 40)));
@@ -90,7 +92,8 @@ class ObjReader {
       polygon_.push_back(vertex(*c));
     }
     if (polygon_.size() < 3) return complain("a face needs at least three corners");
-    if (mesh_.triangle_count() + polygon_.size() > kMaxMeshTriangles || mesh_.vertex_count() > kMaxMeshVertices)
+    if (mesh_.triangle_count() + polygon_.size() > kMaxMeshTriangles ||
+        mesh_.vertex_count() > kMaxMeshVertices)
       return complain("too many triangles");
     add_polygon(mesh_, polygon_);
     return true;

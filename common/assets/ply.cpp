@@ -26,10 +26,10 @@ struct TypeName {
   std::size_t bytes;
 };
 constexpr TypeName kTypes[] = {
-    {"char", Type::i8, 1},    {"int8", Type::i8, 1},    {"uchar", Type::u8, 1},   {"uint8", Type::u8, 1},
-    {"short", Type::i16, 2},  {"int16", Type::i16, 2},  {"ushort", Type::u16, 2}, {"uint16", Type::u16, 2},
-    {"int", Type::i32, 4},    {"int32", Type::i32, 4},  {"uint", Type::u32, 4},   {"uint32", Type::u32, 4},
-    {"float", Type::f32, 4},  {"float32", Type::f32, 4}, {"double", Type::f64, 8}, {"float64", Type::f64, 8}};
+    {"char", Type::i8, 1},   {"int8", Type::i8, 1},     {"uchar", Type::u8, 1},   {"uint8", Type::u8, 1},
+    {"short", Type::i16, 2}, {"int16", Type::i16, 2},   {"ushort", Type::u16, 2}, {"uint16", Type::u16, 2},
+    {"int", Type::i32, 4},   {"int32", Type::i32, 4},   {"uint", Type::u32, 4},   {"uint32", Type::u32, 4},
+    {"float", Type::f32, 4}, {"float32", Type::f32, 4}, {"double", Type::f64, 8}, {"float64", Type::f64, 8}};
 
 const TypeName* type_named(std::string_view name) {
   const auto it = std::ranges::find(kTypes, name, &TypeName::name);
@@ -58,8 +58,8 @@ struct Element {
 // Where a vertex property goes: positions 0-2, normals 3-5, uvs 6-7; -1 nowhere.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
-      {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3}, {"ny", 4}, {"nz", 5},       {"u", 6},         {"v", 7},
-      {"s", 6}, {"t", 7}, {"texture_u", 6}, {"texture_v", 7}, {"texture_s", 6}, {"texture_t", 7}};
+      {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
+      {"v", 7}, {"s", 6}, {"t", 7}, {"texture_u", 6}, {"texture_v", 7}, {"texture_s", 6}, {"texture_t", 7}};
   const auto it = std::ranges::find(kSlots, name, &std::pair<std::string_view, int>::first);
   return it == std::end(kSlots) ? -1 : it->second;
 }
@@ -69,7 +69,8 @@ class PlyReader {
   PlyReader(std::string_view name, std::span<const std::byte> file) : name_(name), file_(file), body_(file) {}
 
   Result<MeshData> read() {
-    if (!header() || !elements()) return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    if (!header() || !elements())
+      return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
     return std::move(mesh_);
   }
 
@@ -78,7 +79,9 @@ class PlyReader {
     problem_ = std::move(text);
     return false;
   }
-  bool complain_line(std::size_t line, std::string_view text) { return complain(fmt::format("line {}: {}", line, text)); }
+  bool complain_line(std::size_t line, std::string_view text) {
+    return complain(fmt::format("line {}: {}", line, text));
+  }
 
   bool header() {
     std::string_view text = as_text(file_);
@@ -92,7 +95,9 @@ class PlyReader {
       } else if (key == "format") {
         has_format = true;
         const std::string_view f = next_word(rest);
-        coding_ = f == "ascii" ? Coding::ascii : f == "binary_big_endian" ? Coding::big_endian : Coding::little_endian;
+        coding_ = f == "ascii"               ? Coding::ascii
+                  : f == "binary_big_endian" ? Coding::big_endian
+                                             : Coding::little_endian;
         if (coding_ == Coding::little_endian && f != "binary_little_endian")
           return complain_line(line, fmt::format("unknown format '{}'", f.substr(0, 40)));
       } else if (key == "element") {
@@ -129,12 +134,14 @@ class PlyReader {
     if (word == "list") {
       p.count = type_named(next_word(rest));
       word = next_word(rest);
-      if (!p.count || p.count->type >= Type::f32) return complain_line(line, "a list's length needs a whole-number type");
+      if (!p.count || p.count->type >= Type::f32)
+        return complain_line(line, "a list's length needs a whole-number type");
     }
     p.type = type_named(word);
     p.name = next_word(rest);
     if (!p.type || p.name.empty())
-      return complain_line(line, fmt::format("a property of unknown type '{}' or without a name", word.substr(0, 40)));
+      return complain_line(
+          line, fmt::format("a property of unknown type '{}' or without a name", word.substr(0, 40)));
     elements_.back().properties.push_back(p);
     return true;
   }
@@ -144,7 +151,8 @@ class PlyReader {
       if (e.properties.empty()) continue;
       const std::uint64_t left = coding_ == Coding::ascii ? rest_.size() : body_.left();
       if (e.count > left / e.least_bytes(coding_))
-        return complain(fmt::format("{} elements '{}' are announced, but only {} bytes follow", e.count, e.name, left));
+        return complain(
+            fmt::format("{} elements '{}' are announced, but only {} bytes follow", e.count, e.name, left));
       const bool ok = e.name == "vertex" ? vertices(e) : e.name == "face" ? faces(e) : skip(e);
       if (!ok) return false;
     }
@@ -162,29 +170,41 @@ class PlyReader {
       const char* const last = rest_.data() + rest_.size();
       const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
       if (ec == std::errc::invalid_argument) return std::nullopt;
-      if (ec == std::errc::result_out_of_range) v = 0;  // below or above what a double holds: no mesh means that
-      if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos) return std::nullopt;
+      if (ec == std::errc::result_out_of_range)
+        v = 0;  // below or above what a double holds: no mesh means that
+      if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos)
+        return std::nullopt;
       rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
       return v;
     }
     const bool big = coding_ == Coding::big_endian;
-    const auto wide = [](auto v) { return v ? std::optional<double>(static_cast<double>(*v)) : std::nullopt; };
+    const auto wide = [](auto v) {
+      return v ? std::optional<double>(static_cast<double>(*v)) : std::nullopt;
+    };
     switch (t.type) {
-      case Type::i8: return wide(body_.take<std::int8_t>(big));
-      case Type::u8: return wide(body_.take<std::uint8_t>(big));
-      case Type::i16: return wide(body_.take<std::int16_t>(big));
-      case Type::u16: return wide(body_.take<std::uint16_t>(big));
-      case Type::i32: return wide(body_.take<std::int32_t>(big));
-      case Type::u32: return wide(body_.take<std::uint32_t>(big));
-      case Type::f32: return wide(body_.take<float>(big));
-      case Type::f64: return wide(body_.take<double>(big));
+      case Type::i8:
+        return wide(body_.take<std::int8_t>(big));
+      case Type::u8:
+        return wide(body_.take<std::uint8_t>(big));
+      case Type::i16:
+        return wide(body_.take<std::int16_t>(big));
+      case Type::u16:
+        return wide(body_.take<std::uint16_t>(big));
+      case Type::i32:
+        return wide(body_.take<std::int32_t>(big));
+      case Type::u32:
+        return wide(body_.take<std::uint32_t>(big));
+      case Type::f32:
+        return wide(body_.take<float>(big));
+      case Type::f64:
+        return wide(body_.take<double>(big));
     }
     return std::nullopt;
   }
   bool broken(const Element& e, std::uint64_t i) {
     const std::size_t at = file_.size() - (coding_ == Coding::ascii ? rest_.size() : body_.left());
-    return complain(fmt::format("{} {} of {} cannot be read: the file ends or holds no number at byte {}", e.name, i,
-                                e.count, at));
+    return complain(fmt::format("{} {} of {} cannot be read: the file ends or holds no number at byte {}",
+                                e.name, i, e.count, at));
   }
   std::optional<std::uint32_t> list_length(const Property& p) {
     const auto n = number(*p.count);
@@ -211,7 +231,8 @@ class PlyReader {
 
   bool vertices(const Element& e) {
     if (vertex_count_ > 0) return complain("has two elements 'vertex'");
-    if (e.count > kMaxMeshVertices) return complain(fmt::format("has {} vertices; the limit is {}", e.count, kMaxMeshVertices));
+    if (e.count > kMaxMeshVertices)
+      return complain(fmt::format("has {} vertices; the limit is {}", e.count, kMaxMeshVertices));
     std::vector<int> slots;
     std::array<bool, 8> has{};
     for (const Property& p : e.properties) {
@@ -263,7 +284,8 @@ class PlyReader {
             return complain(fmt::format("face {} names vertex {} of {}", i, *v, vertex_count_));
           corners.push_back(static_cast<std::uint32_t>(*v));
         }
-        if (mesh_.triangle_count() + corners.size() > kMaxMeshTriangles) return complain("has too many triangles");
+        if (mesh_.triangle_count() + corners.size() > kMaxMeshTriangles)
+          return complain("has too many triangles");
         add_polygon(mesh_, corners);
       }
     return true;
@@ -271,8 +293,8 @@ class PlyReader {
 
   std::string_view name_;
   std::span<const std::byte> file_;
-  ByteReader body_;         // what follows the header, binary
-  std::string_view rest_;   // the same, ascii
+  ByteReader body_;        // what follows the header, binary
+  std::string_view rest_;  // the same, ascii
   Coding coding_ = Coding::ascii;
   std::vector<Element> elements_;
   std::uint64_t vertex_count_ = 0;
@@ -282,6 +304,8 @@ class PlyReader {
 
 }  // namespace
 
-Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) { return PlyReader(name, file).read(); }
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) {
+  return PlyReader(name, file).read();
+}
 
 }  // namespace ls

@@ -54,8 +54,9 @@ bool read_header(Png& p, Shape& shape) {
   if (png_get_bit_depth(p.png, p.info) == 16) png_set_swap(p.png);
   png_set_interlace_handling(p.png);
   png_read_update_info(p.png, p.info);
-  shape = {png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info), png_get_channels(p.png, p.info),
-           png_get_bit_depth(p.png, p.info), png_get_rowbytes(p.png, p.info)};
+  shape = {png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info),
+           png_get_channels(p.png, p.info), png_get_bit_depth(p.png, p.info),
+           png_get_rowbytes(p.png, p.info)};
   return true;
 }
 bool read_rows(Png& p, png_bytepp rows) {
@@ -80,8 +81,10 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   Shape shape;
   if (!read_header(p, shape)) return bad(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 to 1 and a palette of one bit becomes four bytes: a file that claims more lies.
-  if (pixels == 0 || pixels > kMaxImagePixels || shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
+  // Deflate packs at most 1032 to 1 and a palette of one bit becomes four bytes: a file that claims more
+  // lies.
+  if (pixels == 0 || pixels > kMaxImagePixels ||
+      shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
     return bad("its size is not believable");
   std::vector<std::uint8_t> bytes(shape.row_bytes * shape.height);
   std::vector<png_bytep> rows(shape.height);

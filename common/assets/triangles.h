@@ -26,7 +26,8 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
   return area2 > 0;
 }
 
-// The triangles (0, i, i + 1), those of no area or with a vertex that is not finite counted instead. Indices are in range.
+// The triangles (0, i, i + 1), those of no area or with a vertex that is not finite counted instead. Indices
+// are in range.
 inline void add_polygon(MeshData& m, std::span<const std::uint32_t> corners) {
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     if (is_drawable(m, corners[0], corners[i], corners[i + 1]))

@@ -1,5 +1,6 @@
-// Mitsuba's .vol grids, version 3: "VOL", byte 3, int32 type, int32 nx ny nz, int32 channels, six float32 (minimum and
-// maximum corner), then the values; little endian, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0..255 for 0..1).
+// Mitsuba's .vol grids, version 3: "VOL", byte 3, int32 type, int32 nx ny nz, int32 channels, six float32
+// (minimum and maximum corner), then the values; little endian, x fastest. Types: 1 float32, 2 float16, 3
+// uint8 (0..255 for 0..1).
 #pragma once
 
 #include <cstddef>
@@ -11,7 +12,8 @@
 
 namespace ls {
 
-// 1 or 3 channels. A value that is NaN or infinite is refused with its voxel; negative ones become 0 and are counted.
+// 1 or 3 channels. A value that is NaN or infinite is refused with its voxel; negative ones become 0 and are
+// counted.
 Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file);
 Result<GridData> load_vol(const std::filesystem::path& path, std::string_view name);
 

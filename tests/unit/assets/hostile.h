@@ -1,5 +1,5 @@
-// Every truncation of a file, and many random mutations of it: the decoder must come back, with a value or with an error
-// that names the file.
+// Every truncation of a file, and many random mutations of it: the decoder must come back, with a value or
+// with an error that names the file.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,9 @@
 
 namespace ls::test {
 
-inline std::span<const std::byte> bytes_of(const std::string& s) { return std::as_bytes(std::span(s.data(), s.size())); }
+inline std::span<const std::byte> bytes_of(const std::string& s) {
+  return std::as_bytes(std::span(s.data(), s.size()));
+}
 template <class T>
 void append(std::string& to, const T& v) {
   to.append(reinterpret_cast<const char*>(&v), sizeof v);
@@ -46,10 +48,17 @@ void survive_mutations(const std::string& file, Decode decode, Check check, int 
     for (int e = 0; e < edits; ++e) {
       const std::size_t at = rng() % m.size();
       switch (rng() % 4) {
-        case 0: m[at] = static_cast<char>(rng()); break;
-        case 1: m[at] = static_cast<char>(m[at] ^ (1 << rng() % 8)); break;
-        case 2: m.erase(at, 1 + rng() % 4); break;
-        default: m.insert(at, 1 + rng() % 4, static_cast<char>(rng() % 2 ? 0xff : '9'));
+        case 0:
+          m[at] = static_cast<char>(rng());
+          break;
+        case 1:
+          m[at] = static_cast<char>(m[at] ^ (1 << rng() % 8));
+          break;
+        case 2:
+          m.erase(at, 1 + rng() % 4);
+          break;
+        default:
+          m.insert(at, 1 + rng() % 4, static_cast<char>(rng() % 2 ? 0xff : '9'));
       }
       if (m.empty()) m = "x";
     }

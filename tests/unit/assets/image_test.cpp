@@ -66,9 +66,10 @@ std::string jpeg(int width, int height, int channels, std::uint8_t value) {
 std::string hdr() {
   std::string s = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n";
   s += std::string("\x02\x02\x00\x08", 4);
-  s += std::string("\x88\x80", 2);                                   // red: a run of 8 x 128
-  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);       // green: 8 as they are
-  s += std::string("\x84\x10\x84\x20", 4) + std::string("\x88\x81", 2);  // blue: two runs; exponent 129: times 2 / 256
+  s += std::string("\x88\x80", 2);                              // red: a run of 8 x 128
+  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);  // green: 8 as they are
+  s += std::string("\x84\x10\x84\x20", 4) +
+       std::string("\x88\x81", 2);  // blue: two runs; exponent 129: times 2 / 256
   for (int x = 0; x < 8; ++x) s += std::string("\x80\x40\x20\x80", 4);
   return s;
 }
@@ -102,9 +103,12 @@ std::string png16(const std::vector<std::uint16_t>& grey) {
   std::string out;
   png_structp p = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(p);
-  png_set_write_fn(p, &out, [](png_structp w, png_bytep data, png_size_t n) {
-    static_cast<std::string*>(png_get_io_ptr(w))->append(reinterpret_cast<char*>(data), n);
-  }, [](png_structp) {});
+  png_set_write_fn(
+      p, &out,
+      [](png_structp w, png_bytep data, png_size_t n) {
+        static_cast<std::string*>(png_get_io_ptr(w))->append(reinterpret_cast<char*>(data), n);
+      },
+      [](png_structp) {});
   png_set_IHDR(p, info, static_cast<png_uint_32>(grey.size()), 1, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(p, info);
@@ -142,7 +146,8 @@ TEST(Jpeg, ReadsColourAndGrey) {
 
 TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
   const std::string file = jpeg(32, 32, 3, 77);
-  EXPECT_LE(test::accepted_truncations(file, decode_jpeg), 2);  // all pixels are there when only the end marker is cut
+  EXPECT_LE(test::accepted_truncations(file, decode_jpeg),
+            2);  // all pixels are there when only the end marker is cut
   test::survive_mutations(file, decode_jpeg, expect_sound);
 }
 
@@ -170,7 +175,7 @@ TEST(Hdr, ReadsRunsAndPlainRows) {
   EXPECT_EQ(i->width, 8u);
   EXPECT_EQ(i->height, 2u);
   EXPECT_FALSE(i->srgb);
-  EXPECT_EQ(i->f32[0], 1);       // 128 x 2^(129 - 136)
+  EXPECT_EQ(i->f32[0], 1);         // 128 x 2^(129 - 136)
   EXPECT_EQ(i->f32[3 + 1], .25f);  // 32 / 128
   EXPECT_EQ(i->f32[2], .125f);
   EXPECT_EQ(i->f32[24], .5f);  // second row

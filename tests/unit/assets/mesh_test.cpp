@@ -15,7 +15,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 const std::string kQuadObj =
-    "# a quad\nmtllib a.mtl\no quad\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
+    "# a quad\nmtllib a.mtl\no quad\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 "
+    "1\nvn 0 0 1\n"
     "usemtl m\ns off\nf 1/1/1 2/2/1 3/3/1 4/4/1\n";
 
 void expect_sound(const MeshData& m) {
@@ -52,14 +53,17 @@ TEST(Obj, CountsNegativeIndicesBackFromTheLast) {
 }
 
 TEST(Obj, SharesOnlyCornersThatAreAlikeInEverything) {
-  const auto m = decode_obj("q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 2/1 3/1\n"));
+  const auto m = decode_obj(
+      "q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 2/1 3/1\n"));
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 3, 1, 2));
 }
 
 TEST(Obj, DropsAndCountsTrianglesWithoutAreaOrWithVerticesThatAreNotFinite) {
-  const auto m = decode_obj("q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
+  const auto m = decode_obj(
+      "q.obj",
+      bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_EQ(m->triangle_count(), 1u);
@@ -67,7 +71,8 @@ TEST(Obj, DropsAndCountsTrianglesWithoutAreaOrWithVerticesThatAreNotFinite) {
 }
 
 TEST(Obj, ErrorsNameFileAndLine) {
-  EXPECT_THAT(obj_error("v 0 0 0\nf 1 2 3\n"), HasSubstr("'m.obj', line 2: index 2 in '2' is out of range: 1 so far"));
+  EXPECT_THAT(obj_error("v 0 0 0\nf 1 2 3\n"),
+              HasSubstr("'m.obj', line 2: index 2 in '2' is out of range: 1 so far"));
   EXPECT_THAT(obj_error("v 0 0 zero\n"), HasSubstr("line 1: expected 3 numbers, found 'zero'"));
   EXPECT_THAT(obj_error("v 0 0 0\nf 0 1 1\n"), HasSubstr("line 2"));
   EXPECT_THAT(obj_error("v 0 0 0\nf 1 1\n"), HasSubstr("at least three corners"));
@@ -82,13 +87,16 @@ TEST(Obj, SurvivesTruncationsAndMutations) {
 }
 
 std::string ply_header(const std::string& format) {
-  return "ply\nformat " + format + " 1.0\ncomment made by hand\nelement vertex 4\nproperty float z\nproperty double x\n" +
-         "property float y\nproperty uchar red\nproperty float s\nproperty float t\nelement face 1\nproperty uchar flags\n" +
+  return "ply\nformat " + format +
+         " 1.0\ncomment made by hand\nelement vertex 4\nproperty float z\nproperty double x\n" +
+         "property float y\nproperty uchar red\nproperty float s\nproperty float t\nelement face 1\nproperty "
+         "uchar flags\n" +
          "property list uchar int vertex_indices\nelement edge 1\nproperty list int float w\nend_header\n";
 }
 
-const std::string kPlyAscii = ply_header("ascii") +
-                              "0 -1 -1 255 0 0\n0 1 -1 255 1 0\n0 1 1 255 1 1\n0 -1 1 255 0 1\n7 4 0 1 2 3\n2 0.5 0.25\n";
+const std::string kPlyAscii =
+    ply_header("ascii") +
+    "0 -1 -1 255 0 0\n0 1 -1 255 1 0\n0 1 1 255 1 1\n0 -1 1 255 0 1\n7 4 0 1 2 3\n2 0.5 0.25\n";
 
 template <class T>
 void put(std::string& s, T v, bool big) {
@@ -136,15 +144,19 @@ TEST(Ply, ReadsAllThreeCodingsAlike) {
 }
 
 TEST(Ply, RefusesCountsThatTheFileCannotHold) {
-  EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 4000000000")), HasSubstr("4000000000 elements 'vertex'"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 4000000000")),
+              HasSubstr("4000000000 elements 'vertex'"));
   EXPECT_THAT(ply_error(replaced(ply_binary(false), "face 1", "face 99")), HasSubstr("99 elements 'face'"));
   EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 3")), HasSubstr("m.ply"));
 }
 
 TEST(Ply, RefusesIndicesOutOfRangeAndBrokenHeaders) {
-  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 4\n")), HasSubstr("face 0 names vertex 4 of 4"));
-  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 -1\n")), HasSubstr("face 0 names vertex -1 of 4"));
-  EXPECT_THAT(ply_error(replaced(kPlyAscii, "ascii", "ebcdic")), HasSubstr("line 2: unknown format 'ebcdic'"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 4\n")),
+              HasSubstr("face 0 names vertex 4 of 4"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "0 1 2 3\n", "0 1 2 -1\n")),
+              HasSubstr("face 0 names vertex -1 of 4"));
+  EXPECT_THAT(ply_error(replaced(kPlyAscii, "ascii", "ebcdic")),
+              HasSubstr("line 2: unknown format 'ebcdic'"));
   EXPECT_THAT(ply_error(replaced(kPlyAscii, "double x", "double q")), HasSubstr("lack x, y or z"));
   EXPECT_THAT(ply_error(replaced(kPlyAscii, "property float z", "property real z")), HasSubstr("line 5"));
 }

@@ -80,7 +80,8 @@ TEST(Vol, RefusesValuesThatAreNotFiniteWithTheirVoxel) {
 TEST(Vol, RefusesHeadersThatTheFileDoesNotBear) {
   VolFile f = floats({0, 1, 2, 3, 4, 5});
   f.nx = 3;
-  EXPECT_THAT(error(f), HasSubstr("3 x 3 x 1 voxels of 1 channel(s) need 36 bytes after the header, but 24 are there"));
+  EXPECT_THAT(error(f),
+              HasSubstr("3 x 3 x 1 voxels of 1 channel(s) need 36 bytes after the header, but 24 are there"));
   f.nx = 2147483647, f.ny = 2147483647;
   EXPECT_THAT(error(f), HasSubstr("2147483647 voxels along an axis"));
   f.nx = f.ny = f.nz = 8000;

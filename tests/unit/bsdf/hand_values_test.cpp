@@ -102,12 +102,14 @@ TEST(Build, RefusesWhatCannotBe) {
   };
   Scene s = glass(1.5, 1);
   add(s, TwoSidedBsdf{{0}, {0}});
-  EXPECT_THAT(error(s), HasSubstr("material 1: a two-sided material cannot hold one that lets light through"));
+  EXPECT_THAT(error(s),
+              HasSubstr("material 1: a two-sided material cannot hold one that lets light through"));
   s.bsdfs = {TwoSidedBsdf{{0}, {0}}};
   EXPECT_THAT(error(s), HasSubstr("or itself"));
   EXPECT_THAT(error(glass(0, 1)), HasSubstr("indices of refraction 0"));
   EXPECT_THAT(error(glass(std::nan(""), 1)), HasSubstr("indices of refraction"));
-  EXPECT_THAT(error(rough_metal(Microfacet::ggx, -1, .1, kGoldEta, kGoldK)), HasSubstr("roughness alpha = -1"));
+  EXPECT_THAT(error(rough_metal(Microfacet::ggx, -1, .1, kGoldEta, kGoldK)),
+              HasSubstr("roughness alpha = -1"));
   s.bsdfs = {DiffuseBsdf{{99}}};
   EXPECT_THAT(error(s), HasSubstr("texture 99"));
 }
@@ -129,9 +131,10 @@ TEST(Roughness, BelowTheSpecularLimitIsAMirror) {
 }
 
 TEST(Roughness, HemisphericalReflectanceOfGgxAtRoughnessOneSeenFromAbove) {
-  // From mu = 1, alpha = 1: D = 1/pi, visible normals have the density cos / pi, and the masking of the reflected
-  // direction is G1 = 2 z / (1 + z) with z = 2 c^2 - 1 for a normal at cosine c (G1 of the viewer is 1, so that separable and height-correlated
-  // Smith masking are the same there): E = int_{1/sqrt 2}^1 2 c G1 dc = int_0^1 z / (1 + z) dz = 1 - ln 2.
+  // From mu = 1, alpha = 1: D = 1/pi, visible normals have the density cos / pi, and the masking of the
+  // reflected direction is G1 = 2 z / (1 + z) with z = 2 c^2 - 1 for a normal at cosine c (G1 of the viewer
+  // is 1, so that separable and height-correlated Smith masking are the same there): E = int_{1/sqrt 2}^1 2 c
+  // G1 dc = int_0^1 z / (1 + z) dz = 1 - ln 2.
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
   double sum = 0;
   constexpr int n = 20000;  // midpoint rule in z: error n^-2 times a bounded second derivative

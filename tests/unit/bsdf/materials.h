@@ -38,7 +38,8 @@ inline BsdfIndex add(Scene& s, const Bsdf& b) {
 inline std::unique_ptr<Bench> bench(Scene scene) {
   auto b = std::make_unique<Bench>();
   b->scene = std::move(scene);
-  auto textures = TextureTable::build(b->scene, [](const Asset&) { return fail(Errc::not_found, "no file"); });
+  auto textures =
+      TextureTable::build(b->scene, [](const Asset&) { return fail(Errc::not_found, "no file"); });
   EXPECT_TRUE(textures.has_value()) << textures.error().message;
   b->textures = std::move(*textures);
   auto bsdfs = BsdfTable::build(b->scene, b->textures);
@@ -50,13 +51,14 @@ inline std::unique_ptr<Bench> bench(Scene scene) {
 
 inline const Rgb kGoldEta{.14, .37, 1.44}, kGoldK{3.98, 2.38, 1.60};
 
-inline Scene rough_metal(Microfacet d, double au, double av, const Rgb& eta, const Rgb& k, const Rgb& tint = {1, 1, 1}) {
+inline Scene rough_metal(Microfacet d, double au, double av, const Rgb& eta, const Rgb& k,
+                         const Rgb& tint = {1, 1, 1}) {
   Scene s;
   add(s, RoughConductorBsdf{d, texture(s, au), texture(s, av), eta, k, texture(s, tint)});
   return s;
 }
-inline Scene rough_plastic(Microfacet d, double alpha, double int_ior, double ext_ior, bool nonlinear, const Rgb& diffuse,
-                           const Rgb& tint = {1, 1, 1}) {
+inline Scene rough_plastic(Microfacet d, double alpha, double int_ior, double ext_ior, bool nonlinear,
+                           const Rgb& diffuse, const Rgb& tint = {1, 1, 1}) {
   Scene s;
   add(s, RoughPlasticBsdf{d, alpha, int_ior, ext_ior, nonlinear, texture(s, diffuse), texture(s, tint)});
   return s;
@@ -75,7 +77,8 @@ inline Scene glass(double int_ior, double ext_ior) {
 
 inline V3 direction(double cos_theta, double phi) {
   const double sin = std::sqrt(std::max(0., 1 - cos_theta * cos_theta));
-  return {static_cast<float>(sin * std::cos(phi)), static_cast<float>(sin * std::sin(phi)), static_cast<float>(cos_theta)};
+  return {static_cast<float>(sin * std::cos(phi)), static_cast<float>(sin * std::sin(phi)),
+          static_cast<float>(cos_theta)};
 }
 
 }  // namespace ls::render::test

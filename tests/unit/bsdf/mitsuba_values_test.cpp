@@ -28,22 +28,28 @@ std::map<std::string, Scene> materials() {
   std::map<std::string, Scene> m;
   m["diffuse"] = diffuse({.2, .5, .9});
   m["twosided"] = two_sided();
-  for (const auto& [d, name] : {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
-    for (const auto& [a, text] : {std::pair{.02, "0.02"}, std::pair{.1, "0.1"}, std::pair{.5, "0.5"}, std::pair{1., "1.0"}})
+  for (const auto& [d, name] :
+       {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
+    for (const auto& [a, text] :
+         {std::pair{.02, "0.02"}, std::pair{.1, "0.1"}, std::pair{.5, "0.5"}, std::pair{1., "1.0"}})
       m[fmt::format("conductor_{}_{}", name, text)] = rough_metal(d, a, a, kGoldEta, kGoldK);
     m[fmt::format("conductor_{}_aniso", name)] = rough_metal(d, .3, .05, kGoldEta, kGoldK, {.9, .8, .7});
     for (const double a : {.05, .1, .3, .7})
       m[fmt::format("plastic_{}_{}", name, a)] = rough_plastic(d, a, 1.49, 1.000277, false, {.1, .27, .9});
-    m[fmt::format("plastic_{}_nonlinear", name)] = rough_plastic(d, .2, 1.9, 1, true, {.1, .27, .9}, {1, .5, .25});
+    m[fmt::format("plastic_{}_nonlinear", name)] =
+        rough_plastic(d, .2, 1.9, 1, true, {.1, .27, .9}, {1, .5, .25});
   }
   return m;
 }
 
-V3 vec(const double (&v)[3]) { return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}; }
+V3 vec(const double (&v)[3]) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
 
-// Both sides work in float32. The half vector is good to about 1e-7 absolute, which an exponent e = (tan/alpha)^2 turns
-// into a relative error of 2 sqrt(e) 1e-7 / alpha of the lobe: below 1e-4 for alpha >= .02 and e < 87. Plastic: Mitsuba
-// integrates its tables in float32 with fewer nodes; 1e-3 is what we ask there.
+// Both sides work in float32. The half vector is good to about 1e-7 absolute, which an exponent e =
+// (tan/alpha)^2 turns into a relative error of 2 sqrt(e) 1e-7 / alpha of the lobe: below 1e-4 for alpha >=
+// .02 and e < 87. Plastic: Mitsuba integrates its tables in float32 with fewer nodes; 1e-3 is what we ask
+// there.
 TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
   std::map<std::string, std::unique_ptr<Bench>> benches;
   for (auto& [name, scene] : materials()) benches[name] = bench(scene);
@@ -61,8 +67,8 @@ TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
       const double error = std::abs(e.f_cos[c] - row.f_cos[c]);
       worst[name] = std::max(worst[name], row.f_cos[c] > 1e-20 ? error / row.f_cos[c] : 0.);
       EXPECT_LE(error, tolerance * row.f_cos[c] + 1e-20)
-          << name << " channel " << c << ": " << e.f_cos[c] << " for " << row.f_cos[c] << " at wo.z " << row.wo[2]
-          << ", wi.z " << row.wi[2];
+          << name << " channel " << c << ": " << e.f_cos[c] << " for " << row.f_cos[c] << " at wo.z "
+          << row.wo[2] << ", wi.z " << row.wi[2];
     }
   }
   for (const auto& [name, bench] : benches) EXPECT_GE(rows[name], 15) << name;

@@ -10,8 +10,8 @@
 namespace ls::render::test {
 namespace {
 
-// The statistical tests of this file together reject a right program with this probability (seeds are fixed, so that in
-// fact they always or never do), split evenly over kChiSquareTests by Sidak.
+// The statistical tests of this file together reject a right program with this probability (seeds are fixed,
+// so that in fact they always or never do), split evenly over kChiSquareTests by Sidak.
 constexpr double kFalsePositives = 1e-3;
 constexpr int kMaterials = 15;
 const double kViewCosines[] = {.98, .5, .1};
@@ -26,7 +26,8 @@ double normal_quantile(double p) {
   }
   return lo;
 }
-// Wilson and Hilferty 1931: good to a per cent of the tail for the degrees of freedom here (tens to hundreds).
+// Wilson and Hilferty 1931: good to a per cent of the tail for the degrees of freedom here (tens to
+// hundreds).
 double chi_square_limit(int dof, double p) {
   const double v = 2. / (9 * dof);
   return dof * std::pow(1 - v + normal_quantile(p) * std::sqrt(v), 3);
@@ -39,12 +40,14 @@ struct Named {
 std::vector<Named> smooth_materials() {
   std::vector<Named> all;
   all.push_back({"diffuse", bench(diffuse({.2, .5, .9}))});
-  for (const auto& [d, name] : {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
+  for (const auto& [d, name] :
+       {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
     for (const double a : {.05, .3, 1.})
       all.push_back({fmt::format("metal {} {}", name, a), bench(rough_metal(d, a, a, kGoldEta, kGoldK))});
     all.push_back({fmt::format("metal {} .3 x .05", name), bench(rough_metal(d, .3, .05, kGoldEta, kGoldK))});
     for (const double a : {.06, .2, .7})
-      all.push_back({fmt::format("plastic {} {}", name, a), bench(rough_plastic(d, a, 1.5, 1, false, {.5, .4, .3}))});
+      all.push_back(
+          {fmt::format("plastic {} {}", name, a), bench(rough_plastic(d, a, 1.5, 1, false, {.5, .4, .3}))});
   }
   return all;
 }
@@ -53,8 +56,8 @@ constexpr int kThetaCells = 16, kPhiCells = 32, kSubTheta = 20, kSubPhi = 64, kS
 constexpr int kCells = kThetaCells * kPhiCells;
 
 // Probabilities of the cells of the upper hemisphere, and of "nothing" last: midpoint rule in steps of
-// .005 rad in theta and .003 rad in phi; the narrowest lobe (alpha .05 seen at cosine .1) is 2 alpha = .1 wide in theta and
-// 2 alpha cos = .01 in phi.
+// .005 rad in theta and .003 rad in phi; the narrowest lobe (alpha .05 seen at cosine .1) is 2 alpha = .1
+// wide in theta and 2 alpha cos = .01 in phi.
 std::vector<double> expected_cells(const Bench& b, const V3& wo) {
   std::vector<double> p(kCells + 1, 0);
   const double dt = M_PI / 2 / (kThetaCells * kSubTheta), df = 2 * M_PI / (kPhiCells * kSubPhi);
@@ -62,7 +65,8 @@ std::vector<double> expected_cells(const Bench& b, const V3& wo) {
   for (int i = 0; i < kThetaCells * kSubTheta; ++i) {
     const double theta = (i + .5) * dt;
     for (int j = 0; j < kPhiCells * kSubPhi; ++j) {
-      const double mass = b.eval(wo, direction(std::cos(theta), (j + .5) * df)).pdf * std::sin(theta) * dt * df;
+      const double mass =
+          b.eval(wo, direction(std::cos(theta), (j + .5) * df)).pdf * std::sin(theta) * dt * df;
       p[static_cast<std::size_t>(i / kSubTheta * kPhiCells + j / kSubPhi)] += mass;
       total += mass;
     }
@@ -83,10 +87,12 @@ std::vector<double> observed_cells(const Bench& b, const V3& wo, unsigned seed) 
       ++n[kCells];
       continue;
     }
-    const int i = std::min(static_cast<int>(std::acos(std::min(s->wi.z, 1.f)) / (M_PI / 2) * kThetaCells), kThetaCells - 1);
+    const int i = std::min(static_cast<int>(std::acos(std::min(s->wi.z, 1.f)) / (M_PI / 2) * kThetaCells),
+                           kThetaCells - 1);
     double phi = std::atan2(s->wi.y, s->wi.x);
     if (phi < 0) phi += 2 * M_PI;
-    ++n[static_cast<std::size_t>(i * kPhiCells + std::min(static_cast<int>(phi / (2 * M_PI) * kPhiCells), kPhiCells - 1))];
+    ++n[static_cast<std::size_t>(i * kPhiCells +
+                                 std::min(static_cast<int>(phi / (2 * M_PI) * kPhiCells), kPhiCells - 1))];
   }
   return n;
 }
@@ -107,7 +113,8 @@ TEST(Sampling, FollowsItsDensity) {
         const double e = expected[c] * kSamples;
         if (e >= 10) {
           count(e, observed[c]);
-        } else {  // rare cells together: chi-square needs expected counts that a normal distribution describes
+        } else {  // rare cells together: chi-square needs expected counts that a normal distribution
+                  // describes
           pooled_expected += e;
           pooled_observed += observed[c];
         }
@@ -117,7 +124,8 @@ TEST(Sampling, FollowsItsDensity) {
       } else {
         EXPECT_LE(pooled_observed, 45) << m.name;  // Poisson of mean 10: P(> 45) < 1e-14
       }
-      EXPECT_LT(chi2, chi_square_limit(cells - 1, p)) << m.name << " at mu " << mu << ", " << cells << " cells";
+      EXPECT_LT(chi2, chi_square_limit(cells - 1, p))
+          << m.name << " at mu " << mu << ", " << cells << " cells";
     }
 }
 
@@ -132,10 +140,11 @@ TEST(Sampling, WeightTimesDensityIsTheValue) {
         const auto s = m.bench->sample(wo, lobe, {x, y});
         if (!s) continue;
         const BsdfEval e = m.bench->eval(wo, s->wi);
-        // eval() finds the half vector again from wi: 1e-7 absolute, over alpha >= .05 and the slopes of the lobe's tail
-        // (up to 5 alpha) some 1e-4 relative; tails beyond are rare and steeper.
+        // eval() finds the half vector again from wi: 1e-7 absolute, over alpha >= .05 and the slopes of the
+        // lobe's tail (up to 5 alpha) some 1e-4 relative; tails beyond are rare and steeper.
         EXPECT_NEAR(e.pdf, s->pdf, 1e-3f * s->pdf) << m.name;
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(s->weight[c] * s->pdf, e.f_cos[c], 1e-3f * e.f_cos[c] + 1e-20f) << m.name;
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(s->weight[c] * s->pdf, e.f_cos[c], 1e-3f * e.f_cos[c] + 1e-20f) << m.name;
       }
     }
 }
@@ -146,7 +155,8 @@ double albedo(const Bench& b, const V3& wo, int n = 128) {
   for (int l = 0; l < 16; ++l)
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j)
-        if (const auto s = b.sample(wo, (l + .5f) / 16, {(i + .5f) / n, (j + .5f) / n})) sum += s->weight.y * sqr(s->eta);
+        if (const auto s = b.sample(wo, (l + .5f) / 16, {(i + .5f) / n, (j + .5f) / n}))
+          sum += s->weight.y * sqr(s->eta);
   return sum / 16 / n / n;
 }
 
@@ -179,12 +189,14 @@ TEST(Energy, AWhiteDielectricKeepsAll) {
 }
 
 TEST(Energy, WhitePlasticStaysNearOneUnderASmoothCoatAndLosesByMaskingUnderARoughOne) {
-  // Coat and base are coupled by tables (64 nodes, a plain mean), not derived from one another: the dialect's internal
-  // reflectance lies .009 below the integral of .596, which costs the base up to 1 - (1 - .596) / (1 - .587) = 2.2 %.
+  // Coat and base are coupled by tables (64 nodes, a plain mean), not derived from one another: the dialect's
+  // internal reflectance lies .009 below the integral of .596, which costs the base up to 1 - (1 - .596) / (1
+  // - .587) = 2.2 %.
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx})
     for (const double alpha : {5e-4, .1, .5})
       for (const double mu : {1., .5, .1}) {
-        const double e = albedo(*bench(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})), direction(mu, 1), 48);
+        const double e =
+            albedo(*bench(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})), direction(mu, 1), 48);
         EXPECT_LE(e, 1.005) << alpha << " " << mu;
         if (alpha < 1e-3) {
           EXPECT_GE(e, .97) << mu;

@@ -49,11 +49,16 @@ const Expected kExpected[] = {
     {TextureFilter::nearest, Wrap::repeat, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {0, 0}, {1, 2}, {3, 2}}},
     {TextureFilter::nearest, Wrap::mirror, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2, 1}, {0, 2}}},
     {TextureFilter::nearest, Wrap::clamp, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {3, 0}, {0, 3}}},
-    {TextureFilter::bilinear, Wrap::repeat, {{.3f, .3f}, {2.7f, .3f}, {0, 0}, {1.5f, 1.5f}, {1.5f, 1.5f}, {.7f, 1.9f}, {2.7f, 1.9f}}},
-    {TextureFilter::bilinear, Wrap::mirror, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2.3f, 1.1f}, {.3f, 1.9f}}},
+    {TextureFilter::bilinear,
+     Wrap::repeat,
+     {{.3f, .3f}, {2.7f, .3f}, {0, 0}, {1.5f, 1.5f}, {1.5f, 1.5f}, {.7f, 1.9f}, {2.7f, 1.9f}}},
+    {TextureFilter::bilinear,
+     Wrap::mirror,
+     {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2.3f, 1.1f}, {.3f, 1.9f}}},
     {TextureFilter::bilinear, Wrap::clamp, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {3, 0}, {0, 3}}}};
 
-// Coordinates are scaled by 4: float32 leaves 4 x 2.6 x 2^-24 of them, times a slope of 3 over the repeated edge.
+// Coordinates are scaled by 4: float32 leaves 4 x 2.6 x 2^-24 of them, times a slope of 3 over the repeated
+// edge.
 constexpr float kUvError = 4e-6f;
 
 TEST(Bitmap, FiltersAndWrapsAsMitsubaDoes) {
@@ -75,11 +80,13 @@ UvTransform turned() {  // translate(.25, .1) rotate(30) scale(2, 3)
 }
 
 TEST(Bitmap, TransformsCoordinatesAsMitsubaDoes) {
-  const TextureTable t = table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, turned()}), ramp());
+  const TextureTable t =
+      table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, turned()}), ramp());
   const V2 expected[] = {{.59282f, 1.33923f}, {2.13538f, .53923f}, {.61603f, 1.69904f}, {.5f, .3f},
                          {1.4282f, 2.2923f},  {.28001f, .94308f},  {1.45692f, 2.11999f}};
   for (int i = 0; i < 7; ++i) {
-    EXPECT_NEAR(t.eval({0}, kUv[i]).x, expected[i].x, 5e-5f) << i;  // printed to five digits, arguments up to 7
+    EXPECT_NEAR(t.eval({0}, kUv[i]).x, expected[i].x, 5e-5f)
+        << i;  // printed to five digits, arguments up to 7
     EXPECT_NEAR(t.eval({0}, kUv[i]).y, expected[i].y, 5e-5f) << i;
   }
 }
@@ -100,7 +107,8 @@ TEST(Bitmap, IsSafeForAnyCoordinate) {
 TEST(Bitmap, DecodesSrgbBeforeFilteringUnlessRaw) {
   const ImageData image{2, 1, 1, {0, 255}, {}, true};
   const TextureTable cooked = table(with(BitmapTexture{{0}}), image);
-  const TextureTable raw = table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, {}}), {2, 1, 1, {0, 128}, {}, true});
+  const TextureTable raw = table(with(BitmapTexture{{0}, TextureFilter::bilinear, Wrap::repeat, true, {}}),
+                                 {2, 1, 1, {0, 128}, {}, true});
 
   EXPECT_EQ(cooked.eval({0}, {.25f, .5f}), C3(0));
   EXPECT_EQ(cooked.eval({0}, {.75f, .5f}), C3(1));
@@ -144,7 +152,8 @@ TEST(Bitmap, LoadsAFileOnceHoweverManyTexturesUseIt) {
 TEST(Checkerboard, ChoosesAsMitsubaDoes) {
   const auto board = [](const UvTransform& to_uv) {
     Scene s;
-    s.textures = {ConstantTexture{{0, 0, 0}}, ConstantTexture{{1, 1, 1}}, CheckerboardTexture{{0}, {1}, to_uv}};
+    s.textures = {ConstantTexture{{0, 0, 0}}, ConstantTexture{{1, 1, 1}},
+                  CheckerboardTexture{{0}, {1}, to_uv}};
     return table(s, ramp());
   };
   const V2 more[] = {{.5f, .2f}, {.5f, .5f}, {.25f, .1f}, {.50001f, .2f}};

@@ -1,9 +1,11 @@
-// Surface scattering by index: one flat table, a switch on a kind tag, textures read only where they are not constant.
-// Values are Mitsuba 3's (separable Smith masking, its Beckmann rational fit, its rough plastic tables).
+// Surface scattering by index: one flat table, a switch on a kind tag, textures read only where they are not
+// constant. Values are Mitsuba 3's (separable Smith masking, its Beckmann rational fit, its rough plastic
+// tables).
 //
-// Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer or the
-// previous vertex) and wi (where the path goes next, or the light) are unit vectors that point AWAY from the surface.
-// All values are for radiance carried from wi to wo: refraction includes the factor 1 / eta^2.
+// Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer
+// or the previous vertex) and wi (where the path goes next, or the light) are unit vectors that point AWAY
+// from the surface. All values are for radiance carried from wi to wo: refraction includes the factor 1 /
+// eta^2.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +30,7 @@ struct BsdfSample {
   float pdf = 0;       // [1/sr], equal to eval(wi).pdf; for delta lobes the probability of the lobe
   bool delta = false;
   bool transmitted = false;  // wi is on the other side of the surface than wo
-  float eta = 1;             // refractive index on the side of wi over that on the side of wo; 1 unless refracted
+  float eta = 1;  // refractive index on the side of wi over that on the side of wo; 1 unless refracted
 };
 
 class BsdfTable {
@@ -38,8 +40,8 @@ class BsdfTable {
   BsdfTable(BsdfTable&&) noexcept;
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
-  // `textures` must outlive the table. invalid_argument: an index out of range, a two-sided material whose side lets
-  // light through, an index of refraction or roughness that is not a positive finite number.
+  // `textures` must outlive the table. invalid_argument: an index out of range, a two-sided material whose
+  // side lets light through, an index of refraction or roughness that is not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const;

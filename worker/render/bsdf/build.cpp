@@ -51,7 +51,8 @@ class Builder {
   Material operator()(const RoughPlasticBsdf& b) {
     Material m = make(MaterialKind::rough_plastic);
     const double eta = index(b.int_ior, b.ext_ior);
-    if (!(b.alpha >= 0) || !std::isfinite(b.alpha)) refuse(fmt::format("roughness alpha = {} is not a number >= 0", b.alpha));
+    if (!(b.alpha >= 0) || !std::isfinite(b.alpha))
+      refuse(fmt::format("roughness alpha = {} is not a number >= 0", b.alpha));
     if (error) return m;
     m.distribution = b.distribution;
     m.nonlinear = b.nonlinear;
@@ -83,7 +84,9 @@ class Builder {
   void refuse(std::string text) {
     if (!error) error = Error{Errc::invalid_argument, std::move(text)};
   }
-  float mean(const Slot& s) const { return std::min(1.f, mean_component(s.constant ? s.value : textures_.mean(s.texture))); }
+  float mean(const Slot& s) const {
+    return std::min(1.f, mean_component(s.constant ? s.value : textures_.mean(s.texture)));
+  }
 
   Slot slot(TextureIndex t) {
     if (t.value >= textures_.size()) {
@@ -96,14 +99,16 @@ class Builder {
   Slot reflectance(TextureIndex t) {
     Slot s = slot(t);
     if (!s.constant) return s;
-    const C3 in(std::clamp(s.value.x, 0.f, 1.f), std::clamp(s.value.y, 0.f, 1.f), std::clamp(s.value.z, 0.f, 1.f));
+    const C3 in(std::clamp(s.value.x, 0.f, 1.f), std::clamp(s.value.y, 0.f, 1.f),
+                std::clamp(s.value.z, 0.f, 1.f));
     clamped += in != s.value;
     s.value = in;
     return s;
   }
   Slot roughness(TextureIndex t) {
     const Slot s = slot(t);
-    if (s.constant && !(s.value.x >= 0)) refuse(fmt::format("roughness alpha = {} is not a number >= 0", s.value.x));
+    if (s.constant && !(s.value.x >= 0))
+      refuse(fmt::format("roughness alpha = {} is not a number >= 0", s.value.x));
     return s;
   }
   static bool mirror(const Material& m) {
@@ -122,8 +127,10 @@ class Builder {
   double index(double inside, double outside) {
     const double eta = inside / outside;
     if (!(inside > 0) || !(outside > 0) || !(eta >= 1e-3 && eta <= 1e3)) {
-      refuse(fmt::format("the indices of refraction {} (inside) and {} (outside) are not positive numbers of a sensible ratio",
-                         inside, outside));
+      refuse(
+          fmt::format("the indices of refraction {} (inside) and {} (outside) are not positive numbers of a "
+                      "sensible ratio",
+                      inside, outside));
       return 1;
     }
     return eta;
@@ -180,9 +187,12 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
   switch (m.kind) {
     case MaterialKind::diffuse:
     case MaterialKind::rough_conductor:
-    case MaterialKind::rough_plastic: return true;
-    case MaterialKind::two_sided: return has_smooth({m.front}) || has_smooth({m.back});
-    default: return false;
+    case MaterialKind::rough_plastic:
+      return true;
+    case MaterialKind::two_sided:
+      return has_smooth({m.front}) || has_smooth({m.back});
+    default:
+      return false;
   }
 }
 

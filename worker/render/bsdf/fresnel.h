@@ -7,12 +7,14 @@ namespace ls::render {
 
 struct DielectricFresnel {
   double reflectance = 0;
-  double cos_t = 0;     // of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection
-  double eta_it = 1;    // index on the transmitted side over the index on the incident side
-  double eta_ti = 1;    // its inverse
+  double cos_t =
+      0;  // of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection
+  double eta_it = 1;  // index on the transmitted side over the index on the incident side
+  double eta_ti = 1;  // its inverse
 };
 
-// cos_i > 0: from the outside, whose index is 1/eta of the inside's. In double: near eta = 1 the amplitudes cancel.
+// cos_i > 0: from the outside, whose index is 1/eta of the inside's. In double: near eta = 1 the amplitudes
+// cancel.
 inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   const bool outside = cos_i >= 0;
   DielectricFresnel f;

@@ -7,7 +7,15 @@
 
 namespace ls::render {
 
-enum class MaterialKind : std::uint8_t { diffuse, conductor, rough_conductor, dielectric, rough_plastic, null, two_sided };
+enum class MaterialKind : std::uint8_t {
+  diffuse,
+  conductor,
+  rough_conductor,
+  dielectric,
+  rough_plastic,
+  null,
+  two_sided
+};
 
 // A reflectance or roughness: its value if constant, else where to read it.
 struct Slot {
@@ -20,14 +28,14 @@ struct BsdfTable::Material {
   MaterialKind kind = MaterialKind::diffuse;
   Microfacet distribution = Microfacet::beckmann;
   bool nonlinear = false;
-  bool specular = false;             // rough plastic with a smooth coat
+  bool specular = false;              // rough plastic with a smooth coat
   std::uint32_t front = 0, back = 0;  // two_sided: materials that are not two-sided themselves
-  Slot specular_slot;                // specular_reflectance
-  Slot second_slot;                  // specular_transmittance; diffuse reflectance of diffuse and rough_plastic
+  Slot specular_slot;                 // specular_reflectance
+  Slot second_slot;  // specular_transmittance; diffuse reflectance of diffuse and rough_plastic
   Slot alpha_u, alpha_v;
-  C3 eta{0, 0, 0}, k{1, 1, 1};       // conductors
-  float ior = 1;                     // inside over outside
-  float specular_weight = 1;         // rough_plastic: how often the coat is sampled, before Fresnel
+  C3 eta{0, 0, 0}, k{1, 1, 1};  // conductors
+  float ior = 1;                // inside over outside
+  float specular_weight = 1;    // rough_plastic: how often the coat is sampled, before Fresnel
   RoughPlasticTable coat;
 };
 

@@ -2,7 +2,8 @@
 
 namespace ls::render::beckmann {
 
-// M. Giles, "Approximating the erfinv function" (2010), single precision polynomials: relative error below 1e-6.
+// M. Giles, "Approximating the erfinv function" (2010), single precision polynomials: relative error below
+// 1e-6.
 double erf_inverse(double x) {
   double w = -std::log((1 - x) * (1 + x)), p;
   if (w < 5) {
@@ -14,8 +15,8 @@ double erf_inverse(double x) {
   } else {
     w = std::sqrt(w) - 3;
     p = -0.000200214257;
-    for (const double c : {0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773, -0.0076224613, 0.00943887047,
-                           1.00167406, 2.83297682})
+    for (const double c : {0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773, -0.0076224613,
+                           0.00943887047, 1.00167406, 2.83297682})
       p = c + p * w;
   }
   return p * x;
@@ -23,12 +24,14 @@ double erf_inverse(double x) {
 
 // Visible slopes s have the density exp(-s^2) (cos - s sin)+, whose integral up to s is
 //   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2),  s <= cot.
-// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. Bounded: each step that does not converge
-// quadratically halves the bracket, and 64 halvings exhaust a double.
+// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. Bounded: each step that does not
+// converge quadratically halves the bracket, and 64 halvings exhaust a double.
 double visible_slope(double cos_theta, double sin_theta, double u) {
   constexpr double kHalfSqrtPi = .886226925452758014;
   constexpr double kEnd = 6.5;  // exp(-42): beyond any float32 u
-  const auto H = [&](double s, double e) { return cos_theta * kHalfSqrtPi * std::erfc(-s) + .5 * sin_theta * e; };
+  const auto H = [&](double s, double e) {
+    return cos_theta * kHalfSqrtPi * std::erfc(-s) + .5 * sin_theta * e;
+  };
   double lo = -kEnd, hi = cos_theta < kEnd * sin_theta ? cos_theta / sin_theta : kEnd;
   const double target = u * H(hi, std::exp(-hi * hi));
   double s = std::clamp(erf_inverse(std::clamp(2 * u - 1, -1 + 1e-12, 1 - 1e-12)), lo, hi);

@@ -1,8 +1,10 @@
-// Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba. All
-// directions are in the local frame, above the surface (z > 0), unit length. Nothing here divides by a cosine.
+// Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba.
+// All directions are in the local frame, above the surface (z > 0), unit length. Nothing here divides by a
+// cosine.
 //
-// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because that is the dialect's
-// definition of the material; in the *density* of sampling it is the exact one, so that sampling is exact.
+// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because that is the
+// dialect's definition of the material; in the *density* of sampling it is the exact one, so that sampling is
+// exact.
 #pragma once
 
 #include "common/scene/scene.h"
@@ -15,7 +17,9 @@ inline constexpr float kSpecularAlpha = 1e-3f;
 inline constexpr float kMinAlpha = 1e-4f;
 
 // w as seen by a surface of roughness 1: (ax x, ay y, z), and the length of its tangential part.
-inline float stretched_sine(const V3& w, float ax, float ay) { return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y)); }
+inline float stretched_sine(const V3& w, float ax, float ay) {
+  return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y));
+}
 
 namespace ggx {
 // Written with the tangential part of m, so that nothing cancels near the normal.
@@ -60,12 +64,14 @@ inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
   const float s = stretched_sine(w, ax, ay);
   if (w.z > 6 * s) return 1 / w.z;  // erf(6) is 1 and exp(-36) nothing, in float32
   const float a = w.z / s;
-  return 1 / (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
+  return 1 /
+         (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
 }
 inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_G1_over_cos(wo, ax, ay); }
 // By inversion, in double; u in [0, 1)^2.
 V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
-// The slope along the viewer, of roughness 1, for a viewer at this angle: where the share u of visible slopes ends.
+// The slope along the viewer, of roughness 1, for a viewer at this angle: where the share u of visible slopes
+// ends.
 double visible_slope(double cos_theta, double sin_theta, double u);
 double erf_inverse(double x);
 }  // namespace beckmann
@@ -74,9 +80,7 @@ struct Microfacets {
   Microfacet type = Microfacet::ggx;
   float ax = .1f, ay = .1f;
 
-  float D(const V3& m) const {
-    return type == Microfacet::ggx ? ggx::D(m, ax, ay) : beckmann::D(m, ax, ay);
-  }
+  float D(const V3& m) const { return type == Microfacet::ggx ? ggx::D(m, ax, ay) : beckmann::D(m, ax, ay); }
   float G1_over_cos(const V3& w) const {
     return type == Microfacet::ggx ? ggx::G1_over_cos(w, ax, ay) : beckmann::G1_over_cos(w, ax, ay);
   }
@@ -84,7 +88,8 @@ struct Microfacets {
     return type == Microfacet::ggx ? ggx::pdf_over_D(wo, ax, ay) : beckmann::pdf_over_D(wo, ax, ay);
   }
   V3 sample_normal(const V3& wo, const V2& u) const {
-    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u) : beckmann::sample_normal(wo, ax, ay, u);
+    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u)
+                                   : beckmann::sample_normal(wo, ax, ay, u);
   }
 };
 

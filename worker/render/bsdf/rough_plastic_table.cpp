@@ -44,10 +44,11 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// How much of what comes from i = (sin, 0, cos) a microfacet with normal m sends on: reflected with weight F, or refracted
-// with 1 - F, times the masking of the new direction.
+// How much of what comes from i = (sin, 0, cos) a microfacet with normal m sends on: reflected with weight F,
+// or refracted with 1 - F, times the masking of the new direction.
 enum class Way { reflected, refracted };
-double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx, double my, double mz) {
+double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
+               double my, double mz) {
   const double im = sin * mx + cos * mz;
   if (!(im > 0)) return 0;
   const DielectricFresnel f = fresnel_dielectric(im, eta);
@@ -74,7 +75,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
     for (std::size_t b = 0; b < q.x.size(); ++b) {
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
-      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are alike
+      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are
+                // alike
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);
@@ -88,7 +90,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
 }  // namespace
 
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta) {
-  static const Quadrature kOutside = gauss_legendre(48), kInside = gauss_legendre(96);  // inside: total reflection has a kink
+  static const Quadrature kOutside = gauss_legendre(48),
+                          kInside = gauss_legendre(96);  // inside: total reflection has a kink
   RoughPlasticTable t;
   double internal = 0;
   for (int i = 0; i < kPlasticNodes; ++i) {

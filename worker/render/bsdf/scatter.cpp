@@ -1,5 +1,5 @@
-// eval() and sample(). Both take the values of a material's textures once, as a Lobes value, so that value, density and
-// sampling of one vertex can't disagree.
+// eval() and sample(). Both take the values of a material's textures once, as a Lobes value, so that value,
+// density and sampling of one vertex can't disagree.
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
 
@@ -28,19 +28,22 @@ struct Lookup {
   };
   Roughness roughness(const Material& m) const {
     const float u = alpha(m.alpha_u), v = alpha(m.alpha_v);
-    return {{m.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)}, u < kSpecularAlpha && v < kSpecularAlpha};
+    return {{m.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)},
+            u < kSpecularAlpha && v < kSpecularAlpha};
   }
 };
 
 V3 mirrored(const V3& w) { return {-w.x, -w.y, w.z}; }
 
-// ---- diffuse --------------------------------------------------------------------------------------------------------
+// ---- diffuse
+// --------------------------------------------------------------------------------------------------------
 BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
   const float p = wi.z * kInvPi;
   return {reflectance * p, p};
 }
 
-// ---- conductors -----------------------------------------------------------------------------------------------------
+// ---- conductors
+// -----------------------------------------------------------------------------------------------------
 struct Metal {
   C3 eta, k, tint;
   C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
@@ -53,7 +56,8 @@ BsdfEval eval_rough_metal(const Metal& metal, const Microfacets& facets, const V
 }
 
 // The weight is F G1(wi) times a ratio near 1: D, which may be huge or lose digits, stays out of it.
-std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo, const V2& u) {
+std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo,
+                                             const V2& u) {
   const V3 h = facets.sample_normal(wo, u);
   const V3 wi = normalize(reflect(wo, h));
   const float pdf_over_D = facets.pdf_over_D(wo), pdf = facets.D(h) * pdf_over_D;
@@ -75,8 +79,10 @@ std::optional<BsdfSample> sample_mirror(const C3& weight, const V3& wo) {
   return s;
 }
 
-// ---- dielectric -----------------------------------------------------------------------------------------------------
-std::optional<BsdfSample> sample_dielectric(const Material& m, const Lookup& look, const V3& wo, float u_lobe) {
+// ---- dielectric
+// -----------------------------------------------------------------------------------------------------
+std::optional<BsdfSample> sample_dielectric(const Material& m, const Lookup& look, const V3& wo,
+                                            float u_lobe) {
   const DielectricFresnel f = fresnel_dielectric(wo.z, m.ior);
   const float R = static_cast<float>(f.reflectance);
   if (u_lobe < R) {
@@ -95,7 +101,8 @@ std::optional<BsdfSample> sample_dielectric(const Material& m, const Lookup& loo
   return s;
 }
 
-// ---- rough plastic --------------------------------------------------------------------------------------------------
+// ---- rough plastic
+// --------------------------------------------------------------------------------------------------
 struct Plastic {
   const Material& m;
   C3 diffuse, tint;
@@ -121,7 +128,9 @@ struct Plastic {
   }
 };
 
-float coat_reflectance(float cos, float ior) { return static_cast<float>(fresnel_dielectric(cos, ior).reflectance); }
+float coat_reflectance(float cos, float ior) {
+  return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
+}
 
 BsdfEval eval_plastic(const Plastic& p, const V3& wo, const V3& wi) {
   BsdfEval e{p.diffuse_f_cos(wi), (1 - p.p_specular) * wi.z * kInvPi};
@@ -173,14 +182,17 @@ BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
   if (!(o.z > 0) || !(in.z > 0)) return {};  // no smooth lobe of ours transmits, and none shines on the back
   const Lookup look{*textures_, uv};
   switch (m->kind) {
-    case MaterialKind::diffuse: return eval_diffuse(look.reflectance(m->second_slot), in);
+    case MaterialKind::diffuse:
+      return eval_diffuse(look.reflectance(m->second_slot), in);
     case MaterialKind::rough_conductor: {
       const auto rough = look.roughness(*m);
       if (rough.mirror) return {};
       return eval_rough_metal({m->eta, m->k, look.reflectance(m->specular_slot)}, rough.facets, o, in);
     }
-    case MaterialKind::rough_plastic: return eval_plastic(Plastic(*m, look, o), o, in);
-    default: return {};
+    case MaterialKind::rough_plastic:
+      return eval_plastic(Plastic(*m, look, o), o, in);
+    default:
+      return {};
   }
 }
 
@@ -199,20 +211,29 @@ std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, V2 uv, const V3& wo, fl
   if (m->kind == MaterialKind::two_sided) m = &materials_[from_behind ? m->back : m->front];
   if (from_behind) o = flipped(o);
   const Lookup look{*textures_, uv};
-  if (m->kind == MaterialKind::dielectric) return o.z != 0 ? sample_dielectric(*m, look, o, u_lobe) : std::nullopt;
+  if (m->kind == MaterialKind::dielectric)
+    return o.z != 0 ? sample_dielectric(*m, look, o, u_lobe) : std::nullopt;
   if (!(o.z > 0)) return std::nullopt;
   std::optional<BsdfSample> s;
   const auto metal = [&] { return Metal{m->eta, m->k, look.reflectance(m->specular_slot)}; };
   switch (m->kind) {
-    case MaterialKind::diffuse: s = sample_diffuse(look.reflectance(m->second_slot), u); break;
-    case MaterialKind::conductor: s = sample_mirror(metal().reflectance(o.z), o); break;
+    case MaterialKind::diffuse:
+      s = sample_diffuse(look.reflectance(m->second_slot), u);
+      break;
+    case MaterialKind::conductor:
+      s = sample_mirror(metal().reflectance(o.z), o);
+      break;
     case MaterialKind::rough_conductor: {
       const auto rough = look.roughness(*m);
-      s = rough.mirror ? sample_mirror(metal().reflectance(o.z), o) : sample_rough_metal(metal(), rough.facets, o, u);
+      s = rough.mirror ? sample_mirror(metal().reflectance(o.z), o)
+                       : sample_rough_metal(metal(), rough.facets, o, u);
       break;
     }
-    case MaterialKind::rough_plastic: s = sample_plastic(Plastic(*m, look, o), o, u_lobe, u); break;
-    default: break;
+    case MaterialKind::rough_plastic:
+      s = sample_plastic(Plastic(*m, look, o), o, u_lobe, u);
+      break;
+    default:
+      break;
   }
   if (s && from_behind) s->wi = flipped(s->wi);
   return s;

@@ -6,21 +6,21 @@
 
 namespace ls::render {
 
-double srgb_to_linear(double v) {
-  return v <= .04045 ? v / 12.92 : std::pow((v + .055) / 1.055, 2.4);
-}
+double srgb_to_linear(double v) { return v <= .04045 ? v / 12.92 : std::pow((v + .055) / 1.055, 2.4); }
 
 namespace {
 
 // One coordinate folded into [0, 1]; any finite u, however large.
 float fold(float u, Wrap wrap) {
   switch (wrap) {
-    case Wrap::repeat: return u - std::floor(u);
+    case Wrap::repeat:
+      return u - std::floor(u);
     case Wrap::mirror: {
       const float t = u - 2 * std::floor(u * .5f);  // in [0, 2]
       return t > 1 ? 2 - t : t;
     }
-    case Wrap::clamp: break;
+    case Wrap::clamp:
+      break;
   }
   return std::clamp(u, 0.f, 1.f);
 }
@@ -29,8 +29,8 @@ struct Span2 {
   std::uint32_t lo, hi;
   float t;  // weight of hi
 };
-// The two texels around u in [0, 1]. The neighbour over the edge is the opposite edge when repeating, else the edge itself
-// (also when mirroring: texel -1 mirrors to texel 0).
+// The two texels around u in [0, 1]. The neighbour over the edge is the opposite edge when repeating, else
+// the edge itself (also when mirroring: texel -1 mirrors to texel 0).
 Span2 neighbours(float u, std::uint32_t n, Wrap wrap) {
   const float x = u * static_cast<float>(n) - .5f, f = std::floor(x);
   const std::int64_t lo = static_cast<std::int64_t>(f), last = n - 1;
@@ -72,9 +72,10 @@ Result<void> check_texels(std::string_view name, Texels& t) {
     float& v = t.f32[i];
     if (!std::isfinite(v)) {
       const std::size_t p = i / t.channels;
-      return fail(Errc::invalid_argument,
-                  fmt::format("texture '{}': the texel at x {}, y {} (from the top left) is {}; repair the image", name,
-                              p % t.width, p / t.width, std::isnan(v) ? "not a number" : "infinite"));
+      return fail(
+          Errc::invalid_argument,
+          fmt::format("texture '{}': the texel at x {}, y {} (from the top left) is {}; repair the image",
+                      name, p % t.width, p / t.width, std::isnan(v) ? "not a number" : "infinite"));
     }
     if (v < 0) {
       v = 0;

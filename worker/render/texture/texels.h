@@ -1,5 +1,5 @@
-// The texels of one image, ready to look up: 8-bit codes stay 8 bits (a table decodes them before filtering), all else is
-// linear float32. Grey keeps one channel.
+// The texels of one image, ready to look up: 8-bit codes stay 8 bits (a table decodes them before filtering),
+// all else is linear float32. Grey keeps one channel.
 #pragma once
 
 #include <array>

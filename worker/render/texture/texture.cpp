@@ -57,7 +57,8 @@ using TexelsKey = std::pair<std::uint32_t, bool>;  // asset, raw
 Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
                                   TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {
   if (b.file.value >= scene.assets.size())
-    return fail(Errc::invalid_argument, fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
+    return fail(Errc::invalid_argument,
+                fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
   const TexelsKey key{b.file.value, b.raw};
   if (const auto it = loaded.find(key); it != loaded.end()) return it->second;
   const Asset& asset = scene.assets[b.file.value];
@@ -86,7 +87,8 @@ Result<void> resolve_checkerboards(TextureTable::Data& data) {
     if (!changed) return {};
   }
   return fail(Errc::invalid_argument,
-              fmt::format("checkerboard textures contain each other in a circle, or more than {} deep", kMaxTextureDepth));
+              fmt::format("checkerboard textures contain each other in a circle, or more than {} deep",
+                          kMaxTextureDepth));
 }
 
 const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv) {
@@ -111,8 +113,10 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
   std::map<TexelsKey, std::uint32_t> loaded;
   const auto constant = [](const ConstantTexture& t) -> Result<Entry> {
     Entry e;
-    e.value = {static_cast<float>(t.value[0]), static_cast<float>(t.value[1]), static_cast<float>(t.value[2])};
-    if (!is_finite(e.value)) return fail(Errc::invalid_argument, "a constant texture has a value that is not finite");
+    e.value = {static_cast<float>(t.value[0]), static_cast<float>(t.value[1]),
+               static_cast<float>(t.value[2])};
+    if (!is_finite(e.value))
+      return fail(Errc::invalid_argument, "a constant texture has a value that is not finite");
     return e;
   };
   const auto bitmap = [&](const BitmapTexture& t) -> Result<Entry> {
@@ -145,7 +149,9 @@ C3 TextureTable::eval(TextureIndex i, V2 uv) const {
   return t.kind == Kind::constant ? t.value : data_->texels[t.first].lookup(t.to_uv(uv), t.filter, t.wrap);
 }
 
-bool TextureTable::is_constant(TextureIndex i) const { return data_->entries[i.value].kind == Kind::constant; }
+bool TextureTable::is_constant(TextureIndex i) const {
+  return data_->entries[i.value].kind == Kind::constant;
+}
 C3 TextureTable::constant(TextureIndex i) const { return data_->entries[i.value].value; }
 C3 TextureTable::mean(TextureIndex i) const { return data_->entries[i.value].value; }
 std::size_t TextureTable::size() const { return data_->entries.size(); }

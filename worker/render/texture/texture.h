@@ -1,5 +1,6 @@
-// Textures by index: constants, bitmaps, checkerboards. Lookups are Mitsuba 3's: (u, v) = (0, 0) is the UPPER left corner
-// of the image (it is OBJ loading that flips v), to_uv acts first, sRGB is decoded before filtering. Safe for any uv, NaN included.
+// Textures by index: constants, bitmaps, checkerboards. Lookups are Mitsuba 3's: (u, v) = (0, 0) is the UPPER
+// left corner of the image (it is OBJ loading that flips v), to_uv acts first, sRGB is decoded before
+// filtering. Safe for any uv, NaN included.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +23,8 @@ class TextureTable {
   TextureTable(TextureTable&&) noexcept;
   TextureTable& operator=(TextureTable&&) noexcept;
 
-  // Loads each file once. invalid_argument: an index out of range, textures that refer to each other in a circle or deeper
-  // than kMaxTextureDepth, a texel that is NaN or infinite (with file and texel).
+  // Loads each file once. invalid_argument: an index out of range, textures that refer to each other in a
+  // circle or deeper than kMaxTextureDepth, a texel that is NaN or infinite (with file and texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load);
 
   C3 eval(TextureIndex i, V2 uv) const;
@@ -31,8 +32,8 @@ class TextureTable {
   C3 constant(TextureIndex i) const;  // its value if is_constant(i), else its mean
   C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights
   std::size_t size() const;
-  std::uint64_t bytes() const;            // held by texels
-  std::uint64_t clamped_texels() const;   // negative ones, made 0
+  std::uint64_t bytes() const;           // held by texels
+  std::uint64_t clamped_texels() const;  // negative ones, made 0
 
   struct Data;
   const Data& data() const { return *data_; }  // stays where it is when the table moves
