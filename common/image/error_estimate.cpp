@@ -19,34 +19,34 @@ constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal
 constexpr double kFewPixels = 100;
 constexpr double kLargeShare = 0.1;
 
-// out[i] = sum of in[i - kReach .. i + kReach] along a line of `count` values `stride` apart, clipped to the
-// line.
-void box(const double* in, double* out, int count, std::ptrdiff_t stride) {
-  for (int i = 0; i < count; ++i) {
-    const int first = std::max(0, i - kReach), last = std::min(count - 1, i + kReach);
-    double sum = 0;
-    for (int j = first; j <= last; ++j) sum += in[j * stride];
-    out[i * stride] = sum;
+// Sums of a + b over 5 x 5 windows, clipped to the tile. Rows first, then columns, both along rows of memory.
+std::vector<double> window_sums(const double* a, const double* b, std::size_t width, std::size_t height) {
+  constexpr std::size_t kPad = kReach;
+  std::vector<double> padded(width + 2 * kPad), rows(width * (height + 2 * kPad)), sums(width * height);
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) padded[kPad + x] = a[y * width + x] + b[y * width + x];
+    double* out = &rows[(y + kPad) * width];
+    for (std::size_t x = 0; x < width; ++x)
+      out[x] = padded[x] + padded[x + 1] + padded[x + 2] + padded[x + 3] + padded[x + 4];
   }
+  for (std::size_t i = 0; i < width * height; ++i)
+    sums[i] = rows[i] + rows[i + width] + rows[i + 2 * width] + rows[i + 3 * width] + rows[i + 4 * width];
+  return sums;
 }
 
 int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::max(0, i - kReach) + 1; }
 
 // One channel's 1 / (window^2 + 0.01), with the window of the header's comment.
 std::vector<double> weights(const HalfMeans& h, std::size_t plane) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
-  std::vector<double> both(n), rows(n), sums(n);
-  for (std::size_t i = 0; i < n; ++i) both[i] = h.a[plane + i] + h.b[plane + i];
-  for (int y = 0; y < h.height; ++y)
-    box(&both[static_cast<std::size_t>(y) * h.width], &rows[static_cast<std::size_t>(y) * h.width], h.width,
-        1);
-  for (int x = 0; x < h.width; ++x)
-    box(&rows[static_cast<std::size_t>(x)], &sums[static_cast<std::size_t>(x)], h.height, h.width);
+  const double *a = &h.a[plane], *b = &h.b[plane];
+  std::vector<double> sums =
+      window_sums(a, b, static_cast<std::size_t>(h.width), static_cast<std::size_t>(h.height));
   for (int y = 0, i = 0; y < h.height; ++y) {
     for (int x = 0; x < h.width; ++x, ++i) {
       const int others = span_of(x, h.width) * span_of(y, h.height) - 1;
       const auto p = static_cast<std::size_t>(i);
-      const double mean = others > 0 ? (sums[p] - both[p]) / (2 * others) : both[p] / 2;
+      const double own = a[p] + b[p];
+      const double mean = others > 0 ? (sums[p] - own) / (2 * others) : own / 2;
       sums[p] = 1 / (mean * mean + kDark);
     }
   }

@@ -12,6 +12,8 @@
 namespace ls {
 namespace {
 
+constexpr int kZipLevel = 2;  // noise hardly shrinks further, and an image may be asked for at any moment
+
 std::vector<half> to_half(const std::vector<float>& values) {
   std::vector<half> out(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) out[i] = half(values[i]);
@@ -31,6 +33,7 @@ Result<std::vector<std::byte>> write_exr(const ExrPicture& picture) {
 
   return exr::guarded(Errc::internal, "writing an EXR", [&]() -> Result<std::vector<std::byte>> {
     Imf::Header header(size.width, size.height, 1, {0, 0}, 1, Imf::INCREASING_Y, Imf::ZIP_COMPRESSION);
+    header.zipCompressionLevel() = kZipLevel;
     for (const auto& [name, text] : picture.strings) header.insert(name, Imf::StringAttribute(text));
     Imf::FrameBuffer buffer;
     std::vector<std::vector<half>> halves;  // moved, not copied, when it grows: the slices stay valid

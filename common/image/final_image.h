@@ -1,6 +1,7 @@
 // What is handed out of a film: the final EXR, its pixel digest, and a preview PNG.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -31,6 +32,10 @@ struct FinalImage {
 };
 // Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp. Works on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+
+// 8-bit sRGB (IEC 61966-2-1, rounded to nearest) of a linear pixel times `scale`; magenta if a channel is
+// NaN.
+std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 
 // 8-bit sRGB of the mean times 2^exposure. NaN is magenta; tiles without a sample show a quiet dark checker.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);

@@ -11,7 +11,6 @@ namespace ls {
 namespace {
 
 constexpr double kMaxStops = 60;
-constexpr std::array<png_byte, 3> kNaN = {255, 0, 255};
 constexpr int kChecker = 8;  // pixels
 constexpr std::array<png_byte, 3> kEmpty[2] = {{24, 24, 27}, {31, 31, 35}};
 
@@ -26,7 +25,6 @@ std::array<double, 255> srgb_steps() {
 }
 
 void draw_tile(const Film& film, TileIndex index, double scale, png_byte* image) {
-  static const std::array<double, 255> kSteps = srgb_steps();
   const TilePixels tile = film.pixels(index);
   const auto width = static_cast<std::size_t>(film.grid().frame.width);
   std::size_t from = 0;
@@ -36,18 +34,24 @@ void draw_tile(const Film& film, TileIndex index, double scale, png_byte* image)
       const double* v = &tile.mean[from];
       if (tile.spp == 0) {
         std::copy_n(kEmpty[(x / kChecker + y / kChecker) % 2].begin(), 3, to);
-      } else if (std::isnan(v[0] + v[1] + v[2])) {
-        std::copy_n(kNaN.begin(), 3, to);
       } else {
-        for (int c = 0; c < 3; ++c)
-          to[c] = static_cast<png_byte>(std::upper_bound(kSteps.begin(), kSteps.end(), v[c] * scale) -
-                                        kSteps.begin());
+        std::copy_n(srgb8(v, scale).begin(), 3, to);
       }
     }
   }
 }
 
 }  // namespace
+
+std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale) {
+  static const std::array<double, 255> kSteps = srgb_steps();
+  if (std::isnan(rgb[0]) || std::isnan(rgb[1]) || std::isnan(rgb[2])) return {255, 0, 255};
+  std::array<std::uint8_t, 3> out;
+  for (std::size_t c = 0; c < 3; ++c)
+    out[c] = static_cast<std::uint8_t>(std::upper_bound(kSteps.begin(), kSteps.end(), rgb[c] * scale) -
+                                       kSteps.begin());
+  return out;
+}
 
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops) {
   if (!(std::abs(exposure_stops) <= kMaxStops))

@@ -158,6 +158,14 @@ TEST(Preview, IsSrgbWithExposureInStops) {
   EXPECT_EQ(darker.at(9, 3), (std::array{0, 0, 188}));
 }
 
+TEST(Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  using Pixel = std::array<std::uint8_t, 3>;
+
+  EXPECT_EQ(srgb8(std::array{0.5, nan, 0.5}.data(), 1), (Pixel{255, 0, 255}));
+  EXPECT_EQ(srgb8(std::array{inf, -inf, 0.0}.data(), 1), (Pixel{255, 0, 0}));
+}
+
 TEST(Preview, ShowsADarkCheckerWhereNothingIsRendered) {
   const Decoded image = decode(preview_png(Film(kGrid), 0).value());
 
