@@ -91,6 +91,9 @@ class Farm {
   Wanted wanted(const UnitKey& unit) const;
   std::vector<JobId> jobs() const;  // in order of submission
   std::optional<JobFigures> job(const JobId& id) const;
+  // As it stands: priority and spp as changed, a target or time that no longer applies left out. To be
+  // stored.
+  std::optional<JobPlan> plan(const JobId& id) const;
   std::vector<WorkerId> workers() const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;

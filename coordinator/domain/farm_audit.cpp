@@ -75,7 +75,7 @@ std::string Farm::audit() const {
       return "worker " + worker->id.value + ": its load is counted wrong";
     if (!worker->available() || worker->covered() || !worker->wants_more()) continue;
     for (const auto& [seq, job] : state.jobs) {
-      if (!job->leasable() || !may_serve(*job, *worker, state.now) || !state.next_for(*job, *worker))
+      if (!job->leasable() || !may_serve(*job, *worker, state.ticked) || !state.next_for(*job, *worker))
         continue;
       return "worker " + worker->id.value + " idles while job " + job->plan.brief.job.value +
              " has a unit for it";

@@ -161,10 +161,11 @@ void Farm::State::on(const JobExtended& event) {
     effects.emplace_back(ReopenRound{event.job, last});
   }
   if (job->stopping == StopReason::error) plan.target_error.reset();
-  if (job->stopping == StopReason::time) plan.time.reset();
+  if (const auto limit = job->time_limit(); limit && now >= *limit) plan.time.reset();
   job->plan = std::move(plan);
   job->spp = new_spp;
   job->stopping.reset();
+  job->frozen = false;
   job->queue.set_end(unit_code(round_count(new_spp), 0));
   if (job->state == JobState::done) set_state(*job, JobState::running);
   job->move_window(workers.threads());
@@ -187,6 +188,7 @@ void Farm::State::on(const JobForgotten& event) {
 }
 
 void Farm::State::freeze(Job& job, StopReason reason) {
+  job.frozen = true;
   job.queue.skip_accepted(job.units);
   const UnitCode begun = std::max(job.queue.cursor(), job.units.end_of_accepted());
   job.cut_off(std::max(begun, unit_code(1, 0)), reason);

@@ -94,6 +94,11 @@ std::vector<JobId> Farm::jobs() const {
   return ids;
 }
 
+std::optional<JobPlan> Farm::plan(const JobId& id) const {
+  const Job* job = state_->find(id);
+  return job == nullptr ? std::nullopt : std::optional(job->plan);
+}
+
 std::optional<JobFigures> Farm::job(const JobId& id) const {
   const Job* job = state_->find(id);
   if (job == nullptr) return std::nullopt;
@@ -180,7 +185,7 @@ std::string Farm::why_waiting(const JobId& id) const {
       why = "lacks a tag that the job asks for";
     else if (worker->sick_since)
       why = "is sick";
-    else if (worker->blocked(job->seq, state_->now))
+    else if (worker->blocked(job->seq, state_->ticked))
       why = "failed too many of its units";
     else if (worker->draining)
       why = "drains";

@@ -26,6 +26,7 @@ struct Farm::State {
 
   // Of the event in hand.
   TimePoint now{};
+  TimePoint ticked{};  // of the last Tick: blocks are forgiven at ticks, when all workers are looked at
   std::vector<Effect> effects;
   bool work_appeared = false;     // units have come (back) that any worker may want
   std::set<WorkerIndex> touched;  // workers that may want more

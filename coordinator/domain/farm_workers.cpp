@@ -95,14 +95,16 @@ void Farm::State::on(const LeaseCameBack& event) {
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
+  work_appeared = true;  // also what others left to this worker
   free_units(*lease, "returned", false, [&](UnitCode code) { return back.contains(code); });
 }
 
 void Farm::State::on(const Tick&) {
+  ticked = now;
   expire_leases();
   forgive_and_forget();
   for (const auto& [seq, job] : jobs) {
-    if (job->ended() || job->stopping) continue;
+    if (job->ended() || job->frozen) continue;
     const auto limit = job->time_limit();
     if (limit && now >= *limit) freeze(*job, StopReason::time);
   }

@@ -37,7 +37,8 @@ struct Job {
   std::uint64_t spp;  // the plan's, or the limit; even
   JobState state = JobState::queued;
   std::optional<StopReason>
-      stopping;  // decided, while what is leased or unfolded is awaited; final once done
+      stopping;         // decided, while what is leased or unfolded is awaited; final once done
+  bool frozen = false;  // by time or user: what has been leased once is still wanted, nothing else
   std::optional<Digest> numeric_class;
   std::optional<TimePoint> first_ray;
 

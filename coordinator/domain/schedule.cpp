@@ -27,7 +27,7 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads) {
 // Every tile gets its first round.
 bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
   const auto limit = job.time_limit();
-  if (!limit || round_of(code) == 0) return false;
+  if (!limit || job.frozen || round_of(code) == 0) return false;
   if (now >= *limit) return true;
   return worker.covered() && now + from_seconds(worker.seconds_out / worker.threads) >= *limit;
 }
@@ -60,7 +60,7 @@ void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncove
 
 bool Farm::State::assign(Worker& worker) {
   for (const auto& [order, job] : ready) {
-    if (may_serve(*job, worker, now) && lease_from(*job, worker)) return true;  // `ready` may have changed
+    if (may_serve(*job, worker, ticked) && lease_from(*job, worker)) return true;  // `ready` may have changed
   }
   return false;
 }
@@ -98,7 +98,7 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
 bool Farm::State::others_may_take(const Job& job, UnitCode code, const Worker& but) const {
   return std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
     const Worker& other = *entry.second;
-    return other.index != but.index && may_serve(job, other, now) &&
+    return other.index != but.index && may_serve(job, other, ticked) &&
            !job.failures.failed_on(code, other.index);
   });
 }
@@ -110,7 +110,7 @@ void Farm::State::copy_overdue(Worker& worker) {
     Job& job = *lease.job;
     const Duration due = from_seconds(kSpeculateAfter * seconds(lease.predicted)) + kSpeculateSlack;
     if (lease.worker == &worker || now < lease.issued + due) continue;
-    if (!job.leasable() || !may_serve(job, worker, now)) continue;
+    if (!job.leasable() || !may_serve(job, worker, ticked)) continue;
     std::vector<UnitCode> units;
     for (const UnitCode code : lease.units) {
       if (worker.units_out + units.size() >= static_cast<std::uint32_t>(worker.threads)) break;
