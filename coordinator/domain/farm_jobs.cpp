@@ -166,6 +166,7 @@ void Farm::State::on(const JobExtended& event) {
   job->spp = new_spp;
   job->stopping.reset();
   job->frozen = false;
+  work_appeared = true;
   job->queue.set_end(unit_code(round_count(new_spp), 0));
   if (job->state == JobState::done) set_state(*job, JobState::running);
   job->move_window(workers.threads());
@@ -189,6 +190,7 @@ void Farm::State::on(const JobForgotten& event) {
 
 void Farm::State::freeze(Job& job, StopReason reason) {
   job.frozen = true;
+  work_appeared = true;  // what came back after the time limit may be leased again
   job.queue.skip_accepted(job.units);
   const UnitCode begun = std::max(job.queue.cursor(), job.units.end_of_accepted());
   job.cut_off(std::max(begun, unit_code(1, 0)), reason);
