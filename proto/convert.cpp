@@ -37,7 +37,7 @@ Result<UnitKey> key_from(const pb::UnitKey& in) {
 
 void put(const Error& error, pb::Problem* out) {
   out->set_code(std::string(to_string(error.code)));
-  out->set_message(cut(error.message, limits::kTextBytes));
+  out->set_message(sendable(error.message, limits::kTextBytes));
 }
 
 Result<Error> problem_from(const pb::Problem& in) {
@@ -62,7 +62,7 @@ void put(const JobBrief& brief, pb::JobBrief* out) {
     pb::Blob* blob = out->add_assets();
     blob->set_digest(digest_bytes(asset.digest));
     blob->set_bytes(asset.bytes);
-    blob->set_name(cut(asset.name, limits::kNameBytes));
+    blob->set_name(sendable(asset.name, limits::kNameBytes));
   }
 }
 
@@ -91,12 +91,12 @@ Result<JobBrief> brief_from(const pb::JobBrief& in) {
 void put(const WorkerHello& hello, pb::FromWorker& out) {
   pb::Hello* h = out.mutable_hello();
   h->set_protocol(hello.protocol);
-  h->set_name(cut(hello.name, limits::kNameBytes));
-  h->set_build(cut(hello.build, limits::kNameBytes));
+  h->set_name(sendable(hello.name, limits::kNameBytes));
+  h->set_build(sendable(hello.build, limits::kNameBytes));
   h->set_numeric_class(digest_bytes(hello.numeric_class));
   h->set_threads(hello.threads);
   h->set_memory_bytes(hello.memory_bytes);
-  for (const std::string& tag : hello.tags) h->add_tags(cut(tag, limits::kNameBytes));
+  for (const std::string& tag : hello.tags) h->add_tags(sendable(tag, limits::kNameBytes));
   for (const Digest& blob : hello.blobs_held) h->add_blobs_held(digest_bytes(blob));
   h->set_join_token(hello.join_token);
   h->set_previous_id(hello.previous_id.value);
@@ -143,7 +143,7 @@ void put(const WorkerProgress& progress, pb::FromWorker& out) {
     e->set_lease(entry.lease.value);
     e->set_units_done(entry.units_done);
   }
-  p->set_activity(cut(progress.activity, limits::kNameBytes));
+  p->set_activity(sendable(progress.activity, limits::kNameBytes));
   p->set_cpu_seconds_total(progress.cpu_seconds_total);
   p->set_rss_bytes(progress.rss_bytes);
   p->set_load_seconds(progress.load_seconds);
@@ -196,7 +196,7 @@ void put(const UnitFailure& failure, pb::FromWorker& out) {
   put(failure.unit, f->mutable_unit());
   f->set_lease(failure.lease.value);
   f->set_scene_at_fault(failure.scene_at_fault);
-  f->set_reason(cut(failure.reason, limits::kTextBytes));
+  f->set_reason(sendable(failure.reason, limits::kTextBytes));
   if (failure.signal) f->set_signal(*failure.signal);
   if (failure.pixel) {
     f->set_pixel_x(failure.pixel->first);

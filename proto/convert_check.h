@@ -24,7 +24,8 @@ Result<PixelRect> rect_from(const pb::Rect& rect, const char* field);
 // Even ends, not empty, within the largest index.
 Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field);
 
-// The longest prefix of at most `limit` bytes that does not end within a UTF-8 character.
-std::string cut(const std::string& text, std::size_t limit);
+// A text as it may be sent: valid UTF-8 (a peer throws away a whole message with a string that is not; stray bytes become
+// '?'), cut to at most `limit` bytes at the end of a character.
+std::string sendable(const std::string& text, std::size_t limit);
 
 }  // namespace ls::wire

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <csignal>
 #include <map>
 #include <mutex>
 
@@ -104,7 +105,9 @@ Result<void> ChildBackend::greet(Process& process) {
     return fail(Errc::internal, fmt::format("the render child {} before it was ready; run the worker with --fake to see "
                                             "whether the renderer is the cause",
                                             process.end().text));
-  numeric_class_ = answer->reply.numeric_class;
+  if (numeric_class_ == Digest{}) numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
+  if (numeric_class_ != answer->reply.numeric_class)
+    return fail(Errc::internal, "the numeric class of this machine has changed: its arithmetic or memory is at fault");
   return {};
 }
 
@@ -267,7 +270,7 @@ ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
     failure.sample = slot.where.sample;
   }
   failure.signal = end.signal;
-  failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.0f} s",
+  failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
                                                seconds(options_.hang_limit))
                                  : fmt::format("the renderer {}", end.text);
   if (end.signal == SIGKILL && hung < 0) failure.reason += "; the system may have run out of memory";

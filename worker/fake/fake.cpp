@@ -46,8 +46,7 @@ class FakeBackend final : public LocalBackend {
     if (faulty) misbehave(stop);
     if (!pause(stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
-    out.partial.header = {brief.scene, brief.settings_digest, fake_numeric_class(), unit.rect, unit.samples};
-    out.partial.sums = fake_sums(brief.settings.seed, unit.rect, unit.samples);
+    out.partial = fake_partial({brief.scene, brief.settings_digest, fake_numeric_class(), unit.rect, unit.samples});
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
     out.cpu_seconds = thread_cpu_seconds() - start;
     return out;

@@ -1,0 +1,137 @@
+// A coordinator in this process for tests of the agent: keeps what the worker said, answers as told. No clock, no sockets.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "worker/link.h"
+
+namespace ls::worker {
+
+class ScriptedCoordinator final : public CoordinatorLink {
+ public:
+  // ---- what it does; set before or while the agent runs ----
+  void acknowledge_results(bool on) { change([&] { acknowledge_ = on; }); }
+  void refuse_connections(bool on) { change([&] { refuse_ = on; }); }
+  void answer_hello_with(ToWorker message) { change([&] { greeting_ = std::move(message); }); }
+  void add_blob(const std::string& text) { change([&] { blobs_[sha256(std::string_view(text))] = text; }); }
+  void cut_next_fetch() { change([&] { cut_fetch_ = true; }); }
+  void tell(ToWorker message) {
+    if (const auto to = observer()) to->received(std::move(message));
+  }
+  void cut() {
+    std::shared_ptr<LinkObserver> gone;
+    change([&] { gone = std::move(observer_); });
+    if (gone) gone->lost({Errc::unavailable, "cut"});
+  }
+
+  // ---- what it saw ----
+  // Waits for a condition on what was received; fails the test if it does not come true.
+  template <class Condition>
+  void wait_for(Condition condition) {
+    std::unique_lock lock(mutex_);
+    ASSERT_TRUE(changed_.wait_for(lock, kPatience, [&] { return condition(*this); }));
+  }
+  // The same while `drive` (which moves a fake clock) is called again and again.
+  template <class Condition, class Drive>
+  void wait_for(Condition condition, Drive drive) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    std::unique_lock lock(mutex_);
+    while (!condition(*this)) {
+      ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+      lock.unlock();
+      drive();
+      lock.lock();
+      changed_.wait_for(lock, std::chrono::milliseconds(2), [&] { return condition(*this); });
+    }
+  }
+  std::vector<WorkerHello> hellos;          // guarded by the mutex: read them in wait_for or after the agent's end
+  std::vector<UnitResult> results;
+  std::vector<UnitFailure> failures;
+  std::vector<LeaseReturned> returned;
+  std::vector<WorkerProgress> progress;
+  int draining = 0;
+  int fetches = 0;
+
+  // ---- CoordinatorLink ----
+  Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) override {
+    ToWorker greeting;
+    {
+      const std::lock_guard lock(mutex_);
+      if (refuse_) return fail(Errc::unavailable, "nobody listens");
+      hellos.push_back(hello);
+      observer_ = observer;
+      greeting = greeting_;
+    }
+    changed_.notify_all();
+    observer->received(greeting);
+    return {};
+  }
+  void send(FromWorker message) override {
+    std::optional<UnitKey> acknowledge;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!observer_) return;
+      if (auto* m = std::get_if<UnitResult>(&message)) {
+        results.push_back(*m);
+        if (acknowledge_) acknowledge = m->unit;
+      }
+      if (auto* m = std::get_if<UnitFailure>(&message)) {
+        failures.push_back(*m);
+        if (acknowledge_) acknowledge = m->unit;
+      }
+      if (auto* m = std::get_if<LeaseReturned>(&message)) returned.push_back(*m);
+      if (auto* m = std::get_if<WorkerProgress>(&message)) progress.push_back(*m);
+      if (std::holds_alternative<WorkerDraining>(message)) ++draining;
+    }
+    changed_.notify_all();
+    if (acknowledge) tell(ResultAck{*acknowledge, {}});
+  }
+  void close() override {
+    change([&] { observer_.reset(); });
+  }
+  Result<void> fetch_blob(const Digest& digest, std::uint64_t offset,
+                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
+    std::string text;
+    {
+      const std::lock_guard lock(mutex_);
+      ++fetches;
+      if (std::exchange(cut_fetch_, false)) return fail(Errc::unavailable, "cut");
+      const auto it = blobs_.find(digest);
+      if (it == blobs_.end()) return fail(Errc::not_found, "no such blob");
+      text = it->second.substr(offset);
+    }
+    return sink(std::as_bytes(std::span(text)));
+  }
+
+ private:
+  static constexpr auto kPatience = std::chrono::seconds(60);
+
+  template <class Change>
+  void change(Change c) {
+    {
+      const std::lock_guard lock(mutex_);
+      c();
+    }
+    changed_.notify_all();
+  }
+  std::shared_ptr<LinkObserver> observer() {
+    const std::lock_guard lock(mutex_);
+    return observer_;
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::shared_ptr<LinkObserver> observer_;
+  ToWorker greeting_ = Welcome{WorkerId{"w-1"}, 1};
+  std::map<Digest, std::string> blobs_;
+  bool acknowledge_ = true, refuse_ = false, cut_fetch_ = false;
+};
+
+}  // namespace ls::worker

@@ -1,0 +1,154 @@
+#include "worker/cache/cache.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+
+namespace ls::worker {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// A coordinator's blobs, in small pieces; counts what it was asked.
+struct Source {
+  std::map<Digest, std::string> blobs;
+  std::vector<std::uint64_t> offsets;            // of each fetch
+  std::optional<std::uint64_t> cut_after;        // bytes, once
+  std::optional<std::string> lie;                // sent instead, once
+
+  BlobRef add(const std::string& text) {
+    const Digest digest = sha256(std::string_view(text));
+    blobs[digest] = text;
+    return {digest, text.size(), "blob"};
+  }
+  Result<void> fetch(const Digest& digest, std::uint64_t offset, const BlobCache::Sink& sink) {
+    offsets.push_back(offset);
+    if (!blobs.contains(digest)) return fail(Errc::not_found, "no such blob");
+    const std::string text = lie ? *std::exchange(lie, {}) : blobs[digest];
+    for (std::uint64_t at = offset; at < text.size(); at += 7) {
+      if (cut_after && at - offset >= *cut_after) {
+        cut_after.reset();
+        return fail(Errc::unavailable, "cut");
+      }
+      if (auto ok = sink(bytes_of(text).subspan(at, std::min<std::size_t>(7, text.size() - at))); !ok) return ok;
+    }
+    return {};
+  }
+};
+
+class Cache : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "ls-cache-XXXXXX").string();
+    folder_ = ::mkdtemp(pattern.data());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::unique_ptr<BlobCache> open(std::uint64_t limit = 0) {
+    auto cache = BlobCache::open(folder_, limit, [this](const Digest& d, std::uint64_t o, const BlobCache::Sink& s) {
+      return source_.fetch(d, o, s);
+    });
+    return std::move(cache.value());
+  }
+  Source source_;
+  fs::path folder_;
+};
+
+TEST_F(Cache, FetchesABlobOnceAndKeepsItOverARestart) {
+  const BlobRef blob = source_.add("the steam of a bath house");
+
+  EXPECT_EQ(content(open()->acquire(blob).value()->path()), "the steam of a bath house");
+  EXPECT_EQ(content(open()->acquire(blob).value()->path()), "the steam of a bath house");
+
+  EXPECT_EQ(source_.offsets.size(), 1U);
+  EXPECT_THAT(open()->held(10), testing::ElementsAre(blob.digest));
+}
+
+TEST_F(Cache, GoesOnWithACutTransferFromWhereItWas) {
+  const BlobRef blob = source_.add(std::string(100, 'x') + "y");
+  source_.cut_after = 50;
+
+  const auto cut = open()->acquire(blob);
+  const auto whole = open()->acquire(blob);
+
+  EXPECT_EQ(cut.error().code, Errc::unavailable);
+  EXPECT_TRUE(whole);
+  EXPECT_THAT(source_.offsets, testing::ElementsAre(0, 56));
+}
+
+TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
+  const BlobRef blob = source_.add("right");
+  source_.lie = "wrong";
+
+  EXPECT_EQ(content(open()->acquire(blob).value()->path()), "right");
+}
+
+TEST_F(Cache, StopsATransferThatIsLongerThanAnnounced) {
+  const BlobRef blob = source_.add("right");
+  source_.lie = std::string(1 << 20, 'z');
+
+  const auto file = open()->acquire(blob);
+
+  EXPECT_EQ(content(file.value()->path()), "right");
+  EXPECT_TRUE(fs::is_empty(folder_ / "partial"));
+}
+
+TEST_F(Cache, FindsADamagedFileAndFetchesItAgain) {
+  const BlobRef blob = source_.add("a grid");
+  const fs::path path = open()->acquire(blob).value()->path();
+  std::ofstream(path) << "A grid";
+
+  EXPECT_EQ(content(open()->acquire(blob).value()->path()), "a grid");
+  EXPECT_EQ(source_.offsets.size(), 2U);
+}
+
+TEST_F(Cache, EvictsTheLeastRecentlyUsedAndNeverWhatIsInUse) {
+  const auto cache = open(25);
+  const BlobRef a = source_.add("aaaaaaaaaa"), b = source_.add("bbbbbbbbbb"), c = source_.add("cccccccccc");
+  const auto in_use = cache->acquire(a).value();
+  cache->acquire(b).value();
+
+  cache->acquire(c).value();
+
+  EXPECT_THAT(cache->held(10), testing::UnorderedElementsAre(a.digest, c.digest));
+  EXPECT_EQ(content(in_use->path()), "aaaaaaaaaa");
+}
+
+TEST_F(Cache, RefusesWhatDoesNotFitBesideWhatIsInUse) {
+  const auto cache = open(15);
+  const auto in_use = cache->acquire(source_.add("aaaaaaaaaa")).value();
+
+  const auto second = cache->acquire(source_.add("bbbbbbbbbb"));
+
+  EXPECT_EQ(second.error().code, Errc::resource_exhausted);
+  EXPECT_THAT(second.error().message, testing::HasSubstr("--cache-limit"));
+}
+
+TEST_F(Cache, SaysThatABlobIsUnknown) {
+  EXPECT_EQ(open()->acquire({sha256(std::string_view("?")), 1, "x"}).error().code, Errc::not_found);
+  EXPECT_TRUE(fs::is_empty(folder_ / "partial"));
+}
+
+TEST_F(Cache, IsSharedByTwoWorkersOnOneFolder) {
+  const auto one = open(15), two = open(15);
+  const BlobRef a = source_.add("aaaaaaaaaa"), b = source_.add("bbbbbbbbbb");
+  const auto in_use = one->acquire(a).value();
+
+  EXPECT_EQ(two->acquire(b).error().code, Errc::resource_exhausted);
+  EXPECT_TRUE(two->acquire(a));
+  EXPECT_EQ(source_.offsets.size(), 1U);
+}
+
+}  // namespace
+}  // namespace ls::worker

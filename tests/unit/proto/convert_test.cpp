@@ -1,0 +1,198 @@
+// Every message reads back as it was written, and no received bytes get past the checks.
+#include "proto/convert.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "proto/convert_check.h"
+
+namespace ls::wire {
+namespace {
+
+using testing::HasSubstr;
+
+Digest digest_of_text(const char* text) { return sha256(std::string_view(text)); }
+
+RenderSettings settings() {
+  RenderSettings s;
+  s.size = {640, 480};
+  s.integrator = "volpath";
+  s.seed = 7;
+  return s;
+}
+
+AssignLease assignment() {
+  const RenderSettings s = settings();
+  JobBrief brief{JobId{"j-1"}, digest_of_text("scene"), s, digest_of(s), {{digest_of_text("grid"), 12, "steam.vdb"}}};
+  Lease lease{LeaseId{"l-1"}, JobId{"j-1"}, {{3, 2, {0, 32, 32, 64}, {4, 8}}, {4, 2, {32, 32, 64, 64}, {4, 8}}}};
+  return {lease, brief};
+}
+
+const std::vector<FromWorker> kFromWorker = {
+    WorkerHello{kProtocolVersion, "n", "b", digest_of_text("class"), 4, 1 << 30, {"gpu", "big"}, {digest_of_text("held")},
+                "token", WorkerId{"w-9"}},
+    WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
+    UnitResult{{JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, {1, 2, 3}},
+    UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, true, "why", 11, std::pair{3, 4}, 99},
+    UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, false, "why", {}, {}, {}},
+    LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}},
+    WorkerDraining{},
+};
+
+const std::vector<ToWorker> kToWorker = {
+    Welcome{WorkerId{"w-1"}, 3},
+    Refused{{Errc::unauthenticated, "wrong join token"}, true},
+    assignment(),
+    ResultAck{{JobId{"j"}, 1, 2}, {}},
+    ResultAck{{JobId{"j"}, 1, 2}, Error{Errc::failed_precondition, "no"}},
+    CancelJob{JobId{"j"}},
+    CancelLease{LeaseId{"l"}},
+    DrainNow{},
+};
+
+template <class Message, class Wire>
+Result<Message> over_the_wire(const Message& message, Wire wire) {
+  wire.ParseFromString(to_wire(message).SerializeAsString());
+  return from_wire(wire);
+}
+
+TEST(Convert, ReadsEveryWorkerMessageBackAsItWas) {
+  for (const FromWorker& message : kFromWorker) {
+    const auto back = over_the_wire(message, pb::FromWorker{});
+
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(*back, message);
+  }
+}
+
+TEST(Convert, ReadsEveryCoordinatorMessageBackAsItWas) {
+  for (const ToWorker& message : kToWorker) {
+    const auto back = over_the_wire(message, pb::ToWorker{});
+
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(*back, message);
+  }
+}
+
+// Each row damages a good message in one place; the error must name that place.
+struct Damage {
+  const char* field;
+  void (*apply)(pb::FromWorker&);
+  std::size_t message;  // of kFromWorker
+};
+const Damage kDamages[] = {
+    {"hello.numeric_class", [](pb::FromWorker& m) { m.mutable_hello()->set_numeric_class("short"); }, 0},
+    {"hello.threads", [](pb::FromWorker& m) { m.mutable_hello()->set_threads(0); }, 0},
+    {"hello.threads", [](pb::FromWorker& m) { m.mutable_hello()->set_threads(1 << 20); }, 0},
+    {"hello.name", [](pb::FromWorker& m) { m.mutable_hello()->clear_name(); }, 0},
+    {"hello.name", [](pb::FromWorker& m) { m.mutable_hello()->set_name(std::string(5000, 'x')); }, 0},
+    {"hello.tags", [](pb::FromWorker& m) { for (int i = 0; i < 100; ++i) m.mutable_hello()->add_tags("t"); }, 0},
+    {"hello.blobs_held", [](pb::FromWorker& m) { m.mutable_hello()->add_blobs_held("x"); }, 0},
+    {"hello.previous_id", [](pb::FromWorker& m) { m.mutable_hello()->set_previous_id("a\nb"); }, 0},
+    {"progress.leases", [](pb::FromWorker& m) { for (int i = 0; i < 2000; ++i) m.mutable_progress()->add_leases(); }, 1},
+    {"progress.cpu_seconds_total", [](pb::FromWorker& m) { m.mutable_progress()->set_cpu_seconds_total(-1); }, 1},
+    {"progress.load_seconds",
+     [](pb::FromWorker& m) { m.mutable_progress()->set_load_seconds(std::numeric_limits<double>::quiet_NaN()); }, 1},
+    {"result.digest", [](pb::FromWorker& m) { m.mutable_result()->set_digest(std::string(33, 'x')); }, 2},
+    {"result.exr", [](pb::FromWorker& m) { m.mutable_result()->clear_exr(); }, 2},
+    {"result.exr", [](pb::FromWorker& m) { m.mutable_result()->set_exr(std::string(limits::kPartialBytes + 1, 'x')); }, 2},
+    {"unit.job", [](pb::FromWorker& m) { m.mutable_result()->clear_unit(); }, 2},
+    {"failure.reason", [](pb::FromWorker& m) { m.mutable_failure()->set_reason(std::string(9000, 'x')); }, 3},
+    {"returned.lease", [](pb::FromWorker& m) { m.mutable_returned()->set_lease(std::string(65, 'x')); }, 5},
+    {"message", [](pb::FromWorker& m) { m.Clear(); }, 6},
+};
+
+TEST(Convert, NamesTheFieldThatIsWrong) {
+  for (const Damage& damage : kDamages) {
+    pb::FromWorker message = to_wire(kFromWorker[damage.message]);
+    damage.apply(message);
+
+    const auto result = from_wire(message);
+
+    ASSERT_FALSE(result) << damage.field;
+    EXPECT_EQ(result.error().code, Errc::invalid_argument);
+    EXPECT_THAT(result.error().message, HasSubstr(damage.field));
+  }
+}
+
+TEST(Convert, RefusesUnitsWithImpossibleRectanglesOrSamples) {
+  const auto refused = [](auto damage) {
+    pb::ToWorker message = to_wire(ToWorker{assignment()});
+    damage(*message.mutable_assign()->mutable_units(0));
+    return !from_wire(message);
+  };
+
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.mutable_rect()->set_x1(0); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.mutable_rect()->set_x0(-1); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.mutable_rect()->set_y1(std::numeric_limits<int>::max()); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.clear_rect(); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.set_s1(u.s0()); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.set_s1(u.s0() + 1); }));
+  EXPECT_TRUE(refused([](pb::LeaseUnit& u) { u.set_s1(std::numeric_limits<std::uint64_t>::max() - 1); }));
+}
+
+TEST(Convert, RefusesABriefOfAnotherJob) {
+  pb::ToWorker message = to_wire(ToWorker{assignment()});
+  message.mutable_assign()->mutable_brief()->set_job("j-2");
+
+  EXPECT_FALSE(from_wire(message));
+}
+
+TEST(Convert, KeepsEveryMessageWithinTheLimitAtItsLargest) {
+  AssignLease lease = assignment();
+  lease.lease.units.assign(limits::kUnitsPerLease, {~0U, ~0U, {131000, 131000, 131072, 131072}, {1ULL << 39, 1ULL << 40}});
+  lease.brief->assets.assign(limits::kAssetsPerJob, {digest_of_text("x"), ~0ULL, std::string(4000, 'n')});
+  WorkerHello hello = std::get<WorkerHello>(kFromWorker[0]);
+  hello.blobs_held.assign(limits::kBlobsHeld, digest_of_text("x"));
+  UnitResult result = std::get<UnitResult>(kFromWorker[2]);
+  result.exr.assign(limits::kPartialBytes, std::byte{1});
+
+  EXPECT_LT(to_wire(ToWorker{lease}).ByteSizeLong(), limits::kMessageBytes);
+  EXPECT_LT(to_wire(FromWorker{hello}).ByteSizeLong(), limits::kMessageBytes);
+  EXPECT_LT(to_wire(FromWorker{result}).ByteSizeLong(), limits::kMessageBytes);
+}
+
+TEST(Convert, SurvivesRandomlyDamagedBytes) {
+  google::protobuf::SetLogHandler(nullptr);  // it would tell of each text that is no longer UTF-8
+  std::mt19937 random(20240607);
+  for (int i = 0; i < 20000; ++i) {
+    std::string bytes = i % 2 ? to_wire(kFromWorker[i / 2 % kFromWorker.size()]).SerializeAsString()
+                              : to_wire(kToWorker[i / 2 % kToWorker.size()]).SerializeAsString();
+    for (int k = 0; k < 3 && !bytes.empty(); ++k) bytes[random() % bytes.size()] = static_cast<char>(random());
+    pb::FromWorker from;
+    pb::ToWorker to;
+    // Whatever is accepted must be within the limits: it converts back to the same value.
+    if (from.ParseFromString(bytes)) {
+      const auto value = from_wire(from);
+      EXPECT_TRUE(!value || over_the_wire(*value, pb::FromWorker{}));
+    }
+    if (to.ParseFromString(bytes)) {
+      const auto value = from_wire(to);
+      EXPECT_TRUE(!value || over_the_wire(*value, pb::ToWorker{}));
+    }
+  }
+}
+
+TEST(Convert, CutsLongTextsAtACharacterBoundary) {
+  EXPECT_EQ(sendable("abc", 3), "abc");
+  EXPECT_EQ(sendable("ab\xc3\xa9", 3), "ab");
+}
+
+TEST(Convert, SendsOnlyValidUtf8) {
+  EXPECT_EQ(sendable("d\xc3\xa9j\xe0 \xff", 100), "d\xc3\xa9j? ?");
+  EXPECT_EQ(sendable("\xed\xa0\x80\xf0\x9f\x8c\xab", 100), "???\xf0\x9f\x8c\xab");
+  UnitFailure failure = std::get<UnitFailure>(kFromWorker[4]);
+  failure.reason = "cannot read \xff\xfe.vdb";
+
+  EXPECT_TRUE(over_the_wire(FromWorker{failure}, pb::FromWorker{}));
+}
+
+TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
+  EXPECT_EQ(text_from("a\x1b[31mb", 100, "f").value(), "a [31mb");
+}
+
+}  // namespace
+}  // namespace ls::wire

@@ -1,0 +1,107 @@
+#include "worker/inprocess.h"
+
+#include <fmt/format.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <mutex>
+
+#include "common/scene/serialize.h"
+
+namespace ls::worker {
+namespace {
+
+double thread_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// invalid_argument is the scene's fault; anything else (memory, a file that cannot be read here) may go well elsewhere.
+tl::unexpected<UnitFailure> failed(const Error& error) {
+  return tl::unexpected<UnitFailure>(
+      UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
+}
+
+Result<std::string> read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return fail(Errc::internal, fmt::format("cannot read {}", path.string()));
+  return text;
+}
+
+class InProcessBackend final : public LocalBackend {
+ public:
+  explicit InProcessBackend(int threads) : threads_(threads) {}
+
+  Digest numeric_class() const override { return render::numeric_class(); }
+
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
+    if (world(job.brief.job)) return {};
+    const auto text = read_file(job.scene);
+    if (!text) return failed(text.error());
+    const auto scene = deserialize_scene(*text);
+    if (!scene) return failed(scene.error());
+    auto built = render::build_world(*scene, job.brief.settings, job.assets, threads_);
+    if (!built) return failed(built.error());
+    const std::lock_guard lock(mutex_);
+    worlds_[job.brief.job] = std::move(*built);
+    return {};
+  }
+
+  tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
+                                                        const std::atomic<bool>& stop,
+                                                        render::Breadcrumb* where) override {
+    const auto ready = world(job.brief.job);
+    if (!ready) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "the job was not prepared"});
+    const double start = thread_cpu_seconds();
+    render::Breadcrumb own;
+    render::TileResult tile = render::render_tile(*ready, unit.rect, unit.samples, &stop, where ? where : &own);
+    if (tile.stopped) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
+    RenderedUnit out;
+    const JobBrief& brief = job.brief;
+    out.partial.header = {brief.scene, brief.settings_digest, numeric_class(), unit.rect, unit.samples};
+    out.partial.sums = std::move(tile.sums);
+    out.cpu_seconds = thread_cpu_seconds() - start;
+    out.health = {tile.health.nonfinite, tile.health.negative, tile.health.majorant_violations};
+    return out;
+  }
+
+  void forget(const JobId& job) override {
+    std::shared_ptr<const render::World> last;  // freed outside the lock
+    const std::lock_guard lock(mutex_);
+    const auto it = worlds_.find(job);
+    if (it == worlds_.end()) return;
+    last = std::move(it->second);
+    worlds_.erase(it);
+  }
+
+  std::uint64_t rss_bytes() const override {
+    unsigned long total = 0, resident = 0;
+    if (FILE* file = std::fopen("/proc/self/statm", "re")) {
+      if (std::fscanf(file, "%lu %lu", &total, &resident) != 2) resident = 0;
+      std::fclose(file);
+    }
+    return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  }
+
+ private:
+  std::shared_ptr<const render::World> world(const JobId& job) const {
+    const std::lock_guard lock(mutex_);
+    const auto it = worlds_.find(job);
+    return it == worlds_.end() ? nullptr : it->second;
+  }
+
+  const int threads_;
+  mutable std::mutex mutex_;
+  std::map<JobId, std::shared_ptr<const render::World>> worlds_;
+};
+
+}  // namespace
+
+std::unique_ptr<LocalBackend> make_inprocess_backend(int threads) { return std::make_unique<InProcessBackend>(threads); }
+
+}  // namespace ls::worker

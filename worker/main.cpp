@@ -1,0 +1,101 @@
+// lightshaft-worker: the agent, with a render child of this same executable.
+// Exit codes: 0 drained cleanly, 1 failed, 2 bad usage.
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <random>
+#include <thread>
+
+#include "common/base/log.h"
+#include "worker/agent/agent.h"
+#include "worker/cache/cache.h"
+#include "worker/child/child.h"
+#include "worker/child/serve.h"
+#include "worker/client/client.h"
+#include "worker/machine.h"
+#include "worker/options.h"
+#ifdef LIGHTSHAFT_RENDERER
+#include "worker/inprocess.h"
+#endif
+
+namespace {
+
+using namespace ls;
+
+std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& options) {
+#ifdef LIGHTSHAFT_RENDERER
+  if (!options.fake) return worker::make_inprocess_backend(options.threads);
+#endif
+  return worker::make_fake_backend(options.fake_options);
+}
+
+int run_child(const worker::Options& options) {
+  worker::child::confine(options.memory_limit);
+  const auto backend = local_backend(options);
+  return worker::child::serve(*backend, options.threads);
+}
+
+int failed(const Error& error) {
+  log_error("", error.message);
+  return 1;
+}
+
+// The first SIGTERM or SIGINT drains, the second one stops at once.
+void obey_signals(worker::Agent& agent, const sigset_t& signals) {
+  int signal = 0;
+  for (int count = 0; sigwait(&signals, &signal) == 0; ++count) {
+    if (signal == SIGUSR1) return;  // our own: the agent has ended
+    count == 0 ? agent.drain() : agent.stop();
+  }
+}
+
+int run_worker(const worker::Options& options, const sigset_t& signals) {
+  worker::raise_file_limit();
+  std::error_code no_path;
+  worker::ChildOptions child_options{.executable = std::filesystem::read_symlink("/proc/self/exe", no_path),
+                                     .arguments = child_arguments(options),
+                                     .slots = options.threads,
+                                     .hang_limit = from_seconds(options.hang_seconds)};
+  auto backend = worker::make_child_backend(std::move(child_options));
+  if (!backend) return failed(backend.error());
+  const auto link = worker::make_grpc_link(options.coordinator, options.join_token);
+  auto cache = worker::BlobCache::open(
+      options.cache, options.cache_limit,
+      [&link](const Digest& digest, std::uint64_t offset, const worker::BlobCache::Sink& sink) {
+        return link->fetch_blob(digest, offset, sink);
+      });
+  if (!cache) return failed(cache.error());
+
+  worker::AgentOptions agent_options;
+  agent_options.threads = options.threads;
+  agent_options.hello.name = options.name;
+  agent_options.hello.build = LIGHTSHAFT_VERSION;
+  agent_options.hello.memory_bytes = options.memory_limit;
+  agent_options.hello.tags = options.tags;
+  agent_options.hello.join_token = options.join_token;
+  agent_options.backoff_seed = std::random_device{}();
+  const SystemClock clock;
+  worker::Agent agent(std::move(agent_options), *link, **backend, **cache, clock);
+  std::jthread signal_thread([&] { obey_signals(agent, signals); });
+  const auto ended = agent.run();
+  pthread_kill(signal_thread.native_handle(), SIGUSR1);
+  return ended ? 0 : failed(ended.error());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto parsed = ls::worker::parse_options(argc, argv);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& options = std::get<ls::worker::Options>(parsed);
+  if (options.render_child) return run_child(options);
+  // Blocked before any thread starts (gRPC's included), so that only obey_signals sees them.
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return run_worker(options, signals);
+}

@@ -1,0 +1,36 @@
+// The command line of lightshaft-worker.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "worker/fake/fake.h"
+
+namespace ls::worker {
+
+struct Options {
+  std::string coordinator;  // HOST:PORT
+  int threads = 1;
+  std::filesystem::path cache;
+  std::uint64_t cache_limit = 0;   // bytes; 0: none
+  std::uint64_t memory_limit = 0;  // bytes, of the render child; 0: none
+  double hang_seconds = 300;
+  std::string name;
+  std::vector<std::string> tags;
+  std::string join_token;
+  bool fake = false;
+  FakeOptions fake_options;
+  std::string fake_fault_text;
+  bool render_child = false;  // this process is one; started by a worker only
+};
+
+// The exit code instead, when there is nothing to run (help) or the usage is wrong (2, said on stderr).
+std::variant<Options, int> parse_options(int argc, char** argv);
+
+// What makes a child of this executable do the rendering of a worker with these options.
+std::vector<std::string> child_arguments(const Options& options);
+
+}  // namespace ls::worker
