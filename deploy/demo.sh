@@ -1,0 +1,106 @@
+#!/usr/bin/env bash
+# From a fresh Debian 12 to a rendered picture: installs what is missing, builds, starts a local farm (a coordinator with its
+# embedded store and two workers), submits the demo scene over HTTP, waits, and says where image and dashboard are.
+#   deploy/demo.sh            at a terminal the farm runs until Ctrl-C, so that the dashboard can be looked at; else it ends
+#   deploy/demo.sh --detach   leaves the farm running
+#   deploy/demo.sh --stop     ends a farm left running
+#   deploy/demo.sh --full     the large setting: more pixels, more samples, a finer grid
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+detach=0 setting=small
+for arg in "$@"; do
+  case "$arg" in
+    --detach) detach=1 ;;
+    --stop) setting=stop ;;
+    --full) setting=full ;;
+    *) echo "usage: deploy/demo.sh [--detach | --stop] [--full]" >&2; exit 2 ;;
+  esac
+done
+
+home="$PWD/build/demo" bin="$PWD/build/release/bin"
+
+stop_farm() {
+  local file pid
+  for file in "$home"/*.pid; do
+    [ -e "$file" ] || continue
+    pid=$(cat "$file")
+    # Only what we started: process ids are used again.
+    if grep -q lightshaft "/proc/$pid/cmdline" 2>/dev/null; then kill -TERM "$pid" 2>/dev/null || true; fi
+  done
+  for file in "$home"/*.pid; do
+    [ -e "$file" ] || continue
+    pid=$(cat "$file")
+    timeout 20 tail --pid="$pid" -f /dev/null 2>/dev/null || kill -KILL "$pid" 2>/dev/null || true
+    rm -f "$file"
+  done
+}
+
+if [ "$setting" = stop ]; then
+  stop_farm
+  echo "the farm has ended"
+  exit 0
+fi
+
+started=$SECONDS
+deploy/install-deps.sh
+echo "building (log: build/demo/build.log)"
+mkdir -p "$home"
+if ! { cmake --preset release -DLIGHTSHAFT_TESTS=OFF && cmake --build --preset release --target lightshaft lightshaft-coordinator lightshaft-worker; } >"$home/build.log" 2>&1; then
+  tail -n 40 "$home/build.log" >&2
+  echo "error: the build failed; the whole log is build/demo/build.log" >&2
+  exit 1
+fi
+built=$SECONDS
+
+stop_farm
+[ "$detach" = 1 ] || trap stop_farm EXIT
+
+spp=64 width=480 height=320 voxel=0.05
+if [ "$setting" = full ]; then spp=512 width=1280 height=848 voxel=0.025; fi
+python3 scenes/steam_room/make_steam.py "$home/steam.vol" --voxel "$voxel"
+python3 scenes/steam_room/make_scene.py "$home/steam_room.xml"
+
+launch() {  # name, command...
+  local name="$1"; shift
+  setsid "$@" >"$home/$name.log" 2>&1 </dev/null &
+  echo $! >"$home/$name.pid"
+}
+rm -f "$home/data/ports.json"
+http=127.0.0.1:8080
+# If somebody has the usual port already, any free one will do.
+if (exec 3<>/dev/tcp/127.0.0.1/8080) 2>/dev/null; then http=127.0.0.1:0; fi
+launch coordinator "$bin/lightshaft-coordinator" --http "$http" --grpc 127.0.0.1:0 --data "$home/data"
+coordinator=$(cat "$home/coordinator.pid")
+until [ -s "$home/data/ports.json" ]; do
+  kill -0 "$coordinator" 2>/dev/null || { cat "$home/coordinator.log" >&2; echo "error: the coordinator did not start" >&2; exit 1; }
+  sleep 0.1
+done
+port_of() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$home/data/ports.json" "$1"; }
+url="http://127.0.0.1:$(port_of http)"
+threads=$(( ($(nproc) + 1) / 2 ))
+for k in 1 2; do
+  LIGHTSHAFT_JOIN_TOKEN="$(cat "$home/data/join-token")" launch "worker-$k" "$bin/lightshaft-worker" \
+    --coordinator "127.0.0.1:$(port_of grpc)" --threads "$threads" --cache "$home/cache-$k" --name "demo-$k"
+done
+
+token=$(cat "$home/data/token")
+echo "dashboard: $url/#token=$token"
+LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/steam_room.xml" --wait -o "$home/steam_room.exr" \
+  -D spp="$spp" -D width="$width" -D height="$height" | tee "$home/job"
+job=$(head -n 1 "$home/job")
+curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=-1" -o "$home/steam_room.png"
+
+cat <<EOF
+
+done: $((built - started)) s to install and build, $((SECONDS - built)) s to start the farm and render
+image:      build/demo/steam_room.exr   (picture: build/demo/steam_room.png)
+dashboard:  $url/#token=$token
+EOF
+if [ "$detach" = 1 ]; then
+  echo "the farm goes on; end it with: deploy/demo.sh --stop"
+elif [ -t 1 ]; then
+  echo "the farm runs until Ctrl-C"
+  trap 'exit 0' INT TERM
+  while kill -0 "$coordinator" 2>/dev/null; do sleep 1; done
+fi
