@@ -1,0 +1,114 @@
+// Opening, closing and the service's threads.
+#include "coordinator/service.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "common/base/log.h"
+#include "coordinator/service_impl.h"
+#include "coordinator/store/disk_blobs.h"
+#include "coordinator/store/memory_blobs.h"
+
+namespace ls::coordinator {
+
+double unix_now() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) { return Service::open(std::move(options)); }
+
+Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
+  if (!options.clock) options.clock = std::make_shared<SystemClock>();
+  std::shared_ptr<BlobStore> blobs = options.blobs;
+  std::unique_ptr<JobStore> store;
+  File lock;
+  if (options.data.empty()) {
+    if (!blobs) blobs = std::make_shared<MemoryBlobs>();
+    store = make_memory_job_store();
+  } else {
+    if (auto made = make_folder(options.data / "jobs"); !made) return tl::unexpected(made.error());
+    auto locked = lock_folder(options.data);
+    if (!locked) return tl::unexpected(locked.error());
+    lock = std::move(*locked);
+    auto opened = open_sqlite_job_store(options.data / "jobs.sqlite");
+    if (!opened) return tl::unexpected(opened.error());
+    store = std::move(*opened);
+    if (!blobs) {
+      auto disk = DiskBlobs::open(options.data / "blobs");
+      if (!disk) return tl::unexpected(disk.error());
+      blobs = std::move(*disk);
+    }
+  }
+  const auto start = store->reserve("starts", 1);
+  if (!start) return tl::unexpected(start.error());
+  std::unique_ptr<Service> service(
+      new Service(std::move(options), std::move(blobs), std::move(store), std::move(lock), *start + 1));
+  if (auto restored = service->restore(); !restored) return tl::unexpected(restored.error());
+  service->start_threads();
+  return service;
+}
+
+Service::Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store, File lock,
+                 std::uint64_t start)
+    : options_(std::move(options)),
+      blobs_(std::move(blobs)),
+      store_(std::move(store)),
+      lock_(std::move(lock)),
+      start_(start),
+      farm_(Farm::Options{fmt::format("l{}", start)}),
+      last_epoch_(start << 32),
+      hub_(std::make_unique<EventHub>([this](std::uint64_t n) { return store_->reserve("events", n); })) {}
+
+void Service::start_threads() {
+  for (int i = 0; i < limits::kVerifyThreads; ++i)
+    threads_.emplace_back([this](const std::stop_token& token) { verify_loop(token); });
+  threads_.emplace_back([this](const std::stop_token& token) { commit_loop(token); });
+  threads_.emplace_back([this](const std::stop_token& token) {
+    while (!token.stop_requested())
+      for (auto& chore : chores_.pop(1, token)) chore();
+  });
+  if (!options_.tick) return;
+  threads_.emplace_back([this, every = *options_.tick](const std::stop_token& token) {
+    std::mutex mutex;
+    std::condition_variable_any woken;
+    std::unique_lock lock(mutex);
+    while (!woken.wait_for(lock, token, every, [&] { return token.stop_requested(); }) && !token.stop_requested())
+      tick();
+  });
+}
+
+// What has been accepted is durable already and what has not been acknowledged comes again: nothing is flushed here, so
+// that a clean end and a crash are the same thing.
+Service::~Service() {
+  budget_.close();
+  for (auto& thread : threads_) thread.request_stop();
+  threads_.clear();
+  const std::lock_guard lock(mutex_);
+  for (auto& [id, worker] : workers_)
+    if (worker.connection && worker.connection->open) {
+      worker.connection->open = false;
+      worker.connection->sink->close();
+    }
+}
+
+void Service::tick() {
+  const std::lock_guard lock(mutex_);
+  run_locked(Tick{});
+  for (const auto& [id, entry] : entries_)
+    if (entry->progress_due) publish_progress_locked(*entry);
+}
+
+bool Service::ready(std::string* why_not) const {
+  const std::lock_guard lock(mutex_);
+  if (why_not) *why_not = store_trouble_;
+  return store_trouble_.empty();
+}
+
+std::shared_ptr<void> Service::subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) {
+  return hub_->subscribe(after_id, std::move(on_event));
+}
+
+std::uint64_t Service::last_event_id() const { return hub_->last_id(); }
+
+}  // namespace ls::coordinator

@@ -1,0 +1,202 @@
+// What the farm wants done, carried out in its order.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/log.h"
+#include "coordinator/service_impl.h"
+#include "coordinator/views.h"
+
+namespace ls::coordinator {
+
+void Service::run_locked(Event first) {
+  Todo todo;
+  todo.push_back(std::move(first));
+  while (!todo.empty()) {
+    const Event event = std::move(todo.front());
+    todo.pop_front();
+    for (const Effect& effect : farm_.handle(event, now())) carry_out(effect, todo);
+  }
+}
+
+void Service::carry_out(const Effect& effect, Todo& todo) {
+  std::visit([&](const auto& e) { on(e, todo); }, effect);
+}
+
+void Service::on(const UnitsFreed& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry) return;
+  for (const UnitKey& unit : e.units)
+    hub_->publish("tile", tile_event_json(e.job, unit.tile, entry->grid.rect(unit.tile), "free",
+                                          round_range(unit.round).s0, e.worker.value),
+                  e.job.value);
+}
+
+// The log holds it already; here only the job's clock starts.
+void Service::on(const RecordUnit& e, Todo&) {
+  const auto entry = find_locked(e.unit.job);
+  if (!entry || entry->clock_zero) return;
+  const auto figures = farm_.job(e.unit.job);
+  entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : now();
+}
+
+// From memory, or from the log when it came before a restart or too many wait.
+Result<WaitingPartial> Service::partial_for_locked(JobEntry& entry, const Fold& e) {
+  auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
+  if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
+  if (waiting->partial) return std::move(*waiting);
+  if (!waiting->place || !entry.log) return fail(Errc::internal, "an accepted partial has no place");
+  const auto exr = entry.log->read(*waiting->place);
+  if (!exr) return tl::unexpected(exr.error());
+  const UnitHeader expected{entry.stored.scene, entry.settings_digest, entry.stored.numeric_class.value_or(Digest{}),
+                            entry.grid.rect(e.unit.tile), e.samples};
+  auto partial = decode_partial(*exr, expected, entry.grid.frame);
+  if (!partial) return tl::unexpected(partial.error());
+  waiting->partial = std::move(*partial);
+  return std::move(*waiting);
+}
+
+void Service::on(const Fold& e, Todo& todo) {
+  const auto entry = find_locked(e.unit.job);
+  if (!entry || !entry->assembly) return;
+  const auto waiting = partial_for_locked(*entry, e);
+  const auto error =
+      waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
+  if (!error) {
+    // Never a wrong pixel: the tile stands still and the job waits.
+    entry->trouble = fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
+                                 e.unit.tile, e.unit.round, error.error().message);
+    log_error(fmt::format("job={} tile={} round={}", e.unit.job.value, e.unit.tile, e.unit.round), entry->trouble);
+    log_job(e.unit.job, entry->trouble);
+    todo.push_back(JobPaused{e.unit.job});
+    return;
+  }
+  if (const auto at = entry->replay_at.find({e.unit.tile, e.unit.round}); at != entry->replay_at.end())
+    entry->fold_seconds = std::max(entry->fold_seconds, at->second);
+  else
+    entry->fold_seconds = elapsed_locked(*entry);
+  todo.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
+  if (restoring_) return;
+  hub_->publish("tile", tile_event_json(e.unit.job, e.unit.tile, entry->grid.rect(e.unit.tile), "folded",
+                                        e.samples.s1, ""),
+                e.unit.job.value);
+  publish_progress_locked(*entry);
+  snapshot_if_due_locked(entry);
+}
+
+void Service::on(const DropUnwanted& e, Todo&) {
+  log_debug(fmt::format("job={} tile={} round={} worker={}", e.unit.job.value, e.unit.tile, e.unit.round, e.worker.value),
+            "result dropped: " + e.why);
+}
+
+void Service::on(const DigestMismatch& e, Todo&) {
+  const std::string text = fmt::format("tile {} round {}: {} rendered {}, {} rendered {}: one of them has bad memory or lies",
+                                       e.unit.tile, e.unit.round, e.first_worker.value, e.first.hex(),
+                                       e.second_worker.value, e.second.hex());
+  log_error(fmt::format("job={}", e.unit.job.value), text);
+  log_job(e.unit.job, text);
+}
+
+void Service::on(const JobPinned& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry) return;
+  entry->stored.numeric_class = e.numeric_class;
+  for (const auto& [id, worker] : workers_)
+    if (worker.hello.numeric_class == e.numeric_class) entry->stored.build = worker.hello.build;
+  persist_locked(*entry);
+}
+
+// `done` is shown and stored when the final image is written: see finish().
+void Service::on(const JobStateChanged& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry || e.to == JobState::done) return;
+  entry->stored.state = e.to;
+  entry->stored.stopped.reset();
+  log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
+  log_job(e.job, fmt::format("{}", to_string(e.to)));
+  if (e.to == JobState::running) entry->trouble.clear();
+  if (e.to == JobState::cancelled || e.to == JobState::failed) {
+    entry->stored.totals.render_seconds = entry->fold_seconds;
+    entry->clock_zero.reset();
+    if (entry->assembly) entry->assembly->forget_waiting();
+    chores_.push([this, entry] { retire(entry); });
+  }
+  persist_locked(*entry);
+  publish_job_locked(*entry);
+  ended_.notify_all();
+}
+
+void Service::on(const Checkpoint& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry || !entry->assembly) return;
+  const ImageError error = image_error(entry->assembly->errors().at(e.round));
+  entry->assembly->checkpoint_taken(e.round);
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;  // known from before the restart
+  double core = entry->stored.totals.core_seconds;
+  const auto until = std::upper_bound(entry->replay.begin(), entry->replay.end(),
+                                      std::pair(entry->fold_seconds, std::numeric_limits<double>::infinity()));
+  if (!entry->replay.empty()) core = until == entry->replay.begin() ? 0 : std::prev(until)->second;
+  const ConvergencePoint point{entry->fold_seconds, core, error.spp, figures_of(error)};
+  entry->points.push_back(point);
+  chores_.push([this, id = e.job, point] {
+    if (const auto added = store_->add_point(id, point); !added)
+      log_error(fmt::format("job={}", id.value), added.error().message);
+  });
+}
+
+void Service::on(const ReopenRound& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (entry && entry->assembly) entry->assembly->forget_round(e.round);
+}
+
+void Service::on(const JobFinished& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry) return;
+  entry->stored.stopped = e.stopped;
+  entry->stored.totals.render_seconds = entry->fold_seconds;
+  entry->clock_zero.reset();
+  entry->finishing = ++last_final_;
+  if (entry->assembly) entry->assembly->forget_waiting();
+  chores_.push([this, entry, number = entry->finishing] { finish(entry, number); });
+}
+
+void Service::on(const JobFailed& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry) return;
+  entry->stored.error = e.error;
+  log_error(fmt::format("job={}", e.job.value), e.error);
+  log_job(e.job, "failed: " + e.error);
+  persist_locked(*entry);
+  publish_job_locked(*entry);
+}
+
+void Service::persist_locked(const JobEntry& entry) {
+  if (const auto put = store_->put_job(entry.stored); !put) {
+    store_trouble_ = put.error().message;
+    log_error(fmt::format("job={}", entry.stored.id.value), put.error().message);
+  }
+}
+
+void Service::log_job(const JobId& id, std::string text) {
+  chores_.push([this, id, line = LogLine{unix_now(), std::move(text)}] {
+    if (const auto added = store_->add_log(id, line); !added)
+      log_warn(fmt::format("job={}", id.value), added.error().message);
+  });
+}
+
+double Service::elapsed_locked(const JobEntry& entry) const {
+  return entry.clock_zero ? std::max(0.0, seconds(now() - *entry.clock_zero)) : entry.fold_seconds;
+}
+
+void Service::publish_job_locked(JobEntry& entry) {
+  entry.progress_due = false;
+  entry.last_progress = now();
+  if (!restoring_) hub_->publish("job", job_json(view_locked(entry)), entry.stored.id.value);
+}
+
+void Service::publish_progress_locked(JobEntry& entry) {
+  entry.progress_due = seconds(now() - entry.last_progress) < limits::kProgressSeconds;
+  if (!entry.progress_due) publish_job_locked(entry);
+}
+
+}  // namespace ls::coordinator

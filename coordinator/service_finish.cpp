@@ -1,0 +1,126 @@
+// What is written of a job on the keeper thread: snapshots now and then, the final image and report at the end.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/log.h"
+#include "common/image/final_image.h"
+#include "coordinator/service_impl.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Written and read by builds in which the figures have one layout.
+std::string snapshot_format() { return fmt::format("1-{}", sizeof(TileError)); }
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+}  // namespace
+
+Provenance Service::provenance_of(const StoredJob& job) const {
+  return {job.scene,
+          canonical_json(job.settings),
+          job.build,
+          job.numeric_class.value_or(Digest{}),
+          job.settings.seed,
+          job.totals.render_seconds};
+}
+
+// All but the digest of the pixels, which takes its time.
+ReportFacts Service::facts_locked(const JobEntry& entry) const {
+  ReportFacts facts;
+  facts.job = entry.stored;
+  facts.job.state = shown_state(entry);
+  facts.convergence = entry.points;
+  if (!entry.assembly) return facts;
+  const Film& film = entry.assembly->film();
+  facts.samples = film.samples();
+  facts.job.totals.spp_done = static_cast<double>(facts.samples) / static_cast<double>(
+      std::int64_t{entry.grid.frame.width} * entry.grid.frame.height);
+  if (entry.clock_zero) facts.job.totals.render_seconds = elapsed_locked(entry);
+  if (facts.samples > 0) facts.error = image_error(film.error());
+  return facts;
+}
+
+void Service::snapshot_if_due_locked(const EntryPtr& entry) {
+  if (!on_disk() || entry->snapshot_running) return;
+  const std::uint64_t folds = entry->assembly->folds_since_snapshot;
+  if (folds < limits::kSnapshotUnits && seconds(now() - entry->last_snapshot) < limits::kSnapshotSeconds) return;
+  entry->snapshot_running = true;
+  chores_.push([this, entry] { write_snapshot(entry); });
+}
+
+void Service::write_snapshot(const EntryPtr& entry) {
+  std::unique_lock lock(mutex_);
+  entry->snapshot_running = false;
+  if (!entry->assembly) return;
+  const Film film = entry->assembly->film();
+  const RoundErrors errors = entry->assembly->errors();
+  entry->assembly->folds_since_snapshot = 0;
+  entry->last_snapshot = now();
+  const auto path = folder(entry->stored.id) / "film.snap";
+  lock.unlock();
+  if (const auto written = write_atomically(path, save_snapshot(film, errors, snapshot_format())); !written)
+    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+}
+
+void Service::load_folded(JobEntry& entry) const {
+  const bool keep = entry.stored.spec.target_error.has_value();
+  const auto bytes = read_file(folder(entry.stored.id) / "film.snap", std::uint64_t{1} << 40);
+  if (bytes) entry.assembly = load_snapshot(*bytes, entry.grid, keep, snapshot_format());
+  if (!entry.assembly) entry.assembly.emplace(entry.grid, keep);
+}
+
+void Service::finish(const EntryPtr& entry, std::uint64_t number) {
+  std::unique_lock lock(mutex_);
+  if (entry->finishing != number || !entry->assembly) return;
+  const Film film = entry->assembly->film();
+  ReportFacts facts = facts_locked(*entry);
+  facts.job.state = JobState::done;
+  facts.job.totals.units = farm_.job(entry->stored.id).value_or(JobFigures{}).units_done;
+  lock.unlock();
+
+  if (on_disk()) {
+    const auto written = [&]() -> Result<void> {
+      const auto where = folder(facts.job.id);
+      const auto image = final_exr(film, provenance_of(facts.job), facts.job.spec.float_output);
+      if (!image) return tl::unexpected(image.error());
+      facts.clamped_values = image->clamped;
+      facts.pixels = pixels_sha256(film);
+      if (auto done = write_atomically(where / "image.exr", image->exr); !done) return done;
+      return write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
+    }();
+    write_snapshot(entry);
+    if (!written) {
+      lock.lock();
+      entry->trouble = "the final image cannot be written: " + written.error().message + "; then resume the job";
+      log_error(fmt::format("job={}", facts.job.id.value), entry->trouble);
+      publish_job_locked(*entry);
+      return;
+    }
+  }
+  lock.lock();
+  if (entry->finishing != number) return;  // extended meanwhile
+  entry->finishing = 0;
+  entry->trouble.clear();
+  entry->stored = facts.job;
+  if (on_disk()) entry->assembly.reset();
+  persist_locked(*entry);
+  log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
+           facts.job.name);
+  publish_job_locked(*entry);
+  ended_.notify_all();
+}
+
+// A job that failed or was cancelled: what there is of it goes to the disk and out of memory.
+void Service::retire(const EntryPtr& entry) {
+  if (!on_disk()) return;
+  write_snapshot(entry);
+  const std::lock_guard lock(mutex_);
+  if (!entry->assembly) return;
+  entry->stored.totals.spp_done = facts_locked(*entry).job.totals.spp_done;
+  entry->assembly.reset();
+  persist_locked(*entry);
+}
+
+}  // namespace ls::coordinator

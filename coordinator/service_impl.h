@@ -1,0 +1,225 @@
+// The service's inside. One mutex around the farm and all that belongs to it; slow work has its own threads:
+//
+//   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all] -> farm -> acknowledge
+//   [keeper thread: convergence points, logs, snapshots, final images; strictly in order]
+//
+// A public method takes the lock; what ends in _locked expects it. Effects are carried out under the lock, in order.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/image/final_image.h"
+#include "coordinator/assemble/assembly.h"
+#include "coordinator/assemble/report.h"
+#include "coordinator/assemble/verify.h"
+#include "coordinator/domain/farm.h"
+#include "coordinator/domain/limits.h"
+#include "coordinator/event_hub.h"
+#include "coordinator/limits.h"
+#include "coordinator/service.h"
+#include "coordinator/store/job_store.h"
+#include "coordinator/store/partial_log.h"
+#include "coordinator/work_queue.h"
+
+namespace ls::coordinator {
+
+struct JobEntry {
+  StoredJob stored;
+  Digest settings_digest;
+  TileGrid grid;
+  std::shared_ptr<PartialLog> log;    // none in memory
+  std::optional<Assembly> assembly;   // none once an ended job is on disk
+  std::vector<ConvergencePoint> points;
+  bool dormant = false;               // ended in an earlier run: the farm does not know it
+  std::uint64_t finishing = 0;        // number of the final image being made; 0: none
+  bool snapshot_running = false;
+  TimePoint last_snapshot{}, last_progress{};
+  bool progress_due = false;
+  std::optional<TimePoint> clock_zero;  // of the job's seconds, while it runs
+  double fold_seconds = 0;              // job seconds at the last fold
+  std::string trouble;                  // why it waits
+  // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
+  std::vector<std::pair<double, double>> replay;
+  std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
+};
+
+struct Connection {
+  WorkerId worker;
+  std::uint64_t epoch = 0;
+  Digest numeric_class;
+  std::shared_ptr<WorkerSink> sink;
+  bool open = true;                      // under the service's lock
+  std::optional<std::uint64_t> first_lease;  // number of the first one assigned over it
+};
+
+struct WorkerEntry {
+  WorkerHello hello;
+  std::shared_ptr<Connection> connection;
+  TimePoint last_seen{}, last_event{};
+  std::string activity, trouble;
+  double cpu_seconds = 0;
+  std::uint64_t rss_bytes = 0;
+  JobId last_job;
+};
+
+class Service final : public Coordinator {
+ public:
+  static Result<std::unique_ptr<Coordinator>> open(Options options);
+  ~Service() override;
+
+  tl::expected<JobId, Rejected> submit(SubmitRequest request) override;
+  std::vector<JobView> jobs() const override;
+  Result<JobView> job(const JobId& id) const override;
+  Result<void> cancel(const JobId& id) override;
+  Result<void> pause(const JobId& id) override;
+  Result<void> resume(const JobId& id) override;
+  Result<void> set_priority(const JobId& id, int priority) override;
+  Result<void> extend(const JobId& id, std::uint64_t spp) override;
+  Result<std::vector<std::byte>> image_exr(const JobId& id) const override;
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const override;
+  Result<std::string> report_json(const JobId& id) const override;
+  Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const override;
+  Result<std::vector<TileView>> tiles(const JobId& id) const override;
+  Result<std::string> job_log(const JobId& id) const override;
+  Result<void> wait(const JobId& id) const override;
+  std::vector<WorkerView> workers() const override;
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) override;
+  std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) override;
+  std::uint64_t last_event_id() const override;
+  BlobStore& blobs() override { return *blobs_; }
+  bool ready(std::string* why_not) const override;
+  void tick() override;
+
+  // ---- from sessions (service_workers.cpp) ----
+  void receive(const std::shared_ptr<Connection>& from, FromWorker message);
+  void disconnected(const std::shared_ptr<Connection>& connection);
+
+ private:
+  using Todo = std::deque<Event>;
+  using EntryPtr = std::shared_ptr<JobEntry>;
+  struct Arrived {
+    std::shared_ptr<Connection> from;
+    UnitResult result;
+    EntryPtr job;
+    UnitHeader expected;
+    bool duplicate = false;
+    std::size_t bytes = 0;  // of the budget
+  };
+  struct Checked {
+    Arrived arrived;
+    Verified verified;
+  };
+
+  Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store, File lock,
+          std::uint64_t start);
+  void start_threads();
+  Result<void> restore();
+
+  // ---- restart (service_restore.cpp) ----
+  Result<EntryPtr> make_entry(StoredJob stored, bool with_log);
+  Result<JobRestored> restored_locked(JobEntry& entry, JobState state);
+  void load_folded(JobEntry& entry) const;
+  void take_up_records(JobEntry& entry, JobRestored& event);
+  std::filesystem::path folder(const JobId& id) const { return options_.data / "jobs" / id.value; }
+  bool on_disk() const { return !options_.data.empty(); }
+
+  // ---- effects (service_effects.cpp) ----
+  void run_locked(Event first);
+  void carry_out(const Effect& effect, Todo& todo);
+  void on(const Send& e, Todo& todo);
+  void on(const UnitsFreed& e, Todo& todo);
+  void on(const RecordUnit& e, Todo& todo);
+  void on(const Fold& e, Todo& todo);
+  void on(const DropDuplicate&, Todo&) {}
+  void on(const DropUnwanted& e, Todo& todo);
+  void on(const DigestMismatch& e, Todo& todo);
+  void on(const JobPinned& e, Todo& todo);
+  void on(const JobStateChanged& e, Todo& todo);
+  void on(const Checkpoint& e, Todo& todo);
+  void on(const ReopenRound& e, Todo& todo);
+  void on(const JobFinished& e, Todo& todo);
+  void on(const JobFailed& e, Todo& todo);
+  void on(const WorkerStateChanged& e, Todo& todo);
+  void on(const WorkerBlocked& e, Todo& todo);
+  void on(const WorkerForgotten& e, Todo& todo);
+  Result<WaitingPartial> partial_for_locked(JobEntry& entry, const Fold& e);
+  void snapshot_if_due_locked(const EntryPtr& entry);
+  void persist_locked(const JobEntry& entry);
+  void log_job(const JobId& id, std::string text);
+  double elapsed_locked(const JobEntry& entry) const;
+  void publish_job_locked(JobEntry& entry);
+  void publish_progress_locked(JobEntry& entry);
+  void publish_worker_locked(const WorkerId& id, bool at_once);
+
+  // ---- final images and snapshots (service_finish.cpp), on the keeper thread ----
+  void finish(const EntryPtr& entry, std::uint64_t number);
+  void retire(const EntryPtr& entry);
+  void write_snapshot(const EntryPtr& entry);
+  ReportFacts facts_locked(const JobEntry& entry) const;
+  Provenance provenance_of(const StoredJob& job) const;
+
+  // ---- results (service_results.cpp) ----
+  void receive_result(const std::shared_ptr<Connection>& from, UnitResult result);
+  void verify_loop(const std::stop_token& token);
+  void commit_loop(const std::stop_token& token);
+  void commit(std::vector<Checked> batch);
+  void accept_locked(Checked& item, std::optional<PartialLog::Place> place);
+  void refuse_locked(const Arrived& arrived, const Error& error);
+  void cannot_store_locked(const Arrived& arrived, const Error& error);
+  void acknowledge_locked(const Arrived& arrived, std::optional<Error> refused);
+
+  // ---- workers ----
+  void on_message_locked(const std::shared_ptr<Connection>& from, const WorkerProgress& m);
+
+  // ---- views (service_views.cpp) ----
+  EntryPtr find_locked(const JobId& id) const;
+  Result<EntryPtr> entry_locked(const JobId& id) const;
+  JobView view_locked(const JobEntry& entry) const;
+  WorkerView view_locked(const WorkerId& id, const WorkerEntry& entry) const;
+  struct Picture {
+    Film film;
+    StoredJob job;
+    bool final_on_disk = false;
+  };
+  Result<Picture> picture(const JobId& id) const;
+  JobState shown_state(const JobEntry& entry) const;
+
+  TimePoint now() const { return options_.clock->now(); }
+
+  Options options_;
+  std::shared_ptr<BlobStore> blobs_;
+  std::unique_ptr<JobStore> store_;
+  File lock_;
+  std::uint64_t start_;  // number of this start of the coordinator
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable ended_;
+  Farm farm_;
+  std::map<JobId, EntryPtr> entries_;
+  std::vector<JobId> order_;  // of submission
+  std::map<WorkerId, WorkerEntry> workers_;
+  std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
+  std::string store_trouble_;  // the last result that could not be stored
+  bool restoring_ = false;
+
+  ByteBudget budget_{limits::kMaxResultsWaiting};
+  WorkQueue<Arrived> arrived_;
+  WorkQueue<Checked> checked_;
+  WorkQueue<std::function<void()>> chores_;
+  std::unique_ptr<EventHub> hub_;
+  std::vector<std::jthread> threads_;  // last: joined before all that they use goes
+};
+
+double unix_now();
+
+}  // namespace ls::coordinator

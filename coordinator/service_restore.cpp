@@ -1,0 +1,110 @@
+// Restart: jobs out of the store, films out of snapshots, what came after folded again from the partial logs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <tuple>
+
+#include "common/base/log.h"
+#include "coordinator/intake.h"
+#include "coordinator/service_impl.h"
+
+namespace ls::coordinator {
+
+Result<Service::EntryPtr> Service::make_entry(StoredJob stored, bool with_log) {
+  auto entry = std::make_shared<JobEntry>();
+  entry->stored = std::move(stored);
+  entry->settings_digest = digest_of(entry->stored.settings);
+  entry->grid = {entry->stored.settings.size, entry->stored.settings.tile};
+  entry->last_snapshot = now();
+  entry->fold_seconds = entry->stored.totals.render_seconds;
+  if (on_disk() && with_log) {
+    auto log = PartialLog::open(folder(entry->stored.id));
+    if (!log) return tl::unexpected(log.error());
+    entry->log = std::move(*log);
+  }
+  return entry;
+}
+
+Result<void> Service::restore() {
+  const std::lock_guard lock(mutex_);
+  auto jobs = store_->jobs();
+  if (!jobs) return tl::unexpected(jobs.error());
+  restoring_ = true;
+  for (StoredJob& job : *jobs) {
+    const JobState state = job.state;
+    const bool ended = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+    auto entry = make_entry(std::move(job), !ended);
+    if (!entry) return tl::unexpected(entry.error());
+    const JobId id = (*entry)->stored.id;
+    auto points = store_->points(id);
+    if (!points) return tl::unexpected(points.error());
+    (*entry)->points = std::move(*points);
+    (*entry)->dormant = ended;
+    entries_.emplace(id, *entry);
+    order_.push_back(id);
+    if (ended) continue;
+    load_folded(**entry);
+    auto event = restored_locked(**entry, state);
+    if (!event) return tl::unexpected(event.error());
+    log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()), "restored");
+    const double elapsed = event->elapsed_seconds;
+    if (elapsed > 0) (*entry)->clock_zero = now() - from_seconds(elapsed);
+    run_locked(std::move(*event));
+    (*entry)->replay.clear();
+    (*entry)->replay_at.clear();
+  }
+  restoring_ = false;
+  return {};
+}
+
+Result<JobRestored> Service::restored_locked(JobEntry& entry, JobState state) {
+  JobRestored event;
+  event.plan = plan_of(entry.stored);
+  event.state = state;
+  event.stopped = entry.stored.stopped;
+  event.numeric_class = entry.stored.numeric_class;
+  const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
+  event.folded = entry.assembly->rounds_for(spp);
+  if (entry.stored.spec.target_error) event.rel_error = entry.assembly->errors().relative();
+  take_up_records(entry, event);
+  return event;
+}
+
+void Service::take_up_records(JobEntry& entry, JobRestored& event) {
+  if (!entry.log) return;
+  const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
+  JobTotals& totals = entry.stored.totals;
+  totals.core_seconds = 0;
+  totals.health = {};
+  std::set<std::tuple<TileIndex, RoundIndex, std::uint64_t>> seen;
+  for (const auto& [record, place] : entry.log->found()) {
+    if (record.tile >= entry.grid.count() || !seen.emplace(record.tile, record.round, record.samples.s1).second) continue;
+    const bool folded = record.round < event.folded[record.tile];
+    if (!folded && record.samples == cut_range(record.round, spp)) {
+      // What cannot be read is not accepted: it is rendered again, to the same bits.
+      if (const auto readable = entry.log->read(place); !readable) {
+        log_warn(fmt::format("job={} tile={} round={}", entry.stored.id.value, record.tile, record.round),
+                 readable.error().message);
+        seen.erase({record.tile, record.round, record.samples.s1});
+        continue;
+      }
+      entry.assembly->hold(record.tile, record.round, {std::nullopt, place, record.samples, record.digest});
+      entry.replay_at[{record.tile, record.round}] = record.at_seconds;
+    }
+    event.accepted.push_back({record.tile, record.round, record.samples, record.digest, record.worker});
+    event.elapsed_seconds = std::max(event.elapsed_seconds, record.at_seconds);
+    totals.core_seconds += record.cpu_seconds;
+    totals.health.nonfinite += record.health.nonfinite;
+    totals.health.negative += record.health.negative;
+    totals.health.majorant_violations += record.health.majorant_violations;
+    entry.replay.emplace_back(record.at_seconds, record.cpu_seconds);
+    if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
+  }
+  std::sort(entry.replay.begin(), entry.replay.end());
+  double sum = 0;
+  for (auto& [at, core] : entry.replay) core = sum += core;
+  entry.log->forget_found();
+}
+
+}  // namespace ls::coordinator

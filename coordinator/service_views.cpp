@@ -1,0 +1,241 @@
+// What users see.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "common/image/final_image.h"
+#include "coordinator/service_impl.h"
+
+namespace ls::coordinator {
+
+Service::EntryPtr Service::find_locked(const JobId& id) const {
+  const auto found = entries_.find(id);
+  return found == entries_.end() ? nullptr : found->second;
+}
+
+Result<Service::EntryPtr> Service::entry_locked(const JobId& id) const {
+  if (auto entry = find_locked(id)) return entry;
+  return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+}
+
+JobState Service::shown_state(const JobEntry& entry) const {
+  return entry.stored.state;  // stays `running` until finish() has written the image
+}
+
+namespace {
+
+double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
+
+// Samples still needed by the 1/N law of independent samples; 0 when the target is met.
+double spp_to_target(const ErrorFigures& error, double spp, double target) {
+  return std::max(0.0, spp * (error.relmse / target - 1));
+}
+
+struct Outlook {
+  double progress = 0;
+  std::optional<double> eta_seconds;
+};
+
+// Whichever of samples, target and time comes first.
+Outlook outlook(const JobEntry& entry, const JobFigures& f, double elapsed, int threads) {
+  Outlook out;
+  const double core_left = f.core_seconds_left;
+  if (entry.stored.spp && f.units_total > 0)
+    out.progress = static_cast<double>(f.units_done) / static_cast<double>(f.units_total);
+  if (threads > 0 && core_left > 0) out.eta_seconds = core_left / threads;
+  const auto& spec = entry.stored.spec;
+  if (spec.target_error && !entry.points.empty()) {
+    const ConvergencePoint& last = entry.points.back();
+    const double more = spp_to_target(last.error, last.spp, *spec.target_error);
+    out.progress = std::max(out.progress, last.spp / (last.spp + more));
+    const double cores = more * pixels_of(entry.grid) * f.seconds_per_sample;
+    if (threads > 0 && f.seconds_per_sample > 0)
+      out.eta_seconds = std::min(out.eta_seconds.value_or(INFINITY), cores / threads);
+  }
+  if (spec.time) {
+    out.progress = std::max(out.progress, std::min(1.0, elapsed / *spec.time));
+    out.eta_seconds = std::min(out.eta_seconds.value_or(INFINITY), std::max(0.0, *spec.time - elapsed));
+  }
+  return out;
+}
+
+}  // namespace
+
+JobView Service::view_locked(const JobEntry& entry) const {
+  const StoredJob& job = entry.stored;
+  JobView v;
+  v.id = job.id;
+  v.name = job.name;
+  v.state = shown_state(entry);
+  v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
+  v.target_error = job.spec.target_error;
+  v.error = job.error.empty() ? entry.trouble : job.error;
+  v.warnings = job.warnings;
+  v.size = job.settings.size;
+  v.tile = job.settings.tile;
+  v.priority = job.spec.priority;
+  v.elapsed_seconds = elapsed_locked(entry);
+  v.core_seconds = job.totals.core_seconds;
+  v.submitted_unix = job.submitted_unix;
+  v.health = job.totals.health;
+  v.spp = even_spp(job.spp.value_or(kMaxSppWithoutLimit));
+  v.spp_done = job.totals.spp_done;
+  v.units_done = v.units_total = job.totals.units;
+  if (!entry.points.empty()) v.error_now = entry.points.back().error;
+  if (entry.assembly) v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
+  const auto figures = entry.dormant ? std::nullopt : farm_.job(job.id);
+  if (figures) {
+    v.spp = figures->spp;
+    v.units_done = figures->units_done;
+    v.units_total = figures->units_total;
+    const Outlook out = outlook(entry, *figures, v.elapsed_seconds, farm_.threads_connected());
+    v.progress = out.progress;
+    if (v.state == JobState::running || v.state == JobState::queued) v.eta_seconds = out.eta_seconds;
+    if (v.error.empty() && !entry.finishing && figures->units_leased == 0) v.error = farm_.why_waiting(job.id);
+  }
+  if (v.state == JobState::done) v.progress = 1;
+  return v;
+}
+
+std::vector<JobView> Service::jobs() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<JobView> all;
+  for (const JobId& id : order_) all.push_back(view_locked(*entries_.at(id)));
+  return all;
+}
+
+Result<JobView> Service::job(const JobId& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry = entry_locked(id);
+  if (!entry) return tl::unexpected(entry.error());
+  return view_locked(**entry);
+}
+
+// The film as it is, copied under the lock or read from the disk outside of it.
+Result<Service::Picture> Service::picture(const JobId& id) const {
+  std::unique_lock lock(mutex_);
+  const auto entry = entry_locked(id);
+  if (!entry) return tl::unexpected(entry.error());
+  if ((*entry)->assembly) return Picture{(*entry)->assembly->film(), facts_locked(**entry).job, false};
+  JobEntry copy;
+  copy.stored = (*entry)->stored;
+  copy.grid = (*entry)->grid;
+  lock.unlock();
+  load_folded(copy);
+  return Picture{copy.assembly->film(), copy.stored, copy.stored.state == JobState::done};
+}
+
+Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
+  {
+    std::unique_lock lock(mutex_);
+    const auto entry = entry_locked(id);
+    if (!entry) return tl::unexpected(entry.error());
+    const bool final_image = on_disk() && (*entry)->stored.state == JobState::done;
+    lock.unlock();
+    if (final_image) return read_file(folder(id) / "image.exr", std::uint64_t{1} << 33);
+  }
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  auto image = final_exr(shown->film, provenance_of(shown->job), shown->job.spec.float_output);
+  if (!image) return tl::unexpected(image.error());
+  return std::move(image->exr);
+}
+
+Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposure) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return preview_png(shown->film, exposure);
+}
+
+Result<std::string> Service::report_json(const JobId& id) const {
+  std::unique_lock lock(mutex_);
+  const auto entry = entry_locked(id);
+  if (!entry) return tl::unexpected(entry.error());
+  if (on_disk() && (*entry)->stored.state == JobState::done) {
+    lock.unlock();
+    const auto bytes = read_file(folder(id) / "report.json", std::uint64_t{1} << 28);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  }
+  ReportFacts facts = facts_locked(**entry);
+  lock.unlock();
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  facts.pixels = pixels_sha256(shown->film);
+  if (facts.samples == 0 && shown->film.samples() > 0) {
+    facts.samples = shown->film.samples();
+    facts.error = image_error(shown->film.error());
+  }
+  return coordinator::report_json(facts);
+}
+
+Result<std::vector<ConvergencePoint>> Service::convergence(const JobId& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry = entry_locked(id);
+  if (!entry) return tl::unexpected(entry.error());
+  return (*entry)->points;
+}
+
+Result<std::vector<TileView>> Service::tiles(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  const std::lock_guard lock(mutex_);
+  const auto figures = farm_.job(id);
+  const bool leased = figures && figures->units_leased > 0;
+  std::vector<TileView> all;
+  const TileGrid& grid = shown->film.grid();
+  for (TileIndex t = 0; t < grid.count(); ++t) {
+    TileView v{t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), {}};
+    if (leased)
+      for (const WorkerId& worker : farm_.tile_workers(id, t)) {
+        const auto known = workers_.find(worker);
+        v.workers.push_back(known == workers_.end() ? worker.value : known->second.hello.name);
+      }
+    all.push_back(std::move(v));
+  }
+  return all;
+}
+
+Result<std::string> Service::job_log(const JobId& id) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto entry = entry_locked(id); !entry) return tl::unexpected(entry.error());
+  }
+  const auto lines = store_->log(id);
+  if (!lines) return tl::unexpected(lines.error());
+  std::string text;
+  for (const LogLine& line : *lines)
+    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)), line.text);
+  return text;
+}
+
+WorkerView Service::view_locked(const WorkerId& id, const WorkerEntry& worker) const {
+  const auto figures = farm_.worker(id).value_or(WorkerFigures{WorkerState::lost, 1, 0, 0, 0, {}});
+  WorkerView v;
+  v.id = id;
+  v.name = worker.hello.name;
+  v.build = worker.hello.build;
+  v.numeric_class = worker.hello.numeric_class;
+  v.threads = worker.hello.threads;
+  v.tags = worker.hello.tags;
+  v.state = to_string(figures.state);
+  v.activity = worker.trouble.empty() ? worker.activity : worker.trouble;
+  v.job = figures.job.value;
+  v.units_done = figures.units_done;
+  v.cpu_seconds = worker.cpu_seconds;
+  v.rss_bytes = worker.rss_bytes;
+  v.last_seen_seconds = std::max(0.0, seconds(now() - worker.last_seen));
+  return v;
+}
+
+std::vector<WorkerView> Service::workers() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<WorkerView> all;
+  for (const auto& [id, worker] : workers_) all.push_back(view_locked(id, worker));
+  return all;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,198 @@
+// Workers: registration, messages, departure.
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+
+#include <algorithm>
+#include <charconv>
+#include <random>
+
+#include "common/base/log.h"
+#include "common/base/overloaded.h"
+#include "common/protocol/limits.h"
+#include "coordinator/service_impl.h"
+#include "coordinator/views.h"
+
+namespace ls::coordinator {
+namespace {
+
+class Session final : public WorkerSession {
+ public:
+  Session(Service& service, std::shared_ptr<Connection> connection)
+      : service_(service), connection_(std::move(connection)) {}
+  ~Session() override { service_.disconnected(connection_); }
+  void receive(FromWorker message) override { service_.receive(connection_, std::move(message)); }
+  void disconnected() override { service_.disconnected(connection_); }
+
+ private:
+  Service& service_;
+  std::shared_ptr<Connection> connection_;
+};
+
+// In time that tells nothing of where they differ: the digests are compared.
+bool same_token(const std::string& a, const std::string& b) {
+  const Digest x = sha256(a), y = sha256(b);
+  return CRYPTO_memcmp(x.bytes.data(), y.bytes.data(), x.bytes.size()) == 0;
+}
+
+Result<void> check_hello(const WorkerHello& hello, const std::string& join_token) {
+  if (!join_token.empty() && !same_token(hello.join_token, join_token))
+    return fail(Errc::unauthenticated,
+                "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of its data folder");
+  if (hello.protocol != kProtocolVersion)
+    return fail(Errc::failed_precondition,
+                fmt::format("this worker speaks protocol {}, the coordinator {}: use the same build on both",
+                            hello.protocol, kProtocolVersion));
+  if (hello.name.size() > ls::limits::kNameBytes || hello.build.size() > ls::limits::kNameBytes ||
+      hello.previous_id.value.size() > ls::limits::kIdBytes)
+    return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
+  if (hello.tags.size() > limits::kMaxTags)
+    return fail(Errc::invalid_argument, fmt::format("{} tags are more than {}", hello.tags.size(), limits::kMaxTags));
+  if (hello.threads < 1 || hello.threads > ls::limits::kThreads)
+    return fail(Errc::invalid_argument, fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));
+  return {};
+}
+
+bool well_formed(const WorkerId& id) {
+  return id.value.starts_with("w-") && std::all_of(id.value.begin() + 2, id.value.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || c == '-';
+  });
+}
+
+// n of "PREFIX-n".
+std::optional<std::uint64_t> lease_number(const LeaseId& id) {
+  const auto dash = id.value.rfind('-');
+  if (dash == std::string::npos) return std::nullopt;
+  std::uint64_t n = 0;
+  const char* end = id.value.data() + id.value.size();
+  const auto parsed = std::from_chars(id.value.data() + dash + 1, end, n);
+  return parsed.ec == std::errc() && parsed.ptr == end ? std::optional(n) : std::nullopt;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) {
+  if (auto ok = check_hello(hello, options_.join_token); !ok) return tl::unexpected(ok.error());
+  const std::lock_guard lock(mutex_);
+  WorkerId id = hello.previous_id;
+  const auto known = workers_.find(id);
+  // An id that came with a copied folder belongs to the worker that has it.
+  const bool taken = known != workers_.end() && known->second.hello.name != hello.name;
+  if (id.empty() || !well_formed(id) || taken) id.value = fmt::format("w-{:x}-{:x}", start_, last_epoch_ & 0xffffffff);
+  if (workers_.size() >= limits::kMaxWorkers && !workers_.contains(id))
+    return fail(Errc::resource_exhausted, fmt::format("{} workers are known; more are not taken", workers_.size()));
+
+  auto connection = std::make_shared<Connection>();
+  connection->worker = id;
+  connection->epoch = ++last_epoch_;
+  connection->numeric_class = hello.numeric_class;
+  connection->sink = std::move(sink);
+  WorkerEntry& worker = workers_[id];
+  if (worker.connection && worker.connection->open) {
+    worker.connection->open = false;
+    worker.connection->sink->close();
+  }
+  worker.hello = hello;
+  worker.hello.join_token.clear();
+  worker.connection = connection;
+  worker.last_seen = now();
+  connection->sink->send(Welcome{id, connection->epoch});
+  log_info(fmt::format("worker={} name={} epoch={}", id.value, hello.name, connection->epoch), "joined");
+  run_locked(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads, hello.tags});
+  return std::make_unique<Session>(*this, std::move(connection));
+}
+
+void Service::disconnected(const std::shared_ptr<Connection>& connection) {
+  const std::lock_guard lock(mutex_);
+  const bool was_open = std::exchange(connection->open, false);
+  if (!was_open) return;
+  log_info(fmt::format("worker={} epoch={}", connection->worker.value, connection->epoch), "disconnected");
+  run_locked(WorkerLost{connection->worker, connection->epoch});
+}
+
+void Service::receive(const std::shared_ptr<Connection>& from, FromWorker message) {
+  if (auto* result = std::get_if<UnitResult>(&message)) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto w = workers_.find(from->worker); w != workers_.end()) w->second.last_seen = now();
+    }
+    return receive_result(from, std::move(*result));
+  }
+  const std::lock_guard lock(mutex_);
+  const auto found = workers_.find(from->worker);
+  if (!from->open || found == workers_.end()) return;
+  found->second.last_seen = now();
+  std::visit(overloaded{[](const UnitResult&) {},
+                        [](const WorkerHello&) {},  // said at connect(); the door refuses a second one
+                        [&](const WorkerProgress& m) { on_message_locked(from, m); },
+                        [&](const UnitFailure& m) {
+                          log_job(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile, m.unit.round,
+                                                          from->worker.value, m.reason));
+                          run_locked(UnitFailed{from->worker, m});
+                        },
+                        [&](const LeaseReturned& m) { run_locked(LeaseCameBack{from->worker, m}); },
+                        [&](const WorkerDraining&) { run_locked(WorkerDrains{from->worker}); }},
+             message);
+}
+
+void Service::on_message_locked(const std::shared_ptr<Connection>& from, const WorkerProgress& m) {
+  WorkerEntry& worker = workers_[from->worker];
+  worker.activity = m.activity.substr(0, ls::limits::kNameBytes);
+  worker.cpu_seconds = m.cpu_seconds_total;
+  worker.rss_bytes = m.rss_bytes;
+  if (const auto entry = find_locked(worker.last_job)) {
+    JobTotals& totals = entry->stored.totals;
+    totals.peak_rss_bytes = std::max(totals.peak_rss_bytes, m.rss_bytes);
+    if (m.load_seconds < 1e9) totals.load_seconds = std::max(totals.load_seconds, m.load_seconds);
+  }
+  // Leases of an earlier stream were given to others when that stream broke.
+  for (const auto& lease : m.leases) {
+    const auto n = lease_number(lease.lease);
+    const bool ours = n && from->first_lease && *n >= *from->first_lease;
+    if (!ours && from->open) from->sink->send(CancelLease{lease.lease});
+  }
+  run_locked(LeaseProgress{from->worker, m.leases});
+  publish_worker_locked(from->worker, false);
+}
+
+void Service::on(const Send& e, Todo&) {
+  const auto found = workers_.find(e.worker);
+  if (found == workers_.end() || !found->second.connection || !found->second.connection->open) return;
+  Connection& connection = *found->second.connection;
+  if (const auto* assign = std::get_if<AssignLease>(&e.message)) {
+    const Lease& lease = assign->lease;
+    if (!connection.first_lease) connection.first_lease = lease_number(lease.id);
+    found->second.last_job = lease.job;
+    for (const LeaseUnit& unit : lease.units)
+      hub_->publish("tile", tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, e.worker.value),
+                    lease.job.value);
+  }
+  connection.sink->send(e.message);
+}
+
+void Service::on(const WorkerStateChanged& e, Todo&) {
+  log_info(fmt::format("worker={} state={}", e.worker.value, to_string(e.to)), e.why);
+  if (e.to == WorkerState::sick) log_error(fmt::format("worker={}", e.worker.value), "sick: " + e.why);
+  if (const auto w = workers_.find(e.worker); w != workers_.end())
+    w->second.trouble = e.to == WorkerState::sick ? e.why : "";
+  publish_worker_locked(e.worker, true);
+}
+
+void Service::on(const WorkerBlocked& e, Todo&) {
+  log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value), "gets no more of this job: " + e.why);
+  log_job(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
+}
+
+void Service::on(const WorkerForgotten& e, Todo&) {
+  workers_.erase(e.worker);
+  hub_->publish("worker", worker_gone_json(e.worker), "");
+}
+
+void Service::publish_worker_locked(const WorkerId& id, bool at_once) {
+  const auto found = workers_.find(id);
+  if (found == workers_.end()) return;
+  if (!at_once && seconds(now() - found->second.last_event) < 1) return;
+  found->second.last_event = now();
+  hub_->publish("worker", worker_json(view_locked(id, found->second)), "");
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,144 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "common/image/fake_pixels.h"
+#include "coordinator/assemble/assembly.h"
+#include "coordinator/assemble/report.h"
+#include "coordinator/assemble/verify.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr TileGrid kGrid{{48, 40}, 32};
+
+UnitHeader header(TileIndex tile, SampleRange samples) {
+  return {sha256("scene"), sha256("settings"), sha256("class"), kGrid.rect(tile), samples};
+}
+WaitingPartial waiting(TileIndex tile, SampleRange samples) {
+  Partial partial = fake_partial(header(tile, samples));
+  const Digest digest = unit_digest(partial);
+  return {std::move(partial), std::nullopt, samples, digest};
+}
+UnitResult result_of(const Partial& partial) {
+  UnitResult r;
+  r.unit = {{"j"}, 0, 2};
+  r.exr = encode_partial(partial, kGrid.frame).value();
+  r.digest = unit_digest(partial);
+  return r;
+}
+std::string refusal(const Verified& v) {
+  const auto* bad = std::get_if<BadResult>(&v);
+  return bad ? bad->error.message : "";
+}
+
+TEST(FakePixels, SumsOverRangesComposePerHalf) {
+  const Partial whole = fake_partial(header(1, {4, 32}));
+  const Partial first = fake_partial(header(1, {4, 18})), second = fake_partial(header(1, {18, 32}));
+  for (std::size_t i = 0; i < whole.sums.size(); ++i) ASSERT_EQ(whole.sums[i], first.sums[i] + second.sums[i]);
+}
+
+TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
+  RoundErrors errors(2, true);
+  TileError e;
+  e.pixels = 1;
+  for (RoundIndex r = 0; r < 3; ++r) {
+    e.relative.squares = 10 + r;
+    errors.folded(0, r, e);
+  }
+  e.relative.squares = 100;
+  errors.folded(1, 0, e);
+
+  EXPECT_EQ(errors.at(0).relative.squares, 110);
+  errors.checkpoint_taken(0);
+  e.relative.squares = 101;
+  errors.folded(1, 1, e);
+  EXPECT_EQ(errors.at(1).relative.squares, 112);
+  EXPECT_EQ(errors.relative(), (std::vector<std::vector<double>>{{10, 100}, {11, 101}, {12, 0}}));
+  EXPECT_EQ(RoundErrors::load(errors.save(), 2, true).value(), errors);
+}
+
+TEST(RoundErrors, RefusesBytesCutAnywhere) {
+  RoundErrors errors(2, true);
+  errors.folded(0, 0, {});
+  const auto bytes = errors.save();
+  for (std::size_t n = 0; n < bytes.size(); ++n)
+    EXPECT_FALSE(RoundErrors::load(std::span(bytes).first(n), 2, true)) << n;
+}
+
+TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
+  Assembly assembly(kGrid, false);
+  for (TileIndex t = 0; t < kGrid.count(); ++t)
+    for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
+
+  auto bytes = save_snapshot(assembly.film(), assembly.errors(), "f");
+
+  const auto loaded = load_snapshot(bytes, kGrid, false, "f");
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->film(), assembly.film());
+  EXPECT_EQ(loaded->errors(), assembly.errors());
+  EXPECT_FALSE(load_snapshot(bytes, {{48, 48}, 32}, false, "f"));
+  EXPECT_FALSE(load_snapshot(bytes, kGrid, false, "g"));
+  for (std::size_t i = 0; i < bytes.size(); i += 997) {
+    bytes[i] ^= std::byte{1};
+    EXPECT_FALSE(load_snapshot(bytes, kGrid, false, "f")) << i;
+    bytes[i] ^= std::byte{1};
+  }
+}
+
+TEST(Assembly, ATailCutForFewerSamplesDoesNotCountForMore) {
+  Assembly assembly(kGrid, false);
+  for (TileIndex t = 0; t < kGrid.count(); ++t)
+    for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
+  EXPECT_EQ(assembly.rounds_for(6), std::vector<RoundIndex>(kGrid.count(), 3));
+  EXPECT_EQ(assembly.rounds_for(8), std::vector<RoundIndex>(kGrid.count(), 2));
+}
+
+TEST(Verify, TakesWhatIsWantedAndOnlyThat) {
+  const UnitHeader expected = header(0, {4, 8});
+  const Partial good = fake_partial(expected);
+  EXPECT_EQ(std::get<Partial>(verify_result(result_of(good), expected, kGrid.frame)), good);
+
+  UnitResult wrong_digest = result_of(good);
+  wrong_digest.digest = sha256("other");
+  EXPECT_NE(refusal(verify_result(wrong_digest, expected, kGrid.frame)).find("digest"), std::string::npos);
+
+  UnitHeader other = expected;
+  other.numeric_class = sha256("other class");
+  EXPECT_NE(refusal(verify_result(result_of(fake_partial(other)), expected, kGrid.frame)), "");
+
+  UnitResult cut = result_of(good);
+  cut.exr.resize(cut.exr.size() - 1);
+  EXPECT_NE(refusal(verify_result(cut, expected, kGrid.frame)), "");
+
+  UnitResult clock = result_of(good);
+  clock.cpu_seconds = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal(verify_result(clock, expected, kGrid.frame)), "");
+}
+
+TEST(Verify, KnowsAnHonestPartialOfACutRound) {
+  const UnitHeader expected = header(0, {4, 8});
+  const auto verified = verify_result(result_of(fake_partial(header(0, {4, 6}))), expected, kGrid.frame);
+  ASSERT_TRUE(std::holds_alternative<OtherRange>(verified));
+  EXPECT_EQ(std::get<OtherRange>(verified).samples, (SampleRange{4, 6}));
+  EXPECT_NE(refusal(verify_result(result_of(fake_partial(header(0, {6, 8}))), expected, kGrid.frame)), "");
+}
+
+TEST(Report, HasEveryKeyOfTheContract) {
+  ReportFacts facts;
+  facts.job.stopped = StopReason::spp;
+  facts.error = ImageError{};
+  facts.convergence = {{1, 2, 4, {.1, .2, .1, .3}}};
+  const auto j = nlohmann::json::parse(report_json(facts));
+  for (const char* key : {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse",
+                          "relmse", "relmse_ci95", "nonfinite_samples", "pixels_sha256", "features_used",
+                          "features_left_out", "numeric_class", "stopped", "convergence"})
+    EXPECT_TRUE(j.contains(key)) << key;
+  for (const char* key : {"seconds", "core_seconds", "spp", "rmse", "relmse", "relmse_ci95"})
+    EXPECT_TRUE(j["convergence"][0].contains(key)) << key;
+  EXPECT_EQ(j["stopped"], "spp");
+}
+
+}  // namespace
+}  // namespace ls::coordinator

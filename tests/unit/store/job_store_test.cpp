@@ -1,0 +1,113 @@
+#include "coordinator/store/job_store.h"
+
+#include <gtest/gtest.h>
+
+#include "coordinator/limits.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+StoredJob sample_job(std::string id) {
+  StoredJob job;
+  job.id.value = std::move(id);
+  job.name = "steam.xml";
+  job.submitted_unix = 1.7e9 + .25;
+  job.scene = sha256("scene");
+  job.settings.size = {64, 32};
+  job.settings.integrator = "volpath";
+  job.spec.target_error = .01;
+  job.spec.defines = {{"density", "2"}};
+  job.assets = {{sha256("grid"), 4, "grid.vol"}};
+  job.warnings = {"a \"quoted\" warning\n"};
+  job.features_used = {"volume grids"};
+  job.state = JobState::running;
+  job.stopped = StopReason::error;
+  job.numeric_class = sha256("class");
+  job.totals.core_seconds = 12.125;
+  job.totals.health.nonfinite = 3;
+  return job;
+}
+
+TEST(StoredJob, IsTheSameAfterJson) {
+  const StoredJob job = sample_job("j-1");
+  EXPECT_EQ(parse_stored_job(to_json(job)).value(), job);
+}
+
+TEST(StoredJob, RefusesDamagedJson) {
+  EXPECT_FALSE(parse_stored_job("{"));
+  EXPECT_FALSE(parse_stored_job("{}"));
+}
+
+class JobStores : public testing::TestWithParam<bool> {
+ protected:
+  std::unique_ptr<JobStore> open() {
+    return GetParam() ? open_sqlite_job_store(dir_.path() / "jobs.sqlite").value() : make_memory_job_store();
+  }
+  TempFolder dir_;
+};
+INSTANTIATE_TEST_SUITE_P(Both, JobStores, testing::Bool(),
+                         [](const auto& info) { return info.param ? "Sqlite" : "Memory"; });
+
+TEST_P(JobStores, KeepsJobsInOrderOfSubmissionAndReplacesThem) {
+  const auto store = open();
+  ASSERT_TRUE(store->put_job(sample_job("j-2")));
+  ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  StoredJob changed = sample_job("j-2");
+  changed.state = JobState::done;
+  ASSERT_TRUE(store->put_job(changed));
+
+  EXPECT_EQ(store->jobs().value(), (std::vector{changed, sample_job("j-1")}));
+}
+
+TEST_P(JobStores, KeepsPointsAndLogsByJob) {
+  const auto store = open();
+  ASSERT_TRUE(store->add_point({"a"}, {1, 2, 4, {.5, .25, .2, .3}}));
+  ASSERT_TRUE(store->add_point({"b"}, {9, 9, 9, {}}));
+  ASSERT_TRUE(store->add_point({"a"}, {2, 4, 8, {.4, .2, .1, .3}}));
+  ASSERT_TRUE(store->add_log({"a"}, {10, "submitted"}));
+
+  const auto points = store->points({"a"}).value();
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0].spp, 4);
+  EXPECT_EQ(points[1].error.relmse_hi, .3);
+  EXPECT_EQ(store->log({"a"}).value().at(0).text, "submitted");
+  EXPECT_TRUE(store->log({"b"}).value().empty());
+}
+
+TEST_P(JobStores, CountsUpAndNeverGivesANumberTwice) {
+  const auto store = open();
+  EXPECT_EQ(store->reserve("events", 100).value(), 0u);
+  EXPECT_EQ(store->reserve("events", 5).value(), 100u);
+  EXPECT_EQ(store->reserve("starts", 1).value(), 0u);
+  EXPECT_EQ(store->reserve("events", 1).value(), 105u);
+}
+
+TEST(SqliteJobStore, RemembersOverReopening) {
+  TempFolder dir;
+  const auto file = dir.path() / "jobs.sqlite";
+  {
+    const auto store = open_sqlite_job_store(file).value();
+    ASSERT_TRUE(store->put_job(sample_job("j-1")));
+    ASSERT_TRUE(store->reserve("events", 7));
+  }
+  const auto store = open_sqlite_job_store(file).value();
+  EXPECT_EQ(store->jobs().value(), std::vector{sample_job("j-1")});
+  EXPECT_EQ(store->reserve("events", 1).value(), 7u);
+}
+
+TEST(SqliteJobStore, SaysThatAFileIsNoDatabase) {
+  TempFolder dir;
+  const auto file = dir.path() / "jobs.sqlite";
+  FILE* f = std::fopen(file.c_str(), "wb");
+  for (int i = 0; i < 200; ++i) std::fputs("this is no database ", f);
+  std::fclose(f);
+
+  const auto store = open_sqlite_job_store(file);
+
+  ASSERT_FALSE(store);
+  EXPECT_NE(store.error().message.find("jobs.sqlite"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace ls::coordinator

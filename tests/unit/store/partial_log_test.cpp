@@ -1,0 +1,107 @@
+#include "coordinator/store/partial_log.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "coordinator/limits.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+PartialRecord record(std::uint32_t n) {
+  PartialRecord r;
+  r.tile = n;
+  r.round = n % 5;
+  r.samples = {n, n + 2};
+  r.digest = sha256(std::to_string(n));
+  r.worker.value = "w-" + std::to_string(n);
+  r.cpu_seconds = n * .5;
+  r.at_seconds = n;
+  r.health = {n, 1, 2};
+  return r;
+}
+std::vector<std::byte> payload(std::uint32_t n, std::size_t size = 700) {
+  return std::vector<std::byte>(size, static_cast<std::byte>(n));
+}
+constexpr std::uint64_t kRecordBytes = 184 + 700;
+
+void fill(const std::filesystem::path& dir, std::uint32_t count) {
+  auto log = PartialLog::open(dir).value();
+  for (std::uint32_t i = 0; i < count; ++i) ASSERT_TRUE(log->append(record(i), payload(i)));
+  ASSERT_TRUE(log->sync());
+}
+
+TEST(PartialLog, FindsEveryRecordAfterReopening) {
+  TempFolder dir;
+  fill(dir.path(), 10);
+
+  const auto log = PartialLog::open(dir.path()).value();
+
+  ASSERT_EQ(log->found().size(), 10u);
+  EXPECT_EQ(log->cut_bytes(), 0u);
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(log->found()[i].record, record(i));
+    EXPECT_EQ(log->read(log->found()[i].place).value(), payload(i));
+  }
+}
+
+TEST(PartialLog, CutsATornTailAtAnyByteAndGoesOn) {
+  for (std::uint64_t torn = 1; torn <= kRecordBytes; torn += 61) {
+    TempFolder dir;
+    fill(dir.path(), 3);
+    std::filesystem::resize_file(dir.path() / "partials-000.seg", 3 * kRecordBytes - torn);
+
+    auto log = PartialLog::open(dir.path()).value();
+    ASSERT_EQ(log->found().size(), 2u) << torn;
+    EXPECT_EQ(log->cut_bytes(), kRecordBytes - torn);
+    ASSERT_TRUE(log->append(record(7), payload(7)));
+
+    const auto again = PartialLog::open(dir.path()).value();
+    ASSERT_EQ(again->found().size(), 3u);
+    EXPECT_EQ(again->found()[2].record, record(7));
+  }
+}
+
+TEST(PartialLog, CutsARecordWhosePayloadOrHeaderIsDamaged) {
+  for (const std::uint64_t place : {kRecordBytes + 20, kRecordBytes + 400}) {
+    TempFolder dir;
+    fill(dir.path(), 2);
+    {
+      std::fstream file(dir.path() / "partials-000.seg", std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp(static_cast<std::streamoff>(place));
+      file.put('!');
+    }
+    EXPECT_EQ(PartialLog::open(dir.path()).value()->found().size(), 1u);
+  }
+}
+
+TEST(PartialLog, NoticesDamageWhenAPartialIsRead) {
+  TempFolder dir;
+  auto log = PartialLog::open(dir.path()).value();
+  const auto place = log->append(record(1), payload(1)).value();
+  {
+    std::fstream file(dir.path() / "partials-000.seg", std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(300);
+    file.put('!');
+  }
+  EXPECT_EQ(log->read(place).error().code, Errc::unavailable);
+}
+
+TEST(PartialLog, BeginsANewSegmentWhenOneIsFull) {
+  TempFolder dir;
+  const std::size_t big = std::size_t{900} << 10;
+  const auto count = static_cast<std::uint32_t>(limits::kMaxSegmentBytes / big + 3);
+  {
+    auto log = PartialLog::open(dir.path()).value();
+    for (std::uint32_t i = 0; i < count; ++i) ASSERT_TRUE(log->append(record(i), payload(i, big)));
+  }
+  EXPECT_TRUE(std::filesystem::exists(dir.path() / "partials-001.seg"));
+  const auto log = PartialLog::open(dir.path()).value();
+  ASSERT_EQ(log->found().size(), count);
+  EXPECT_EQ(log->read(log->found().back().place).value(), payload(count - 1, big));
+}
+
+}  // namespace
+}  // namespace ls::coordinator
