@@ -124,8 +124,7 @@ net::awaitable<bool> Connection::serve_one() {
   }
   auto parsed = to_request(parser);
   if (const auto* refused = std::get_if<Response>(&parsed)) {
-    co_await answer(Request{}, *refused, false);
-    co_await linger();
+    co_await answer_unread(*refused);
     co_return false;
   }
   Request& request = std::get<Request>(parsed);
@@ -196,6 +195,14 @@ net::awaitable<bool> Connection::answer(const Request& request, const Response& 
   co_return written&& keep_alive;
 }
 
+// To what could not be read as a request. (A named one: GCC 12 destroys a temporary aggregate in a co_await
+// twice.)
+net::awaitable<void> Connection::answer_unread(const Response& response) {
+  const Request unread;
+  co_await answer(unread, response, false);
+  co_await linger();
+}
+
 net::awaitable<void> Connection::answer_failed_read(Read read) {
   if (read == Read::closed || read == Read::ok) co_return;
   Response response;
@@ -207,8 +214,7 @@ net::awaitable<void> Connection::answer_failed_read(Read read) {
   if (read == Read::malformed) response = problem(400, "this is not a well-formed HTTP/1.1 request");
   if (read == Read::header_too_large)
     response = problem(431, fmt::format("the request header has more than {} bytes", limits_.header_bytes));
-  co_await answer(Request{}, response, false);
-  co_await linger();
+  co_await answer_unread(response);
 }
 
 }  // namespace ls::http

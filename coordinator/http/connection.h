@@ -72,6 +72,7 @@ class Connection {
   net::awaitable<Read> read_header(Parser& parser);
   net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
   net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
+  net::awaitable<void> answer_unread(const Response& response);
   net::awaitable<void> answer_failed_read(Read read);
 
   // ---- body_reader.cpp ----

@@ -31,13 +31,14 @@ void EventQueue::push(const coordinator::StreamEvent& event) {
                        event.id - 1);
   if (job_.empty() || event.job.empty() || event.job == job_) text += format_event(event);
   if (text.empty()) return;
+  const bool first = text_.empty();
   if (events_ == bounds_.events || text_.size() + text.size() > bounds_.bytes) {
     overflowed_ = true;
   } else {
     text_ += text;
     ++events_;
   }
-  wake_();
+  if (first) wake_();  // the reader looks again after it has taken what is there
 }
 
 std::string EventQueue::take() {

@@ -168,8 +168,8 @@ void Server::start(Api& api) {
 }
 
 void Server::stop() {
+  if (state_ == nullptr || !state_->thread.joinable()) return;
   State& s = *state_;
-  if (!s.thread.joinable()) return;
   net::post(s.io, [&s] {
     s.shared->stopping = true;
     error_code ignored;
@@ -186,6 +186,7 @@ void Server::stop() {
   s.thread.join();
   s.quick->join();
   s.slow->join();
+  state_.reset();  // with it the frames of connections that were cut: they use the api
 }
 
 }  // namespace ls::http

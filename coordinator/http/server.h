@@ -17,7 +17,7 @@ class Server {
   static Result<std::unique_ptr<Server>> listen(const std::string& address);
   ~Server();  // stops
 
-  int port() const;
+  int port() const;  // until stop()
   // `api` lives until stop() has returned.
   void start(Api& api);
   // Ends listening and event streams, gives requests under way Limits::stop_seconds, then cuts them.

@@ -1,0 +1,211 @@
+// A coordinator in memory: jobs with states, blobs, events. Enough to see what the HTTP door asks of it.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/service.h"
+
+namespace ls::http::testing {
+
+using namespace ls::coordinator;
+
+class FakeBlobs final : public BlobStore {
+ public:
+  bool has(const Digest& digest) const override {
+    const std::lock_guard lock(mutex_);
+    return blobs_.count(digest) > 0;
+  }
+  Result<std::uint64_t> size(const Digest& digest) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = blobs_.find(digest);
+    if (found == blobs_.end()) return fail(Errc::not_found, "no such blob");
+    return found->second.size();
+  }
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = blobs_.find(digest);
+    if (found == blobs_.end()) return fail(Errc::not_found, "no such blob");
+    const auto begin = found->second.begin() + static_cast<std::ptrdiff_t>(offset);
+    return std::vector<std::byte>(begin, begin + static_cast<std::ptrdiff_t>(length));
+  }
+  Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override {
+    if (sha256(bytes) != digest) return fail(Errc::invalid_argument, "the digest of the bytes is another");
+    const std::lock_guard lock(mutex_);
+    blobs_[digest].assign(bytes.begin(), bytes.end());
+    return {};
+  }
+  Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override {
+    return std::make_unique<FakeUpload>(*this, digest);
+  }
+
+  Digest add(std::string_view text) {
+    const Digest digest = sha256(text);
+    EXPECT_TRUE(put(digest, std::as_bytes(std::span(text))));
+    return digest;
+  }
+  std::atomic<int> open_uploads{0};
+
+ private:
+  struct FakeUpload final : Upload {
+    FakeUpload(FakeBlobs& o, const Digest& d) : owner(o), digest(d) { ++owner.open_uploads; }
+    ~FakeUpload() override { --owner.open_uploads; }
+    Result<void> append(std::span<const std::byte> more) override {
+      bytes.insert(bytes.end(), more.begin(), more.end());
+      return {};
+    }
+    Result<void> finish() override { return owner.put(digest, bytes); }
+    FakeBlobs& owner;
+    Digest digest;
+    std::vector<std::byte> bytes;
+  };
+
+  mutable std::mutex mutex_;
+  std::map<Digest, std::vector<std::byte>> blobs_;
+};
+
+class FakeCoordinator final : public Coordinator {
+ public:
+  tl::expected<JobId, Rejected> submit(SubmitRequest request) override {
+    if (request.scene_text.find("misspelt") != std::string::npos) {
+      Diagnostic d;
+      d.place = {request.scene_name, 14, 16};
+      d.text = "medium has no parameter 'sigmat'; did you mean 'sigma_t'?";
+      d.source_line = "misspelt \xff";  // not UTF-8
+      return tl::unexpected(Rejected{{Errc::invalid_argument, "the scene has 1 error"}, {d}});
+    }
+    const std::lock_guard lock(mutex_);
+    JobView job;
+    job.id = JobId{"j-" + std::to_string(jobs_.size() + 1)};
+    job.name = request.scene_name;
+    job.spp = request.spec.spp.value_or(16);
+    job.priority = request.spec.priority;
+    job.warnings = {"'strict_normals' means nothing here"};
+    jobs_[job.id] = job;
+    last_request = std::move(request);
+    return job.id;
+  }
+  std::vector<JobView> jobs() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<JobView> all;
+    for (const auto& [id, job] : jobs_) all.push_back(job);
+    return all;
+  }
+  Result<JobView> job(const JobId& id) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = jobs_.find(id);
+    if (found == jobs_.end()) return fail(Errc::not_found, "there is no job '" + id.value + "'");
+    return found->second;
+  }
+  Result<void> cancel(const JobId& id) override { return set_state(id, JobState::cancelled); }
+  Result<void> pause(const JobId& id) override { return set_state(id, JobState::paused); }
+  Result<void> resume(const JobId& id) override { return set_state(id, JobState::running); }
+  Result<void> set_priority(const JobId& id, int priority) override {
+    return change(id, [=](JobView& job) { job.priority = priority; });
+  }
+  Result<void> extend(const JobId& id, std::uint64_t spp) override {
+    return change(id, [=](JobView& job) { job.spp = spp; });
+  }
+  Result<std::vector<std::byte>> image_exr(const JobId& id) const override {
+    if (auto found = job(id); !found) return tl::unexpected(found.error());
+    return std::vector<std::byte>(exr_bytes, std::byte{7});
+  }
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const override {
+    if (auto found = job(id); !found) return tl::unexpected(found.error());
+    if (slow_image != nullptr) slow_image(exposure);
+    return std::vector<std::byte>(static_cast<std::size_t>(10 + exposure), std::byte{1});
+  }
+  Result<std::string> report_json(const JobId& id) const override { return text_of(id, "{\"spp\":16}"); }
+  Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const override {
+    if (auto found = job(id); !found) return tl::unexpected(found.error());
+    return std::vector<ConvergencePoint>(2);
+  }
+  Result<std::vector<TileView>> tiles(const JobId& id) const override {
+    if (auto found = job(id); !found) return tl::unexpected(found.error());
+    return std::vector<TileView>(3);
+  }
+  Result<std::string> job_log(const JobId& id) const override { return text_of(id, "submitted\n"); }
+  Result<void> wait(const JobId&) const override { return {}; }
+
+  std::vector<WorkerView> workers() const override { return std::vector<WorkerView>(2); }
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello&, std::shared_ptr<WorkerSink>) override {
+    return fail(Errc::unavailable, "no workers here");
+  }
+
+  std::shared_ptr<void> subscribe(std::uint64_t after_id,
+                                  std::function<void(const StreamEvent&)> on_event) override {
+    const std::lock_guard lock(mutex_);
+    for (const auto& event : kept_)
+      if (event.id > after_id) on_event(event);
+    const int key = next_reader_++;
+    readers_[key] = std::move(on_event);
+    return std::shared_ptr<void>(nullptr, [this, key](void*) {
+      const std::lock_guard guard(mutex_);
+      readers_.erase(key);
+    });
+  }
+  std::uint64_t last_event_id() const override {
+    const std::lock_guard lock(mutex_);
+    return last_event_;
+  }
+  void tell(std::string type, std::string data, std::string job = {}) {
+    const std::lock_guard lock(mutex_);
+    StreamEvent event{++last_event_, std::move(type), std::move(data), std::move(job)};
+    for (auto& [key, reader] : readers_) reader(event);
+    kept_.push_back(std::move(event));
+    if (kept_.size() > 100) kept_.erase(kept_.begin());
+  }
+  std::size_t readers() const {
+    const std::lock_guard lock(mutex_);
+    return readers_.size();
+  }
+
+  BlobStore& blobs() override { return store; }
+  bool ready(std::string* why_not) const override {
+    if (!is_ready) *why_not = "the store is being read";
+    return is_ready;
+  }
+  void tick() override {}
+
+  FakeBlobs store;
+  SubmitRequest last_request;
+  std::size_t exr_bytes = 100;
+  std::atomic<bool> is_ready{true};
+  std::function<void(double)> slow_image;
+
+ private:
+  template <class Change>
+  Result<void> change(const JobId& id, Change apply) {
+    const std::lock_guard lock(mutex_);
+    const auto found = jobs_.find(id);
+    if (found == jobs_.end()) return fail(Errc::not_found, "there is no job '" + id.value + "'");
+    if (found->second.state == JobState::cancelled)
+      return fail(Errc::failed_precondition, "the job is cancelled");
+    apply(found->second);
+    return {};
+  }
+  Result<void> set_state(const JobId& id, JobState state) {
+    return change(id, [=](JobView& job) { job.state = state; });
+  }
+  Result<std::string> text_of(const JobId& id, std::string text) const {
+    if (auto found = job(id); !found) return tl::unexpected(found.error());
+    return text;
+  }
+
+  mutable std::mutex mutex_;
+  std::map<JobId, JobView> jobs_;
+  std::vector<StreamEvent> kept_;
+  std::map<int, std::function<void(const StreamEvent&)>> readers_;
+  int next_reader_ = 0;
+  std::uint64_t last_event_ = 0;
+};
+
+}  // namespace ls::http::testing

@@ -1,0 +1,78 @@
+// An Api over a FakeCoordinator, and requests to it as one line.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "coordinator/http/api.h"
+#include "coordinator/http/uri.h"
+#include "tests/unit/http/fake_coordinator.h"
+
+namespace ls::http::testing {
+
+inline constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
+
+inline constexpr char kPage[] = "<!doctype html><title>dashboard</title>";
+inline const StaticFile kPages[] = {{"index.html", std::as_bytes(std::span(kPage, sizeof kPage - 1))},
+                                    {"js/main.js", std::as_bytes(std::span(kPage, 9))}};
+
+inline Request request(Method method, std::string_view target, Fields headers = {}, std::string body = {}) {
+  Request r;
+  r.method = method;
+  auto parsed = parse_target(target);
+  EXPECT_TRUE(parsed) << target;
+  if (parsed) {
+    r.segments = parsed->segments;
+    r.query = parsed->query;
+  }
+  r.headers = std::move(headers);
+  if (r.header("host").empty()) r.headers.emplace_back("host", "farm:8080");
+  r.has_body = !body.empty();
+  r.content_length = body.size();
+  r.body = std::move(body);
+  return r;
+}
+
+class ApiTest : public ::testing::Test {
+ protected:
+  // As the server loop does: admit, then the handler or the upload.
+  Response ask(Request r) {
+    auto admitted = api.admit(r);
+    if (auto* response = std::get_if<Response>(&admitted)) return *response;
+    auto& match = std::get<Match>(admitted);
+    if (match.route->body != BodyKind::blob) return api.handle(match, r);
+    auto opened = api.open_upload(match, r);
+    if (auto* response = std::get_if<Response>(&opened)) return *response;
+    auto& sink = std::get<std::unique_ptr<BodySink>>(opened);
+    if (auto refused = sink->append(std::as_bytes(std::span(r.body)))) return *refused;
+    return sink->finish();
+  }
+  // With the token.
+  Response ask(Method method, std::string_view target, std::string body = {},
+               std::string type = "application/json") {
+    Fields headers{{"authorization", std::string("Bearer ") + kToken}};
+    if (!body.empty()) headers.emplace_back("content-type", std::move(type));
+    return ask(request(method, target, std::move(headers), std::move(body)));
+  }
+  std::string submit() {
+    const Response r = ask(Method::post, "/api/v1/jobs", "<scene/>", "application/xml");
+    EXPECT_EQ(r.status, 201);
+    return json_of(r)["id"];
+  }
+  static std::string text(const Response& r) {
+    return std::string(reinterpret_cast<const char*>(r.bytes().data()), r.bytes().size());
+  }
+  static nlohmann::json json_of(const Response& r) { return nlohmann::json::parse(text(r)); }
+  static std::string header(const Response& r, std::string_view name) {
+    for (const auto& [key, value] : r.headers)
+      if (key == name) return value;
+    return {};
+  }
+
+  FakeCoordinator coordinator;
+  Limits limits{.blob_bytes = 1000};
+  Api api{coordinator, kToken, limits, StaticFiles(kPages)};
+};
+
+}  // namespace ls::http::testing

@@ -1,0 +1,358 @@
+// The server loop on a real port, with strangers that behave badly.
+#include "coordinator/http/server.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <thread>
+
+#include "tests/unit/http/fixture.h"
+#include "tests/unit/http/raw_client.h"
+
+namespace ls::http::testing {
+namespace {
+
+const std::string kAuth = std::string("Authorization: Bearer ") + kToken + "\r\n";
+const std::string kGet = "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n";
+
+Limits quick_limits() {
+  Limits limits;
+  limits.header_seconds = 0.2;
+  limits.idle_seconds = 5;
+  limits.body_grace_seconds = 0.3;
+  limits.min_rate = 1e5;
+  limits.heartbeat_seconds = 0.1;
+  limits.linger_seconds = 0.2;
+  limits.stop_seconds = 2;
+  limits.connections = 16;
+  limits.event_streams = 4;
+  limits.blob_bytes = 4u << 20;
+  return limits;
+}
+
+class ServerTest : public ::testing::Test {
+ protected:
+  void start(Limits limits = quick_limits()) {
+    auto listening = Server::listen("127.0.0.1:0");
+    ASSERT_TRUE(listening) << listening.error().message;
+    server = std::move(*listening);
+    api.emplace(coordinator, kToken, limits, StaticFiles(kPages));
+    server->start(*api);
+  }
+  void TearDown() override {
+    if (server) server->stop();
+  }
+  // Waits for what another thread brings about; the test's own time limit ends it otherwise.
+  template <class Condition>
+  static bool eventually(Condition condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::yield();
+    }
+    return true;
+  }
+  int ask(const std::string& text) {
+    RawClient client(server->port());
+    client.send(text);
+    return RawClient::status(client.response());
+  }
+  static std::string put(std::string_view body, std::size_t announced) {
+    return "PUT /api/v1/blobs/" + sha256(body).hex() + " HTTP/1.1\r\nHost: x\r\n" + kAuth +
+           "Content-Length: " + std::to_string(announced) + "\r\n\r\n";
+  }
+  static std::string events(const std::string& more = "") {
+    return "GET /api/v1/events HTTP/1.1\r\nHost: x\r\n" + kAuth + more + "\r\n";
+  }
+
+  FakeCoordinator coordinator;
+  std::optional<Api> api;
+  std::unique_ptr<Server> server;
+};
+
+TEST_F(ServerTest, AnswersRequestsOneAfterTheOtherOnAKeptConnection) {
+  start();
+  RawClient client(server->port());
+
+  for (int i = 0; i < 3; ++i) {
+    client.send(kGet);
+    const std::string response = client.response();
+    EXPECT_EQ(RawClient::status(response), 200);
+    EXPECT_TRUE(response.ends_with("\r\n\r\nok\n")) << response;
+  }
+  client.send(kGet + kGet);  // and when they come at once
+  EXPECT_EQ(RawClient::status(client.response()), 200);
+  EXPECT_EQ(RawClient::status(client.response()), 200);
+  client.send("GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_EQ(RawClient::status(client.read_all()), 200);
+}
+
+TEST_F(ServerTest, AnswersHeadWithoutABody) {
+  start();
+  RawClient client(server->port());
+
+  client.send("HEAD / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+
+  const std::string response = client.read_all();
+  EXPECT_NE(response.find("Content-Length: " + std::to_string(sizeof kPage - 1)), std::string::npos);
+  EXPECT_TRUE(response.ends_with("\r\n\r\n"));
+}
+
+TEST_F(ServerTest, RefusesAPortThatIsTaken) {
+  start();
+
+  const auto second = Server::listen("127.0.0.1:" + std::to_string(server->port()));
+
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, Errc::already_exists);
+  EXPECT_NE(second.error().message.find("--http"), std::string::npos);
+  for (const char* wrong : {"8080", ":8080", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:70000", "127.0.0.1:-1"})
+    EXPECT_EQ(Server::listen(wrong).error().code, Errc::invalid_argument) << wrong;
+}
+
+TEST_F(ServerTest, AnswersWhatIsNoRequest) {
+  start();
+
+  EXPECT_EQ(ask("\x16\x03\x01 hello\r\n\r\n"), 400);
+  EXPECT_EQ(ask("GET /healthz HTTP/1.1\r\n\r\n"), 400);  // no Host
+  EXPECT_EQ(ask("GET /healthz HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n"), 400);
+  EXPECT_EQ(ask("GET /a%2fb HTTP/1.1\r\nHost: x\r\n\r\n"), 400);
+  EXPECT_EQ(ask("BREW /healthz HTTP/1.1\r\nHost: x\r\n\r\n"), 501);
+  EXPECT_EQ(ask("POST /api/v1/session HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nTransfer-Encoding: "
+                "chunked\r\n\r\n"),
+            400);
+  EXPECT_EQ(ask("POST /api/v1/session HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\n"),
+            400);
+  EXPECT_EQ(ask("POST /api/v1/session HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n"), 400);
+  EXPECT_EQ(ask("POST /api/v1/session HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: gzip, chunked\r\n\r\n"), 501);
+  EXPECT_EQ(ask("GET /" + std::string(9000, 'a') + " HTTP/1.1\r\nHost: x\r\n\r\n"), 414);
+  EXPECT_EQ(ask("GET / HTTP/1.1\r\nHost: x\r\nX: " + std::string(20'000, 'a') + "\r\n\r\n"), 431);
+  EXPECT_EQ(ask("OPTIONS * HTTP/1.1\r\nHost: x\r\n\r\n"), 204);
+  EXPECT_EQ(ask(kGet), 200);
+}
+
+TEST_F(ServerTest, CutsAHeaderThatDripsIn) {
+  start();
+  RawClient slow(server->port());
+  ASSERT_TRUE(slow.send("GET /healthz HTTP/1.1\r\nHost: x\r\n"));
+
+  EXPECT_EQ(ask(kGet), 200);  // others are served meanwhile
+  EXPECT_EQ(RawClient::status(slow.read_all()), 408);
+}
+
+TEST_F(ServerTest, CutsABodyThatComesTooSlowlyAndKeepsNothingOfIt) {
+  start();
+  RawClient slow(server->port());
+  ASSERT_TRUE(slow.send(put("never whole", 1'000'000) + "never"));
+  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+
+  EXPECT_EQ(ask(kGet), 200);
+  EXPECT_EQ(RawClient::status(slow.read_all()), 408);
+  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 0; }));
+}
+
+TEST_F(ServerTest, KeepsNothingOfAnUploadThatIsCutOff) {
+  start();
+  {
+    RawClient client(server->port());
+    ASSERT_TRUE(client.send(put("whole", 5) + "who"));
+    EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+  }
+  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 0; }));
+  EXPECT_FALSE(coordinator.store.has(sha256("whole")));
+}
+
+TEST_F(ServerTest, StreamsABlobOfManyChunksIntoTheStore) {
+  start();
+  std::string body(3'000'000, 'x');
+  for (std::size_t i = 0; i < body.size(); ++i) body[i] = static_cast<char>(i * 2654435761u >> 13);
+
+  EXPECT_EQ(ask(put(body, body.size()) + body), 201);
+  EXPECT_EQ(coordinator.store.size(sha256(body)).value_or(0), body.size());
+}
+
+TEST_F(ServerTest, TakesChunkedBodiesWithinTheSameBounds) {
+  start();
+  const std::string head = "PUT /api/v1/blobs/" + sha256("grid").hex() + " HTTP/1.1\r\nHost: x\r\n" + kAuth +
+                           "Transfer-Encoding: chunked\r\n\r\n";
+
+  EXPECT_EQ(ask(head + "2\r\ngr\r\n2;a=b\r\nid\r\n0\r\n\r\n"), 201);
+  EXPECT_TRUE(coordinator.store.has(sha256("grid")));
+  EXPECT_EQ(ask(head + "zz\r\ngr\r\n"), 400);
+
+  const std::string session =
+      "POST /api/v1/session HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+      "Transfer-Encoding: chunked\r\n\r\n";
+  EXPECT_EQ(ask(session + "2000\r\n" + std::string(0x2000, ' ') + "\r\n0\r\n\r\n"), 413);
+}
+
+TEST_F(ServerTest, RefusesTooLongABodyBeforeItComes) {
+  start();
+
+  EXPECT_EQ(ask(put("x", 5u << 20)), 413);
+  EXPECT_EQ(coordinator.store.open_uploads, 0);
+}
+
+TEST_F(ServerTest, AnswersARefusedUploadThatIsStillBeingSent) {
+  start();
+  const std::string body(500'000, 'x');
+
+  // No token: refused at the header, with most of the body on its way.
+  EXPECT_EQ(ask("PUT /api/v1/blobs/" + sha256(body).hex() +
+                " HTTP/1.1\r\nHost: x\r\nContent-Length: 500000\r\n\r\n" + body),
+            401);
+}
+
+TEST_F(ServerTest, AsksForTheBodyOnlyWhenItWantsIt) {
+  start();
+  RawClient client(server->port());
+  std::string head = put("grid", 4);
+  head.insert(head.size() - 2, "Expect: 100-continue\r\n");
+
+  client.send(head);
+  EXPECT_TRUE(client.read_until("100 Continue\r\n\r\n"));
+  client.received.clear();
+  client.send("grid");
+  EXPECT_EQ(RawClient::status(client.response()), 201);
+
+  EXPECT_EQ(ask(head), 204);  // it is here: no body is asked for
+}
+
+TEST_F(ServerTest, ServesOthersWhileTheSlowWorkIsBusy) {
+  start();
+  std::promise<void> release;
+  auto gate = release.get_future().share();
+  coordinator.slow_image = [gate](double) { gate.wait(); };
+  SubmitRequest job;
+  job.scene_text = "<scene/>";
+  ASSERT_TRUE(coordinator.submit(job));
+  std::vector<std::unique_ptr<RawClient>> waiting;
+  for (int i = 0; i < 6; ++i) {  // more than there are slow threads
+    waiting.push_back(std::make_unique<RawClient>(server->port()));
+    waiting.back()->send("GET /api/v1/jobs/j-1/image.png HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n");
+  }
+
+  EXPECT_EQ(ask("GET /api/v1/jobs HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n"), 200);
+  EXPECT_EQ(ask(kGet), 200);
+
+  release.set_value();
+  for (auto& client : waiting) EXPECT_EQ(RawClient::status(client->response()), 200);
+}
+
+TEST_F(ServerTest, BoundsTheNumberOfConnections) {
+  start();
+  std::vector<std::unique_ptr<RawClient>> open;
+  for (int i = 0; i < 16; ++i) {
+    open.push_back(std::make_unique<RawClient>(server->port()));
+    open.back()->send(put("whole", 5) + "who");
+  }
+  ASSERT_TRUE(eventually([&] { return coordinator.store.open_uploads == 16; }));  // all under way, none idle
+
+  RawClient more(server->port());
+  EXPECT_EQ(RawClient::status(more.read_all()), 503);
+
+  for (auto& client : open) EXPECT_EQ(RawClient::status(client->read_all()), 408);  // in the end they are cut
+  open.clear();
+  EXPECT_TRUE(eventually([&] { return api->counters().connections == 0; }));
+  EXPECT_EQ(ask(kGet), 200);
+}
+
+TEST_F(ServerTest, LetsIdleConnectionsGiveWay) {
+  start();
+  std::vector<std::unique_ptr<RawClient>> idle;
+  for (int i = 0; i < 16; ++i) idle.push_back(std::make_unique<RawClient>(server->port()));
+  ASSERT_TRUE(eventually([&] { return api->counters().connections == 16; }));
+
+  EXPECT_EQ(ask(kGet), 200);
+}
+
+TEST_F(ServerTest, StreamsEventsFromWhereTheReaderLeftOff) {
+  start();
+  for (int i = 1; i <= 5; ++i) coordinator.tell("job", "old" + std::to_string(i));
+
+  RawClient fresh(server->port());
+  fresh.send(events());
+  ASSERT_TRUE(fresh.read_until("id: 5\n\n"));
+  RawClient back(server->port());
+  back.send(events("Last-Event-ID: 3\r\n"));
+  ASSERT_TRUE(back.read_until("old5\n\n"));
+  EXPECT_EQ(back.received.find("old3"), std::string::npos);
+  EXPECT_NE(back.received.find("id: 4\nevent: job\ndata: old4\n\n"), std::string::npos);
+  RawClient other_life(server->port());
+  other_life.send(events("Last-Event-ID: 99\r\n"));
+  EXPECT_TRUE(other_life.read_until("event: reset\n"));
+
+  ASSERT_TRUE(eventually([&] { return coordinator.readers() == 3; }));
+  coordinator.tell("tile", "new");
+  EXPECT_TRUE(fresh.read_until("id: 6\nevent: tile\ndata: new\n\n"));
+  EXPECT_EQ(fresh.received.find("old"), std::string::npos);
+  EXPECT_NE(fresh.received.find("Content-Type: text/event-stream"), std::string::npos);
+  EXPECT_TRUE(fresh.read_until("\n:\n\n"));  // the heartbeat of a silent stream
+}
+
+TEST_F(ServerTest, ForgetsReadersThatLeave) {
+  start();
+  {
+    RawClient reader(server->port());
+    reader.send(events());
+    ASSERT_TRUE(eventually([&] { return coordinator.readers() == 1; }));
+  }
+  EXPECT_TRUE(eventually([&] { return coordinator.readers() == 0; }));
+  EXPECT_TRUE(eventually([&] { return api->counters().event_streams == 0; }));
+}
+
+TEST_F(ServerTest, SendsAwayAReaderThatDoesNotKeepUp) {
+  Limits limits = quick_limits();
+  limits.event_queue = 64;
+  start(limits);
+  RawClient lazy(server->port(), 4096);
+  lazy.send(events());
+  RawClient keen(server->port());
+  keen.send(events());
+  ASSERT_TRUE(eventually([&] { return coordinator.readers() == 2; }));
+
+  const std::string data(10'000, 'x');
+  std::uint64_t told = 0;
+  EXPECT_TRUE(eventually([&] {  // the lazy one reads nothing: its socket fills, then its queue
+    coordinator.tell("job", data);
+    ++told;
+    EXPECT_TRUE(keen.read_until("id: " + std::to_string(told) + "\n"));
+    keen.received.clear();
+    return coordinator.readers() == 1;
+  }));
+  EXPECT_EQ(ask(kGet), 200);
+}
+
+TEST_F(ServerTest, BoundsTheNumberOfEventStreams) {
+  start();
+  std::vector<std::unique_ptr<RawClient>> readers;
+  for (int i = 0; i < 4; ++i) {
+    readers.push_back(std::make_unique<RawClient>(server->port()));
+    readers.back()->send(events());
+    ASSERT_TRUE(readers.back()->read_until("\n\n"));
+  }
+
+  EXPECT_EQ(ask(events()), 503);
+  EXPECT_EQ(ask(kGet), 200);
+}
+
+TEST_F(ServerTest, StopsWithReadersIdlersAndHalfRequestsOpen) {
+  start();
+  RawClient reader(server->port()), idler(server->port()), half(server->port()), upload(server->port());
+  reader.send(events());
+  half.send("GET /");
+  upload.send(put("whole", 5) + "who");
+  ASSERT_TRUE(reader.read_until("\n\n"));
+  ASSERT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+
+  server->stop();
+
+  EXPECT_EQ(coordinator.readers(), 0u);
+  EXPECT_EQ(coordinator.store.open_uploads, 0);
+  reader.read_all();
+  EXPECT_EQ(idler.read_all(), "");
+}
+
+}  // namespace
+}  // namespace ls::http::testing
