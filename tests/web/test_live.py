@@ -261,6 +261,19 @@ def test_submits_a_scene_with_the_files_it_names_and_no_others(farm, dashboard, 
     assert farm.asked("PUT", f"/api/v1/blobs/{digest(scene_files[4])}") == 0
 
 
+def test_files_can_be_dropped(farm, dashboard):
+    page = dashboard("#/submit")
+    page.wait("document.querySelector('.drop')")
+
+    page.evaluate("""void (() => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File(["<scene version='3.0.0'/>"], "drop.xml"));
+      document.querySelector(".drop").dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    })()""")
+
+    assert page.text(".bundle h2") == "drop.xml"
+
+
 def test_a_missing_file_is_named_before_anything_is_sent(farm, dashboard, scene_files):
     page = dashboard("#/submit")
     page.wait("document.getElementById('files')")

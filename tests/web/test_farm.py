@@ -1,0 +1,142 @@
+"""The dashboard on a real farm: coordinator and fake workers as processes, Chromium in front."""
+import pytest
+from local_farm import SCENE, LocalFarm
+
+QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"
+WITH_MESH = SCENE.replace('<shape type="sphere">', '<shape type="obj"><string name="filename" value="meshes/quad.obj"/>')
+SLOW = ("--fake-delay", 150)  # milliseconds a unit: long enough to be seen in flight
+
+
+@pytest.fixture
+def real_farm(tmp_path):
+    try:
+        farm = LocalFarm(tmp_path / "farm")
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))
+    with farm:
+        yield farm
+
+
+@pytest.fixture
+def page(real_farm, open_page):
+    """Signed in as a person does it: with the token from the data folder."""
+    page = open_page(f"http://127.0.0.1:{real_farm.http}/")
+    page.click("#token")
+    page.type(real_farm.token)
+    page.key("Enter", virtual=13, text="\r")
+    page.wait("document.querySelector('.link.live')")
+    return page
+
+
+def submit_files(page, tmp_path, files):
+    paths = []
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+        paths.append(tmp_path / name)
+    page.evaluate("void (location.hash = '#/submit')")
+    page.wait("document.getElementById('files')")
+    page.set_files("#files", paths)
+
+
+def test_from_dropped_files_to_a_finished_image(real_farm, page, tmp_path):
+    real_farm.add_workers(2, *SLOW)
+    real_farm.wait_for_workers(2)
+    submit_files(page, tmp_path, {"bath.xml": WITH_MESH, "quad.obj": QUAD})
+    page.click("#set-spp")
+    page.type("64")
+    page.click(".settings button")
+
+    page.wait("document.querySelector('.job h1')?.innerText === 'bath.xml'")
+    page.wait("document.querySelector('.mark-tile')", timeout=60)
+    page.wait("document.querySelector('.flash')", timeout=60)
+    page.wait("document.querySelector('live-image').dataset.painted", timeout=60)
+    page.wait("document.querySelector('.job .pill').innerText === 'done'", timeout=120)
+
+    page.wait("document.querySelectorAll('.plot-point').length >= 3", timeout=60)
+    assert "64 of 64" in page.text(".figures")
+    assert page.count(".mark-tile") == 0
+    assert page.wait("""(() => {
+      const canvas = document.querySelector('live-image canvas');
+      const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+      return canvas.width === 96 && canvas.height === 64 && new Set(data).size > 16;
+    })()""")
+
+
+def test_downloads_are_what_the_coordinator_gives(real_farm, page):
+    real_farm.add_worker()
+    job = real_farm.submit(SCENE, spp=4)
+    real_farm.wait_for_job(job)
+    page.evaluate(f"void (location.hash = '#/jobs/{job}')")
+    page.wait("document.querySelector('.downloads a')")
+
+    sizes = page.evaluate("""Promise.all([...document.querySelectorAll('.downloads a')].map(async (link) => {
+      const response = await fetch(link.href);
+      const bytes = new Uint8Array(await response.arrayBuffer());
+      return [link.download.split('.').pop(), response.status, bytes.length, [...bytes.slice(0, 4)]];
+    }))""")
+
+    assert [kind for kind, *_ in sizes] == ["exr", "json", "csv", "log"]
+    assert all(status == 200 and size > 0 for _, status, size, _ in sizes), sizes
+    assert sizes[0][3] == [0x76, 0x2F, 0x31, 0x01]  # OpenEXR's magic number
+
+
+def test_cancel_and_pause_reach_the_farm(real_farm, page):
+    real_farm.add_worker(*SLOW)
+    job = real_farm.submit(SCENE, spp=4096, name="long.xml")
+    page.wait("document.querySelector('[data-job] .pill')?.innerText === 'rendering'", timeout=60)
+
+    page.click("[aria-label='Pause: long.xml']")
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'paused'", timeout=30)
+    assert real_farm.job(job)["state"] == "paused"
+    page.click("[aria-label='Resume: long.xml']")
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'rendering'", timeout=30)
+    page.click("[aria-label='Cancel: long.xml']")
+    page.click("button.danger")
+
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'cancelled'", timeout=30)
+    assert real_farm.job(job)["state"] == "cancelled"
+
+
+def test_workers_are_listed_with_what_they_do_and_leave_when_they_die(real_farm, page):
+    first, second = real_farm.add_workers(2, *SLOW)
+    real_farm.wait_for_workers(2)
+    real_farm.submit(SCENE, spp=4096, name="long.xml")
+    page.evaluate("void (location.hash = '#/workers')")
+
+    page.wait("document.querySelectorAll('[data-worker].is-connected').length === 2", timeout=30)
+    page.wait("[...document.querySelectorAll('.doing')].every(doing => doing.innerText.includes('long.xml'))", timeout=60)
+    second.kill()
+
+    page.wait("document.querySelectorAll('[data-worker].is-connected').length === 1", timeout=60)
+
+
+def test_a_broken_scene_is_shown_with_its_place(real_farm, page, tmp_path):
+    submit_files(page, tmp_path, {"bath.xml": SCENE.replace('name="fov"', 'name="fow"')})
+    page.click(".settings button")
+
+    text = page.text(".diagnostics")
+
+    line = 1 + SCENE.split('name="fov"')[0].count("\n")
+    assert f"bath.xml:{line}:" in text and "fow" in text and "^~" in text
+
+
+def test_a_restarted_coordinator_is_found_again(real_farm, page):
+    job = real_farm.submit(SCENE, spp=4, name="patient.xml")
+    page.wait("document.querySelector('[data-job]')")
+
+    real_farm.restart_coordinator()
+    page.wait("document.querySelector('.link.live')", timeout=60)
+    real_farm.add_worker()
+
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'done'", timeout=60)
+    assert real_farm.job(job)["state"] == "done"
+
+
+def test_names_from_outside_are_shown_as_text(real_farm, page):
+    markup = "<img src=x onerror=document.title='stolen'>"
+    real_farm.add_worker("--name", markup)
+    real_farm.wait_for_workers(1)
+    page.evaluate("void (location.hash = '#/workers')")
+
+    page.wait(f"document.querySelector('[data-worker]')?.innerText.includes({markup!r})", timeout=30)
+    assert page.count("main img") == 0 and "stolen" not in page.evaluate("document.title")
