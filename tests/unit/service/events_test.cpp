@@ -1,0 +1,129 @@
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <set>
+
+#include "coordinator/event_hub.h"
+#include "coordinator/limits.h"
+#include "coordinator/views.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+class Listener {
+ public:
+  std::function<void(const StreamEvent&)> callback() {
+    return [this](const StreamEvent& e) {
+      const std::lock_guard lock(mutex_);
+      events_.push_back(e);
+      heard_.notify_all();
+    };
+  }
+  std::vector<StreamEvent> first(std::size_t n) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() >= n; }));
+    return events_;
+  }
+  std::vector<StreamEvent> until_state(const std::string& state) {
+    std::unique_lock lock(mutex_);
+    const auto seen = [&] {
+      return !events_.empty() && events_.back().type == "job" &&
+             nlohmann::json::parse(events_.back().data)["state"] == state;
+    };
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::seconds(20), seen));
+    return events_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::vector<StreamEvent> events_;
+};
+
+EventHub::Reserve from_zero() {
+  return [](std::uint64_t) -> Result<std::uint64_t> { return 0; };
+}
+
+TEST(EventHub, ReplaysWhatAReaderMissedThenGoesOnLive) {
+  EventHub hub(from_zero());
+  for (int i = 0; i < 5; ++i) hub.publish("job", std::to_string(i), "j");
+  Listener late;
+
+  const auto handle = hub.subscribe(2, late.callback());
+  hub.publish("job", "live", "j");
+
+  const auto events = late.first(4);
+  ASSERT_EQ(events.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(events[i].id, 3 + i);
+  EXPECT_EQ(events[3].data, "live");
+  EXPECT_EQ(hub.last_id(), 6u);
+}
+
+TEST(EventHub, KeepsABoundedHistoryAndStartsWithTheOldestKept) {
+  EventHub hub(from_zero());
+  for (std::size_t i = 0; i < limits::kEventsKept + 10; ++i) hub.publish("job", "", "");
+  Listener reader;
+  const auto handle = hub.subscribe(0, reader.callback());
+  EXPECT_EQ(reader.first(limits::kEventsKept).front().id, 11u);
+}
+
+TEST(EventHub, NothingComesOnceTheHandleIsGone) {
+  EventHub hub(from_zero());
+  Listener gone, stays;
+  auto handle = hub.subscribe(0, gone.callback());
+  const auto other = hub.subscribe(0, stays.callback());
+  hub.publish("job", "1", "");
+  stays.first(1);
+  gone.first(1);
+  handle.reset();
+  hub.publish("job", "2", "");
+  stays.first(2);
+  EXPECT_EQ(gone.first(1).size(), 1u);
+}
+
+TEST(Events, TellAJobFromSubmissionToItsEndWithGrowingIds) {
+  TempFolder dir;
+  std::uint64_t last = 0;
+  {
+    auto coordinator = open_at(dir.path());
+    Listener listener;
+    const auto handle = coordinator->subscribe(0, listener.callback());
+    const JobId job = submit(*coordinator);
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(job));
+
+    const auto events = listener.until_state("done");
+    std::set<std::string> tiles;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      if (i > 0) { EXPECT_EQ(events[i].id, events[i - 1].id + 1); }
+      const auto data = nlohmann::json::parse(events[i].data);
+      if (events[i].type != "worker") { EXPECT_EQ(events[i].job, job.value); }
+      if (events[i].type == "tile") tiles.insert(data["state"]);
+    }
+    EXPECT_EQ(tiles, (std::set<std::string>{"leased", "folded"}));
+    last = coordinator->last_event_id();
+  }
+  EXPECT_GE(open_at(dir.path())->last_event_id(), last);
+}
+
+TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
+  JobView v;
+  v.id.value = "j-1";
+  v.name = "bad \xff name";
+  const auto j = nlohmann::json::parse(job_json(v));
+  for (const char* key : {"rmse", "relmse", "relmse_ci95", "eta_seconds", "stopped", "error", "target_error"})
+    EXPECT_TRUE(j.at(key).is_null()) << key;
+  EXPECT_EQ(j["state"], "queued");
+  EXPECT_EQ(nlohmann::json::parse(jobs_json({v, v}))["jobs"].size(), 2u);
+}
+
+TEST(Views, CsvHasOneLineForEachPoint) {
+  EXPECT_EQ(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}}}),
+            "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi\n1.5,3,4,0.5,0.25,0.125,0.375\n");
+}
+
+}  // namespace
+}  // namespace ls::coordinator

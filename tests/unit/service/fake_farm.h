@@ -1,0 +1,182 @@
+// Fake workers for whole jobs through the coordinator's public interface: they render fake_partial, in any order, twice,
+// late or wrong, as a test wishes.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+
+#include "common/image/fake_pixels.h"
+#include "coordinator/service.h"
+
+namespace ls::coordinator {
+
+inline const std::string kSceneText = R"(<scene version="3.0.0">
+  <integrator type="volpath"/>
+  <sensor type="perspective">
+    <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="24"/></film>
+    <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
+  </sensor>
+  <shape type="sphere"/>
+  <emitter type="constant"/>
+</scene>)";
+
+// Messages to all fake workers, in order of arrival.
+class Mailbox {
+ public:
+  void put(int worker, ToWorker message) {
+    const std::lock_guard lock(mutex_);
+    mail_.emplace_back(worker, std::move(message));
+    arrived_.notify_all();
+  }
+  // Nothing within 20 s: a test hangs no longer than that.
+  std::optional<std::pair<int, ToWorker>> take() {
+    std::unique_lock lock(mutex_);
+    if (!arrived_.wait_for(lock, std::chrono::seconds(20), [&] { return !mail_.empty(); })) return std::nullopt;
+    auto first = std::move(mail_.front());
+    mail_.pop_front();
+    return first;
+  }
+  bool empty() {
+    const std::lock_guard lock(mutex_);
+    return mail_.empty();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<std::pair<int, ToWorker>> mail_;
+};
+
+class MailSink final : public WorkerSink {
+ public:
+  MailSink(std::shared_ptr<Mailbox> mail, int worker) : mail_(std::move(mail)), worker_(worker) {}
+  void send(ToWorker message) override { mail_->put(worker_, std::move(message)); }
+  void close() override {}
+
+ private:
+  std::shared_ptr<Mailbox> mail_;
+  int worker_;
+};
+
+class FakeFarm {
+ public:
+  FakeFarm(Coordinator& coordinator, int workers) : coordinator_(coordinator) {
+    for (int i = 0; i < workers; ++i) {
+      WorkerHello hello;
+      hello.name = "fake-" + std::to_string(i);
+      hello.build = "test";
+      hello.numeric_class = sha256("fake class");
+      hello.join_token = token;
+      auto session = coordinator_.connect(hello, std::make_shared<MailSink>(mail_, i));
+      if (session) sessions_.push_back(std::move(*session));
+      EXPECT_EQ(sessions_.size(), static_cast<std::size_t>(i) + 1);
+    }
+  }
+
+  // May change a result, hand in more of them, or hold some back.
+  std::function<std::vector<UnitResult>(UnitResult)> tamper = [](UnitResult r) { return std::vector{std::move(r)}; };
+  std::function<void(std::vector<LeaseUnit>&)> reorder = [](auto&) {};
+  int results_sent = 0;
+  int stop_after = -1;  // results; then run() returns false
+  std::vector<ResultAck> refusals;
+  static inline std::string token;
+
+  // Works until all units that are out have been acknowledged and `until` holds.
+  bool run(const std::function<bool()>& until) {
+    while (!until()) {
+      const auto letter = mail_->take();
+      if (!letter) {
+        ADD_FAILURE() << "the farm stands still";
+        return false;
+      }
+      if (const auto* ack = std::get_if<ResultAck>(&letter->second); ack && ack->refused) refusals.push_back(*ack);
+      const auto* assign = std::get_if<AssignLease>(&letter->second);
+      if (assign && !render(letter->first, *assign)) return false;
+    }
+    return true;
+  }
+  bool finish(const JobId& job) {
+    return run([&] {
+      const auto state = coordinator_.job(job)->state;
+      if (state == JobState::failed || state == JobState::cancelled || state == JobState::done) return true;
+      // Everything is rendered: only the final image is missing.
+      if (coordinator_.job(job)->units_done == coordinator_.job(job)->units_total && mail_->empty()) {
+        EXPECT_TRUE(coordinator_.wait(job));
+      }
+      return coordinator_.job(job)->state == JobState::done;
+    });
+  }
+  std::vector<std::unique_ptr<WorkerSession>>& sessions() { return sessions_; }
+
+  UnitResult render_unit(const Lease& lease, const LeaseUnit& unit) {
+    const JobBrief& brief = briefs_.at(lease.job);
+    const Partial partial = fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
+    UnitResult r;
+    r.unit = {lease.job, unit.tile, unit.round};
+    r.lease = lease.id;
+    r.exr = encode_partial(partial, brief.settings.size).value();
+    r.digest = unit_digest(partial);
+    r.cpu_seconds = .125;
+    return r;
+  }
+
+ private:
+  bool render(int worker, const AssignLease& assign) {
+    if (assign.brief) briefs_[assign.lease.job] = *assign.brief;
+    auto units = assign.lease.units;
+    reorder(units);
+    for (const LeaseUnit& unit : units)
+      for (UnitResult& result : tamper(render_unit(assign.lease, unit))) {
+        if (results_sent == stop_after) return false;
+        ++results_sent;
+        sessions_[static_cast<std::size_t>(worker)]->receive(std::move(result));
+      }
+    return true;
+  }
+
+  Coordinator& coordinator_;
+  std::shared_ptr<Mailbox> mail_ = std::make_shared<Mailbox>();
+  std::vector<std::unique_ptr<WorkerSession>> sessions_;
+  std::map<JobId, JobBrief> briefs_;
+};
+
+inline std::unique_ptr<Coordinator> open_at(const std::filesystem::path& data) {
+  Coordinator::Options options;
+  options.data = data;
+  auto opened = Coordinator::open(std::move(options));
+  EXPECT_TRUE(opened) << (opened ? "" : opened.error().message);
+  return std::move(*opened);
+}
+
+inline JobId submit(Coordinator& coordinator, JobSpec spec = {}) {
+  auto id = coordinator.submit({"test.xml", kSceneText, {}, std::move(spec)});
+  EXPECT_TRUE(id) << (id ? "" : id.error().error.message + format_diagnostics(id.error().diagnostics));
+  return id.value_or(JobId{});
+}
+
+inline nlohmann::json report(const Coordinator& coordinator, const JobId& job) {
+  return nlohmann::json::parse(coordinator.report_json(job).value_or("{}"));
+}
+inline std::string pixels(const Coordinator& coordinator, const JobId& job) {
+  return report(coordinator, job).value("pixels_sha256", "");
+}
+
+// What everything else is compared with: one worker, in memory, in order.
+inline std::string reference_pixels(std::optional<std::uint64_t> spp = {}) {
+  auto coordinator = open_at({});
+  JobSpec spec;
+  spec.spp = spp;
+  const JobId job = submit(*coordinator, spec);
+  FakeFarm farm(*coordinator, 1);
+  EXPECT_TRUE(farm.finish(job));
+  return pixels(*coordinator, job);
+}
+
+}  // namespace ls::coordinator

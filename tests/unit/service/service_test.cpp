@@ -1,0 +1,316 @@
+// Whole jobs through the public interface: the same pixels whatever happens on the way.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/base/log.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  FakeFarm farm(*coordinator, 2);
+
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
+  const auto r = report(*coordinator, job);
+  EXPECT_EQ(r["spp"], 16);
+  EXPECT_EQ(r["samples"], 16 * 40 * 24);
+  EXPECT_EQ(r["stopped"], "spp");
+  EXPECT_EQ(r["convergence"].size(), 4u);  // rounds of 2, 2, 4, 8 samples
+  EXPECT_EQ(r["core_seconds"], farm.results_sent * .125);
+  EXPECT_TRUE(std::filesystem::exists(dir.path() / "jobs" / job.value / "image.exr"));
+  const JobView view = coordinator->job(job).value();
+  EXPECT_EQ(view.state, JobState::done);
+  EXPECT_EQ(view.progress, 1);
+  EXPECT_EQ(view.spp_done, 16);
+  EXPECT_TRUE(view.error_now.has_value());
+}
+
+TEST(Service, ShuffledAndDuplicatedResultsGiveTheSamePixels) {
+  TempFolder dir;
+  const std::string expected = reference_pixels();
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    auto coordinator = open_at(dir.path() / std::to_string(seed));
+    const JobId job = submit(*coordinator);
+    FakeFarm farm(*coordinator, 3);
+    std::mt19937 random(seed);
+    farm.reorder = [&](auto& units) { std::shuffle(units.begin(), units.end(), random); };
+    farm.tamper = [&](UnitResult r) { return std::vector<UnitResult>(1 + random() % 3, r); };
+
+    ASSERT_TRUE(farm.finish(job));
+
+    EXPECT_EQ(pixels(*coordinator, job), expected);
+    EXPECT_TRUE(farm.refusals.empty());
+  }
+}
+
+TEST(Service, ARestartAtAnyPointLosesNothingThatCounts) {
+  const std::string expected = reference_pixels();
+  for (int k = 0; k <= 8; ++k) {
+    TempFolder dir;
+    JobId job;
+    {
+      auto coordinator = open_at(dir.path());
+      job = submit(*coordinator);
+      FakeFarm farm(*coordinator, 1);
+      farm.stop_after = k;
+      farm.finish(job);
+    }  // no shutdown: what is in flight is dropped
+    auto coordinator = open_at(dir.path());
+    ASSERT_TRUE(coordinator->job(job)) << k;
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job)) << k;
+    EXPECT_EQ(pixels(*coordinator, job), expected) << k;
+    EXPECT_LE(farm.results_sent, 8);
+  }
+}
+
+TEST(Service, ASegmentCutAtAnyByteIsRenderedAgainToTheSamePixels) {
+  const std::string expected = reference_pixels();
+  for (const double share : {0.0, .13, .5, .77, .999}) {
+    TempFolder dir;
+    JobId job;
+    {
+      auto coordinator = open_at(dir.path());
+      job = submit(*coordinator);
+      FakeFarm farm(*coordinator, 1);
+      farm.stop_after = 6;
+      farm.finish(job);
+    }
+    const auto segment = dir.path() / "jobs" / job.value / "partials-000.seg";
+    const auto size = static_cast<double>(std::filesystem::file_size(segment));
+    std::filesystem::resize_file(segment, static_cast<std::uintmax_t>(size * share));
+
+    auto coordinator = open_at(dir.path());
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(job)) << share;
+    EXPECT_EQ(pixels(*coordinator, job), expected) << share;
+  }
+}
+
+TEST(Service, AcknowledgedResultsAreNotRenderedAgainAfterARestart) {
+  TempFolder dir;
+  JobId job;
+  std::uint64_t done = 0;
+  {
+    auto coordinator = open_at(dir.path());
+    job = submit(*coordinator);
+    FakeFarm farm(*coordinator, 1);
+    farm.tamper = [&](UnitResult r) { return std::vector<UnitResult>(farm.results_sent < 5 ? 1 : 0, r); };
+    // The acknowledgement of the fifth says that all five are on the disk.
+    ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == 5; }));
+    done = coordinator->job(job)->units_done;
+  }
+  ASSERT_EQ(done, 5u);
+  auto coordinator = open_at(dir.path());
+  EXPECT_EQ(coordinator->job(job)->units_done, 5u);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_EQ(farm.results_sent, 3);  // of 2 tiles x 4 rounds
+}
+
+TEST(Service, WrongPartialsAreRefusedWithAReasonWhileTheJobGoesOn) {
+  const std::string expected = reference_pixels();
+  for (int kind = 0; kind < 4; ++kind) {
+    auto coordinator = open_at({});
+    const JobId job = submit(*coordinator);
+    FakeFarm farm(*coordinator, 2);
+    int wrong = 1;
+    farm.tamper = [&](UnitResult r) {
+      if (wrong-- <= 0) return std::vector{r};
+      if (kind == 0) r.digest = sha256("other");
+      if (kind == 1) r.exr.resize(r.exr.size() / 2);
+      if (kind == 2 || kind == 3) {
+        Partial partial = decode_partial_file(r.exr)->partial;
+        if (kind == 2) partial.header.numeric_class = sha256("another class");
+        if (kind == 3) {
+          // Past encode_partial, which checks too: the last float of the file.
+          const float nan = std::numeric_limits<float>::quiet_NaN();
+          std::memcpy(r.exr.data() + r.exr.size() - sizeof nan, &nan, sizeof nan);
+          return std::vector{r};
+        }
+        r.exr = encode_partial(partial, {40, 24}).value();
+        r.digest = unit_digest(partial);
+      }
+      return std::vector{r};
+    };
+
+    ASSERT_TRUE(farm.finish(job)) << kind;
+
+    ASSERT_EQ(farm.refusals.size(), 1u) << kind;
+    EXPECT_FALSE(farm.refusals[0].refused->message.empty());
+    EXPECT_EQ(pixels(*coordinator, job), expected) << kind;
+  }
+}
+
+TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
+  TempFolder dir;
+  for (const bool restart : {false, true}) {
+    const auto data = dir.path() / (restart ? "restart" : "live");
+    auto coordinator = open_at(data);
+    JobSpec spec;
+    spec.spp = 11;  // 12: the last round is cut
+    const JobId job = submit(*coordinator, spec);
+    {
+      FakeFarm farm(*coordinator, 1);
+      ASSERT_TRUE(farm.finish(job));
+    }
+    EXPECT_EQ(pixels(*coordinator, job), reference_pixels(12));
+    if (restart) {
+      coordinator.reset();
+      coordinator = open_at(data);
+    }
+    EXPECT_FALSE(coordinator->extend(job, 12));
+    ASSERT_TRUE(coordinator->extend(job, 70));
+    EXPECT_EQ(coordinator->job(job)->state, JobState::running);
+
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job));
+
+    EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70));
+    EXPECT_EQ(report(*coordinator, job)["spp"], 70);
+  }
+}
+
+TEST(Service, ACancelledJobIgnoresResults) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    EXPECT_TRUE(coordinator->cancel(job));
+    return std::vector{r};
+  };
+
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_EQ(coordinator->job(job)->state, JobState::cancelled);
+  EXPECT_EQ(coordinator->job(job)->units_done, 0u);
+  EXPECT_TRUE(coordinator->cancel(job));
+  EXPECT_EQ(coordinator->extend(job, 64).error().code, Errc::failed_precondition);
+}
+
+TEST(Service, AnUnknownJobIsSaidToBeSo) {
+  auto coordinator = open_at({});
+  const JobId nobody{"j-none"};
+  EXPECT_EQ(coordinator->job(nobody).error().code, Errc::not_found);
+  EXPECT_EQ(coordinator->image_exr(nobody).error().code, Errc::not_found);
+  EXPECT_EQ(coordinator->wait(nobody).error().code, Errc::not_found);
+}
+
+TEST(Service, ATargetErrorStopsTheJobAndSurvivesARestart) {
+  JobSpec spec;
+  spec.target_error = .003;
+  auto whole = open_at({});
+  const JobId at_once = submit(*whole, spec);
+  FakeFarm one(*whole, 1);
+  ASSERT_TRUE(one.finish(at_once));
+  ASSERT_EQ(report(*whole, at_once)["stopped"], "error");
+
+  TempFolder dir;
+  JobId job;
+  {
+    auto coordinator = open_at(dir.path());
+    job = submit(*coordinator, spec);
+    FakeFarm farm(*coordinator, 2);
+    farm.stop_after = 9;
+    farm.finish(job);
+  }
+  auto coordinator = open_at(dir.path());
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_EQ(pixels(*coordinator, job), pixels(*whole, at_once));
+  EXPECT_LE(report(*coordinator, job)["relmse"].get<double>(), .003);
+}
+
+TEST(Service, TwoCoordinatorsCannotShareAFolder) {
+  TempFolder dir;
+  auto first = open_at(dir.path());
+  Coordinator::Options options;
+  options.data = dir.path();
+  const auto second = Coordinator::open(options);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().message.find("another coordinator"), std::string::npos);
+}
+
+TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
+  Coordinator::Options options;
+  options.join_token = "open sesame";
+  auto coordinator = Coordinator::open(options).value();
+  WorkerHello hello;
+  hello.name = "w";
+  auto mail = std::make_shared<Mailbox>();
+  EXPECT_EQ(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).error().code, Errc::unauthenticated);
+  hello.join_token = "open sesame";
+  EXPECT_TRUE(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)));
+  ASSERT_TRUE(std::holds_alternative<Welcome>(mail->take()->second));
+}
+
+TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
+  auto coordinator = open_at({});
+  auto mail = std::make_shared<Mailbox>();
+  WorkerHello hello;
+  hello.name = "w";
+  auto first = coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).value();
+  const auto welcome = std::get<Welcome>(mail->take()->second);
+  hello.previous_id = welcome.worker;
+
+  auto second = coordinator->connect(hello, std::make_shared<MailSink>(mail, 1)).value();
+
+  const auto again = std::get<Welcome>(mail->take()->second);
+  EXPECT_EQ(again.worker, welcome.worker);
+  EXPECT_GT(again.epoch, welcome.epoch);
+  first->disconnected();
+  EXPECT_EQ(coordinator->workers().at(0).state, "connected");
+  second->disconnected();
+  EXPECT_EQ(coordinator->workers().at(0).state, "lost");
+}
+
+TEST(Service, ASceneMayOnlyNameWhatWasSentAlong) {
+  auto coordinator = open_at({});
+  std::string text = kSceneText;
+  text.replace(text.find("<shape type=\"sphere\"/>"), 22,
+               "<shape type=\"ply\"><string name=\"filename\" value=\"/etc/passwd\"/></shape>");
+  const auto refused = coordinator->submit({"evil.xml", text, {}, {}});
+  ASSERT_FALSE(refused);
+  ASSERT_FALSE(refused.error().diagnostics.empty());
+  EXPECT_EQ(refused.error().diagnostics[0].place.line, 7);
+
+  const auto missing = coordinator->submit({"a.xml", text, {{"/etc/passwd", sha256("mesh")}}, {}});
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().diagnostics.at(0).text.find(sha256("mesh").hex()), std::string::npos);
+}
+
+TEST(Service, RefusesSpecsBeyondItsLimits) {
+  auto coordinator = open_at({});
+  const auto refusal = [&](JobSpec spec) {
+    const auto id = coordinator->submit({"t.xml", kSceneText, {}, std::move(spec)});
+    return id ? "" : id.error().error.message;
+  };
+  JobSpec spec;
+  spec.spp = 1'000'000'000;
+  EXPECT_NE(refusal(spec), "");
+  spec = {};
+  spec.size = FrameSize{0, 10};
+  EXPECT_NE(refusal(spec).find("0 x 10"), std::string::npos);
+  spec.size = FrameSize{1 << 20, 1 << 20};
+  EXPECT_NE(refusal(spec), "");
+  spec = {};
+  spec.integrator = "bdpt";
+  EXPECT_NE(refusal(spec).find("volpath"), std::string::npos);
+  spec = {};
+  spec.target_error = std::nan("");
+  EXPECT_NE(refusal(spec), "");
+  EXPECT_TRUE(coordinator->jobs().empty());
+}
+
+}  // namespace
+}  // namespace ls::coordinator
