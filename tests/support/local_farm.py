@@ -1,0 +1,215 @@
+"""LocalFarm: a coordinator and N real workers as processes of this machine, on ports that the system chooses.
+
+Every system test uses it. Conditions are waited for by looking again until a deadline, never by a fixed sleep.
+"""
+
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PATIENCE = 120.0  # seconds until a condition that should come true counts as failed
+
+
+def bin_dir():
+    """Where the executables are: $LIGHTSHAFT_BIN, else the first build that has them."""
+    if "LIGHTSHAFT_BIN" in os.environ:
+        return pathlib.Path(os.environ["LIGHTSHAFT_BIN"])
+    for preset in ("release", "dev"):
+        folder = ROOT / "build" / preset / "bin"
+        if (folder / "lightshaft-coordinator").exists() and (folder / "lightshaft-worker").exists():
+            return folder
+    raise FileNotFoundError("build the project first, or set LIGHTSHAFT_BIN to the folder of its executables")
+
+
+def wait_until(condition, what, patience=PATIENCE):
+    """Returns the first true value of `condition`; AssertionError with `what` after the deadline."""
+    deadline = time.monotonic() + patience
+    while True:
+        value = condition()
+        if value:
+            return value
+        assert time.monotonic() < deadline, f"did not come true within {patience:.0f} s: {what}"
+        time.sleep(0.02)
+
+
+class HttpError(Exception):
+    def __init__(self, status, body):
+        super().__init__(f"HTTP {status}: {body}")
+        self.status, self.body = status, body
+
+
+class Process:
+    """A child process with its output in a file."""
+
+    def __init__(self, name, args, log, env=None):
+        self.name, self.args, self.log, self.env = name, [str(a) for a in args], log, env
+        self.start()
+
+    def start(self):
+        with open(self.log, "ab") as out:
+            self.popen = subprocess.Popen(self.args, stdin=subprocess.DEVNULL, stdout=out, stderr=out, env=self.env)
+
+    def signal(self, number):
+        if self.popen.poll() is None:
+            self.popen.send_signal(number)
+
+    def kill(self):
+        self.signal(signal.SIGKILL)
+        self.popen.wait()
+
+    def stop(self):
+        self.signal(signal.SIGSTOP)
+
+    def resume(self):
+        self.signal(signal.SIGCONT)
+
+    def terminate(self, patience=PATIENCE):
+        """SIGTERM; the exit code."""
+        self.signal(signal.SIGTERM)
+        return self.wait(patience)
+
+    def wait(self, patience=PATIENCE):
+        return self.popen.wait(patience)
+
+    def alive(self):
+        return self.popen.poll() is None
+
+    def output(self):
+        return pathlib.Path(self.log).read_text(errors="replace")
+
+
+class LocalFarm:
+    def __init__(self, folder=None, bin=None):
+        self.bin = pathlib.Path(bin) if bin else bin_dir()
+        self._temporary = tempfile.TemporaryDirectory(prefix="lightshaft-farm-") if folder is None else None
+        self.folder = pathlib.Path(folder or self._temporary.name)
+        self.data = self.folder / "data"
+        self.workers = []
+        self.coordinator = None
+        self.http = self.grpc = None
+        self.count = 0
+        self.start_coordinator()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        for process in self.workers + ([self.coordinator] if self.coordinator else []):
+            process.resume()
+            process.kill()
+        if error[0] is not None:
+            self.print_logs()
+        if self._temporary:
+            self._temporary.cleanup()
+
+    def print_logs(self):
+        for log in sorted(self.folder.glob("*.log")):
+            print(f"---- {log.name}\n{log.read_text(errors='replace')[-4000:]}")
+
+    # ---- the coordinator ----
+    def start_coordinator(self):
+        """Starts it, or starts it again on the same ports after it was killed or ended."""
+        (self.data / "ports.json").unlink(missing_ok=True)
+        self.coordinator = Process(
+            "coordinator",
+            [self.bin / "lightshaft-coordinator", "--http", f"127.0.0.1:{self.http or 0}",
+             "--grpc", f"127.0.0.1:{self.grpc or 0}", "--data", self.data],
+            self.folder / "coordinator.log")
+        wait_until(lambda: (self.data / "ports.json").exists() or not self.coordinator.alive(), "the coordinator listens")
+        assert self.coordinator.alive(), self.coordinator.output()
+        ports = json.loads((self.data / "ports.json").read_text())
+        self.http, self.grpc = ports["http"], ports["grpc"]
+        self.token = (self.data / "token").read_text().strip()
+        self.join_token = (self.data / "join-token").read_text().strip()
+
+    def restart_coordinator(self):
+        """kill -9 and a new one on the same folder and ports."""
+        self.coordinator.kill()
+        self.start_coordinator()
+
+    # ---- workers ----
+    def add_worker(self, *flags, threads=1, token=None, fake=True):
+        self.count += 1
+        name = f"worker-{self.count}"
+        env = dict(os.environ, LIGHTSHAFT_JOIN_TOKEN=self.join_token if token is None else token)
+        args = [self.bin / "lightshaft-worker", "--coordinator", f"127.0.0.1:{self.grpc}", "--threads", threads,
+                "--cache", self.folder / "cache" / name, "--name", name]
+        worker = Process(name, args + (["--fake"] if fake else []) + list(flags), self.folder / f"{name}.log", env)
+        self.workers.append(worker)
+        return worker
+
+    def add_workers(self, count, *flags, **options):
+        return [self.add_worker(*flags, **options) for _ in range(count)]
+
+    def wait_for_workers(self, count):
+        wait_until(lambda: sum(w["state"] == "connected" for w in self.get("/api/v1/workers")["workers"]) >= count,
+                   f"{count} workers are connected")
+
+    # ---- HTTP ----
+    def request(self, method, path, body=None, content_type="application/json", token=None):
+        request = urllib.request.Request(f"http://127.0.0.1:{self.http}{path}", data=body, method=method)
+        request.add_header("Authorization", f"Bearer {self.token if token is None else token}")
+        if body is not None:
+            request.add_header("Content-Type", content_type)
+        try:
+            with urllib.request.urlopen(request, timeout=60) as reply:
+                return reply.read()
+        except urllib.error.HTTPError as error:
+            raise HttpError(error.code, error.read().decode(errors="replace")) from None
+
+    def get(self, path):
+        return json.loads(self.request("GET", path))
+
+    def submit(self, scene, **spec):
+        """A self-contained scene (text); spec as in the HTTP contract's query. The job's id."""
+        query = "&".join(f"{key}={value}" for key, value in spec.items())
+        reply = self.request("POST", f"/api/v1/jobs?{query}", scene.encode(), "application/xml")
+        return json.loads(reply)["id"]
+
+    def job(self, job):
+        return self.get(f"/api/v1/jobs/{job}")
+
+    def wait_for_job(self, job, states=("done",), patience=PATIENCE):
+        """Waits for an end of the job; it must be one of `states`."""
+        ends = {"done", "failed", "cancelled"}
+
+        def ended():
+            view = self.job(job)
+            return view if view["state"] in ends | set(states) else None
+
+        view = wait_until(ended, f"job {job} ends", patience)
+        assert view["state"] in states, view
+        return view
+
+    def wait_for_progress(self, job, units):
+        return wait_until(lambda: (v := self.job(job))["units_done"] >= units and v, f"{units} units of {job} are done")
+
+    def report(self, job):
+        return self.get(f"/api/v1/jobs/{job}/report")
+
+    def pixels(self, job):
+        """The finished job's pixels_sha256."""
+        self.wait_for_job(job)
+        return self.report(job)["pixels_sha256"]
+
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="volpath"/>
+  <sensor type="perspective">
+    <float name="fov" value="45"/>
+    <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="96"/><integer name="height" value="64"/><rfilter type="box"/></film>
+  </sensor>
+  <shape type="sphere"><bsdf type="diffuse"/></shape>
+  <emitter type="constant"/>
+</scene>
+"""

@@ -1,0 +1,83 @@
+"""Scenes that crash, hang or eat memory in the renderer, strangers on the gRPC port, workers that may not join: each is told
+clearly, and everybody else goes on."""
+
+import os
+import socket
+
+import pytest
+from local_farm import SCENE, wait_until
+
+BAD, GOOD = 13, 5  # seeds
+
+
+@pytest.mark.parametrize("fault, reason", [
+    ("crash", "signal 11"),
+    ("hang", "hung"),
+    ("memory", "memory"),
+])
+def test_a_unit_that_brings_the_renderer_down_fails_its_job_clearly_and_no_other(farm, fault, reason):
+    flags = ("--fake-fault", f"{fault},seed={BAD},tile=2,round=1", "--hang-after", 0.5, "--memory-limit", 400_000_000)
+    farm.add_workers(2, *flags)
+    bad = farm.submit(SCENE, spp=24, seed=BAD)
+    good = farm.submit(SCENE, spp=24, seed=GOOD)
+
+    error = farm.wait_for_job(bad, states=("failed",))["error"]
+
+    assert reason in error
+    assert "64" in error and "0" in error, "tile 2 begins at pixel (64, 0)"
+    assert "--pixel 64,0" in error and "--sample" in error, "how to see it again"
+    farm.wait_for_job(good)
+    assert all(w.alive() for w in farm.workers)
+
+
+def test_garbage_on_the_grpc_port_harms_nobody(farm):
+    farm.add_worker("--fake-delay", 10)
+    job = farm.submit(SCENE, spp=24)
+    dice = os.urandom
+    preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+    for sent in (dice(4096), b"GET / HTTP/1.1\r\n\r\n", preface + dice(4096), preface + b"\x00\xff\xff\x01" + dice(64), b""):
+        with socket.create_connection(("127.0.0.1", farm.grpc), timeout=10) as stranger:
+            try:
+                stranger.sendall(sent)
+            except OSError:
+                pass  # hung up on already
+
+    farm.wait_for_job(job)
+    assert farm.coordinator.alive()
+
+
+def test_a_worker_with_a_wrong_join_token_is_refused_with_a_reason(farm):
+    stranger = farm.add_worker(token="guess")
+
+    assert stranger.wait() == 1
+    assert "token" in stranger.output()
+    assert farm.get("/api/v1/workers")["workers"] == []
+
+
+def test_a_second_coordinator_on_the_port_says_so(farm, tmp_path):
+    from local_farm import Process
+
+    second = Process("second", [farm.bin / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc",
+                                f"127.0.0.1:{farm.grpc}", "--data", tmp_path / "other"], tmp_path / "second.log")
+
+    assert second.wait() == 1
+    assert str(farm.grpc) in second.output()
+
+
+def test_a_lying_worker_or_bad_usage_is_named(farm, tmp_path):
+    from local_farm import Process
+
+    for args, word in ((["--coordinator", "nowhere"], "HOST:PORT"), (["--coordinator", "a:1", "--threads", "0"], "threads"),
+                       (["--coordinator", "a:1", "--token-file", "/nonexistent"], "/nonexistent")):
+        process = Process("bad", [farm.bin / "lightshaft-worker", *args], tmp_path / "bad.log")
+        assert process.wait() == 2
+        assert word in process.output()
+
+
+def test_a_worker_whose_stream_is_cut_comes_back_as_itself(farm):
+    worker = farm.add_worker("--fake-delay", 10)
+    farm.wait_for_workers(1)
+    farm.restart_coordinator()
+    farm.wait_for_workers(1)
+
+    assert [w["name"] for w in farm.get("/api/v1/workers")["workers"] if w["state"] == "connected"] == [worker.name]
