@@ -1,6 +1,9 @@
 """The dashboard on a real farm: coordinator and fake workers as processes, Chromium in front."""
+import json
+import urllib.parse
+
 import pytest
-from local_farm import SCENE, LocalFarm
+from local_farm import SCENE, LocalFarm, bin_dir
 
 QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"
 WITH_MESH = SCENE.replace('<shape type="sphere">', '<shape type="obj"><string name="filename" value="meshes/quad.obj"/>')
@@ -10,10 +13,12 @@ SLOW = ("--fake-delay", 150)  # milliseconds a unit: long enough to be seen in f
 @pytest.fixture
 def real_farm(tmp_path):
     try:
-        farm = LocalFarm(tmp_path / "farm")
+        bin = bin_dir()
     except FileNotFoundError as missing:
         pytest.skip(str(missing))
-    with farm:
+    folder = tmp_path / "farm"
+    folder.mkdir()
+    with LocalFarm(folder, bin) as farm:
         yield farm
 
 
@@ -134,9 +139,12 @@ def test_a_restarted_coordinator_is_found_again(real_farm, page):
 
 def test_names_from_outside_are_shown_as_text(real_farm, page):
     markup = "<img src=x onerror=document.title='stolen'>"
-    real_farm.add_worker("--name", markup)
+    real_farm.add_worker("--tags", markup)
     real_farm.wait_for_workers(1)
-    page.evaluate("void (location.hash = '#/workers')")
+    real_farm.submit(SCENE, spp=2, name=urllib.parse.quote(markup))
 
-    page.wait(f"document.querySelector('[data-worker]')?.innerText.includes({markup!r})", timeout=30)
+    page.wait(f"document.querySelector('[data-job] a')?.innerText === {json.dumps(markup)}", timeout=30)
+    page.evaluate("void (location.hash = '#/workers')")
+    page.wait(f"document.querySelector('.tag')?.innerText === {json.dumps(markup)}", timeout=30)
+
     assert page.count("main img") == 0 and "stolen" not in page.evaluate("document.title")
