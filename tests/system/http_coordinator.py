@@ -22,12 +22,11 @@ http-stop-seconds = 2
 
 
 def find_coordinator():
-    """LIGHTSHAFT_BIN names the folder of the executables; else the newest build is taken."""
-    if folder := os.environ.get("LIGHTSHAFT_BIN"):
-        path = Path(folder) / "lightshaft-coordinator"
-        return str(path) if path.exists() else None
-    built = sorted((ROOT / "build").glob("*/bin/lightshaft-coordinator"), key=lambda p: p.stat().st_mtime)
-    return str(built[-1]) if built else None
+    """In the folder that LIGHTSHAFT_BIN names, else in the first build that has it."""
+    folders = [Path(os.environ["LIGHTSHAFT_BIN"])] if "LIGHTSHAFT_BIN" in os.environ else [
+        ROOT / "build" / preset / "bin" for preset in ("release", "dev")]
+    found = [folder / "lightshaft-coordinator" for folder in folders if (folder / "lightshaft-coordinator").exists()]
+    return str(found[0]) if found else None
 
 
 class Answer:

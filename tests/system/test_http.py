@@ -200,6 +200,7 @@ def test_an_upload_cut_off_leaves_nothing(farm):
     assert farm.ask("HEAD", "/api/v1/blobs/" + sha(data)).headers["Upload-Offset"] == "0"
     assert files_under(farm.data) == before
     assert farm.ask("PUT", "/api/v1/blobs/" + sha(data), data).status == 201
+    assert len(files_under(farm.data)) == len(before) + 1
 
 
 def test_a_blob_with_another_digest_is_refused_and_leaves_nothing(farm):
