@@ -81,15 +81,17 @@ void Service::start_threads() {
 // What has been accepted is durable already and what has not been acknowledged comes again: nothing is flushed here, so
 // that a clean end and a crash are the same thing.
 Service::~Service() {
+  *alive_ = false;
   budget_.close();
   for (auto& thread : threads_) thread.request_stop();
   threads_.clear();
   const std::lock_guard lock(mutex_);
-  for (auto& [id, worker] : workers_)
+  for (auto& [id, worker] : workers_) {
     if (worker.connection && worker.connection->open) {
       worker.connection->open = false;
       worker.connection->sink->close();
     }
+  }
 }
 
 void Service::tick() {

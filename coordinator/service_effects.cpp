@@ -17,6 +17,8 @@ void Service::run_locked(Event first) {
     todo.pop_front();
     for (const Effect& effect : farm_.handle(event, now())) carry_out(effect, todo);
   }
+  // Not in the middle: what a snapshot holds must have its convergence points before it in the keeper's queue.
+  for (const EntryPtr& entry : std::exchange(folded_, {})) snapshot_if_due_locked(entry);
 }
 
 void Service::carry_out(const Effect& effect, Todo& todo) {
@@ -26,16 +28,22 @@ void Service::carry_out(const Effect& effect, Todo& todo) {
 void Service::on(const UnitsFreed& e, Todo&) {
   const auto entry = find_locked(e.job);
   if (!entry) return;
-  for (const UnitKey& unit : e.units)
+  for (const UnitKey& unit : e.units) {
+    const auto held = entry->leased.find({unit.tile, unit.round});
+    if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
+      entry->leased.erase(held);
     hub_->publish("tile", tile_event_json(e.job, unit.tile, entry->grid.rect(unit.tile), "free",
                                           round_range(unit.round).s0, e.worker.value),
                   e.job.value);
+  }
 }
 
 // The log holds it already; here only the job's clock starts.
 void Service::on(const RecordUnit& e, Todo&) {
   const auto entry = find_locked(e.unit.job);
-  if (!entry || entry->clock_zero) return;
+  if (!entry) return;
+  entry->leased.erase({e.unit.tile, e.unit.round});
+  if (entry->clock_zero) return;
   const auto figures = farm_.job(e.unit.job);
   entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : now();
 }
@@ -81,7 +89,7 @@ void Service::on(const Fold& e, Todo& todo) {
                                         e.samples.s1, ""),
                 e.unit.job.value);
   publish_progress_locked(*entry);
-  snapshot_if_due_locked(entry);
+  if (folded_.empty() || folded_.back() != entry) folded_.push_back(entry);
 }
 
 void Service::on(const DropUnwanted& e, Todo&) {
@@ -118,6 +126,7 @@ void Service::on(const JobStateChanged& e, Todo&) {
   if (e.to == JobState::cancelled || e.to == JobState::failed) {
     entry->stored.totals.render_seconds = entry->fold_seconds;
     entry->clock_zero.reset();
+    entry->leased.clear();
     if (entry->assembly) entry->assembly->forget_waiting();
     chores_.push([this, entry] { retire(entry); });
   }
@@ -156,6 +165,7 @@ void Service::on(const JobFinished& e, Todo&) {
   entry->stored.totals.render_seconds = entry->fold_seconds;
   entry->clock_zero.reset();
   entry->finishing = ++last_final_;
+  entry->leased.clear();
   if (entry->assembly) entry->assembly->forget_waiting();
   chores_.push([this, entry, number = entry->finishing] { finish(entry, number); });
 }

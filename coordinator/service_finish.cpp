@@ -43,25 +43,32 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
 }
 
 void Service::snapshot_if_due_locked(const EntryPtr& entry) {
-  if (!on_disk() || entry->snapshot_running) return;
+  if (!on_disk() || entry->snapshot_running || !entry->assembly) return;
   const std::uint64_t folds = entry->assembly->folds_since_snapshot;
   if (folds < limits::kSnapshotUnits && seconds(now() - entry->last_snapshot) < limits::kSnapshotSeconds) return;
   entry->snapshot_running = true;
-  chores_.push([this, entry] { write_snapshot(entry); });
+  entry->assembly->folds_since_snapshot = 0;
+  entry->last_snapshot = now();
+  chores_.push([this, entry, film = entry->assembly->film(), errors = entry->assembly->errors()] {
+    write_snapshot(entry, film, errors);
+    const std::lock_guard lock(mutex_);
+    entry->snapshot_running = false;
+  });
 }
 
-void Service::write_snapshot(const EntryPtr& entry) {
+void Service::write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors) {
+  const auto path = folder(entry->stored.id) / "film.snap";
+  if (const auto written = write_atomically(path, save_snapshot(film, errors, snapshot_format())); !written)
+    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+}
+
+void Service::write_snapshot_now(const EntryPtr& entry) {
   std::unique_lock lock(mutex_);
-  entry->snapshot_running = false;
   if (!entry->assembly) return;
   const Film film = entry->assembly->film();
   const RoundErrors errors = entry->assembly->errors();
-  entry->assembly->folds_since_snapshot = 0;
-  entry->last_snapshot = now();
-  const auto path = folder(entry->stored.id) / "film.snap";
   lock.unlock();
-  if (const auto written = write_atomically(path, save_snapshot(film, errors, snapshot_format())); !written)
-    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+  write_snapshot(entry, film, errors);
 }
 
 void Service::load_folded(JobEntry& entry) const {
@@ -90,7 +97,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
       if (auto done = write_atomically(where / "image.exr", image->exr); !done) return done;
       return write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
     }();
-    write_snapshot(entry);
+    write_snapshot_now(entry);
     if (!written) {
       lock.lock();
       entry->trouble = "the final image cannot be written: " + written.error().message + "; then resume the job";
@@ -103,7 +110,9 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   if (entry->finishing != number) return;  // extended meanwhile
   entry->finishing = 0;
   entry->trouble.clear();
-  entry->stored = facts.job;
+  entry->stored.state = JobState::done;
+  entry->stored.totals.spp_done = facts.job.totals.spp_done;
+  entry->stored.totals.units = facts.job.totals.units;
   if (on_disk()) entry->assembly.reset();
   persist_locked(*entry);
   log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
@@ -115,10 +124,11 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
 // A job that failed or was cancelled: what there is of it goes to the disk and out of memory.
 void Service::retire(const EntryPtr& entry) {
   if (!on_disk()) return;
-  write_snapshot(entry);
+  write_snapshot_now(entry);
   const std::lock_guard lock(mutex_);
   if (!entry->assembly) return;
   entry->stored.totals.spp_done = facts_locked(*entry).job.totals.spp_done;
+  entry->stored.totals.units = farm_.job(entry->stored.id).value_or(JobFigures{}).units_done;
   entry->assembly.reset();
   persist_locked(*entry);
 }

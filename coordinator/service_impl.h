@@ -48,6 +48,7 @@ struct JobEntry {
   std::optional<TimePoint> clock_zero;  // of the job's seconds, while it runs
   double fold_seconds = 0;              // job seconds at the last fold
   std::string trouble;                  // why it waits
+  std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;  // for people
   // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
   std::vector<std::pair<double, double>> replay;
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
@@ -59,6 +60,7 @@ struct Connection {
   Digest numeric_class;
   std::shared_ptr<WorkerSink> sink;
   bool open = true;                      // under the service's lock
+  std::shared_ptr<const std::atomic<bool>> service_lives;  // a session may outlive the service
   std::optional<std::uint64_t> first_lease;  // number of the first one assigned over it
 };
 
@@ -157,6 +159,7 @@ class Service final : public Coordinator {
   void persist_locked(const JobEntry& entry);
   void log_job(const JobId& id, std::string text);
   double elapsed_locked(const JobEntry& entry) const;
+  void note_leased_locked(JobEntry& entry, const Lease& lease, const WorkerId& worker);
   void publish_job_locked(JobEntry& entry);
   void publish_progress_locked(JobEntry& entry);
   void publish_worker_locked(const WorkerId& id, bool at_once);
@@ -164,7 +167,8 @@ class Service final : public Coordinator {
   // ---- final images and snapshots (service_finish.cpp), on the keeper thread ----
   void finish(const EntryPtr& entry, std::uint64_t number);
   void retire(const EntryPtr& entry);
-  void write_snapshot(const EntryPtr& entry);
+  void write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors);
+  void write_snapshot_now(const EntryPtr& entry);
   ReportFacts facts_locked(const JobEntry& entry) const;
   Provenance provenance_of(const StoredJob& job) const;
 
@@ -210,7 +214,9 @@ class Service final : public Coordinator {
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
   std::string store_trouble_;  // the last result that could not be stored
+  std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
   bool restoring_ = false;
+  std::shared_ptr<std::atomic<bool>> alive_ = std::make_shared<std::atomic<bool>>(true);
 
   ByteBudget budget_{limits::kMaxResultsWaiting};
   WorkQueue<Arrived> arrived_;

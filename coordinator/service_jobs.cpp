@@ -116,7 +116,8 @@ Result<void> Service::extend(const JobId& id, std::uint64_t spp) {
   const JobState state = shown_state(entry);
   if (state == JobState::failed || state == JobState::cancelled) return wrong_state(id, state, "extended");
   const bool at_end = entry.finishing != 0 || state == JobState::done;
-  const std::optional<StopReason> stopped = at_end ? entry.stored.stopped : std::optional<StopReason>{};
+  const auto cut_by = [&](StopReason reason) { return at_end && entry.stored.stopped == reason; };
+  const bool by_error = cut_by(StopReason::error), by_time = cut_by(StopReason::time);
   if (!entry.assembly) load_folded(entry);
   if (entry.dormant) {
     if (!entry.log) {
@@ -131,19 +132,19 @@ Result<void> Service::extend(const JobId& id, std::uint64_t spp) {
   }
   const std::uint64_t before = farm_.job(id).value_or(JobFigures{}).spp;
   const std::uint64_t finishing = std::exchange(entry.finishing, 0);
-  if (stopped) entry.clock_zero = now() - from_seconds(entry.stored.totals.render_seconds);
+  if (at_end) entry.clock_zero = now() - from_seconds(entry.stored.totals.render_seconds);
   run_locked(JobExtended{id, spp});
   const auto after = farm_.job(id);
   // An image cut short by its target may have fewer samples than the limit that stays its `spp`.
-  const bool taken = after && (after->spp != before || (stopped && after->state != JobState::done));
+  const bool taken = after && (after->spp != before || (at_end && after->state != JobState::done));
   if (!taken) {
-    if (stopped) entry.clock_zero.reset();
+    if (at_end) entry.clock_zero.reset();
     entry.finishing = finishing;
     return fail(Errc::invalid_argument,
                 fmt::format("job {} has {} samples per pixel already; ask for a larger total", id.value, before));
   }
-  if (stopped == StopReason::error) entry.stored.spec.target_error.reset();
-  if (stopped == StopReason::time) entry.stored.spec.time.reset();
+  if (by_error) entry.stored.spec.target_error.reset();
+  if (by_time) entry.stored.spec.time.reset();
   entry.stored.spp = entry.stored.spec.spp = even_spp(spp);
   log_job(id, fmt::format("extended to {} samples per pixel", spp));
   if (const auto put = store_->put_job(entry.stored); !put) return put;

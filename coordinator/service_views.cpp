@@ -183,19 +183,20 @@ Result<std::vector<TileView>> Service::tiles(const JobId& id) const {
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
   const std::lock_guard lock(mutex_);
-  const auto figures = farm_.job(id);
-  const bool leased = figures && figures->units_leased > 0;
   std::vector<TileView> all;
   const TileGrid& grid = shown->film.grid();
   for (TileIndex t = 0; t < grid.count(); ++t) {
-    TileView v{t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), {}};
-    if (leased)
-      for (const WorkerId& worker : farm_.tile_workers(id, t)) {
-        const auto known = workers_.find(worker);
-        v.workers.push_back(known == workers_.end() ? worker.value : known->second.hello.name);
-      }
-    all.push_back(std::move(v));
+    all.push_back({t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), {}});
   }
+  const auto entry = find_locked(id);
+  if (!entry) return all;
+  for (const auto& [unit, holders] : entry->leased)
+    for (const WorkerId& worker : holders) {
+      const auto known = workers_.find(worker);
+      const std::string& name = known == workers_.end() ? worker.value : known->second.hello.name;
+      auto& names = all[unit.first].workers;
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
   return all;
 }
 

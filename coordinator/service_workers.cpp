@@ -19,9 +19,13 @@ class Session final : public WorkerSession {
  public:
   Session(Service& service, std::shared_ptr<Connection> connection)
       : service_(service), connection_(std::move(connection)) {}
-  ~Session() override { service_.disconnected(connection_); }
-  void receive(FromWorker message) override { service_.receive(connection_, std::move(message)); }
-  void disconnected() override { service_.disconnected(connection_); }
+  ~Session() override { disconnected(); }
+  void receive(FromWorker message) override {
+    if (*connection_->service_lives) service_.receive(connection_, std::move(message));
+  }
+  void disconnected() override {
+    if (*connection_->service_lives) service_.disconnected(connection_);
+  }
 
  private:
   Service& service_;
@@ -86,6 +90,7 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   connection->epoch = ++last_epoch_;
   connection->numeric_class = hello.numeric_class;
   connection->sink = std::move(sink);
+  connection->service_lives = alive_;
   WorkerEntry& worker = workers_[id];
   if (worker.connection && worker.connection->open) {
     worker.connection->open = false;
@@ -162,11 +167,18 @@ void Service::on(const Send& e, Todo&) {
     const Lease& lease = assign->lease;
     if (!connection.first_lease) connection.first_lease = lease_number(lease.id);
     found->second.last_job = lease.job;
-    for (const LeaseUnit& unit : lease.units)
-      hub_->publish("tile", tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, e.worker.value),
-                    lease.job.value);
+    if (const auto entry = find_locked(lease.job)) note_leased_locked(*entry, lease, e.worker);
   }
   connection.sink->send(e.message);
+}
+
+void Service::note_leased_locked(JobEntry& entry, const Lease& lease, const WorkerId& worker) {
+  for (const LeaseUnit& unit : lease.units) {
+    auto& holders = entry.leased[{unit.tile, unit.round}];
+    if (std::find(holders.begin(), holders.end(), worker) == holders.end()) holders.push_back(worker);
+    hub_->publish("tile", tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, worker.value),
+                  lease.job.value);
+  }
 }
 
 void Service::on(const WorkerStateChanged& e, Todo&) {

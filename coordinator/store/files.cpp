@@ -33,7 +33,7 @@ Result<File> File::open(const std::filesystem::path& path, int flags, unsigned m
 Error errno_error(std::string_view what, const std::filesystem::path& path) {
   const int code = errno;
   const std::string reason = std::strerror(code);
-  if (code == ENOSPC || code == EDQUOT)
+  if (code == ENOSPC || code == EDQUOT || code == EFBIG)
     return {Errc::resource_exhausted, fmt::format("the disk is full: cannot {} {} ({}); free some space and try again",
                                                   what, path.string(), reason)};
   if (code == ENOENT) return {Errc::not_found, fmt::format("cannot {} {}: {}", what, path.string(), reason)};

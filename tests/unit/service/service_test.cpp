@@ -1,9 +1,13 @@
 // Whole jobs through the public interface: the same pixels whatever happens on the way.
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "common/base/log.h"
 #include "tests/unit/service/fake_farm.h"
@@ -196,6 +200,83 @@ TEST(Service, ACancelledJobIgnoresResults) {
   EXPECT_EQ(coordinator->job(job)->units_done, 0u);
   EXPECT_TRUE(coordinator->cancel(job));
   EXPECT_EQ(coordinator->extend(job, 64).error().code, Errc::failed_precondition);
+}
+
+// Read by the service's threads while the test moves it.
+class SharedClock final : public Clock {
+ public:
+  TimePoint now() const override { return TimePoint{Duration{at_.load()}}; }
+  void advance(Duration d) { at_ += d.count(); }
+
+ private:
+  std::atomic<std::int64_t> at_{0};
+};
+
+TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
+  const std::string expected = reference_pixels();
+  for (int k = 2; k <= 8; k += 2) {
+    TempFolder dir;
+    JobId job;
+    {
+      const auto clock = std::make_shared<SharedClock>();
+      Coordinator::Options options;
+      options.data = dir.path();
+      options.clock = clock;
+      auto coordinator = Coordinator::open(options).value();
+      job = submit(*coordinator);
+      FakeFarm farm(*coordinator, 1);
+      farm.tamper = [&](UnitResult r) {
+        if (farm.results_sent == k) return std::vector<UnitResult>{};
+        if (farm.results_sent == k / 2) clock->advance(std::chrono::seconds(61));
+        return std::vector{r};
+      };
+      ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == static_cast<std::uint64_t>(k); }));
+      const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+      const auto snapshot = dir.path() / "jobs" / job.value / "film.snap";
+      while (!std::filesystem::exists(snapshot) && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+      ASSERT_TRUE(std::filesystem::exists(snapshot)) << k;
+    }
+    auto coordinator = open_at(dir.path());
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(job));
+    EXPECT_EQ(pixels(*coordinator, job), expected) << k;
+    EXPECT_EQ(coordinator->convergence(job)->size(), 4u) << k;
+  }
+}
+
+TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  ::signal(SIGXFSZ, SIG_IGN);
+  farm.tamper = [&](UnitResult r) {
+    // Half of the third record finds room.
+    if (farm.results_sent == 2) {
+      const rlimit tight{2 * (r.exr.size() + 184) + 1000, before.rlim_max};
+      ::setrlimit(RLIMIT_FSIZE, &tight);
+    }
+    return std::vector<UnitResult>(farm.results_sent < 3 ? 1 : 0, r);
+  };
+  farm.run([&] { return !farm.refusals.empty(); });
+  ::setrlimit(RLIMIT_FSIZE, &before);
+
+  ASSERT_EQ(farm.refusals.size(), 1u);
+  EXPECT_EQ(farm.refusals[0].refused->code, Errc::resource_exhausted);
+  EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
+  EXPECT_NE(coordinator->job(job)->error.find("disk is full"), std::string::npos);
+  std::string why;
+  EXPECT_FALSE(coordinator->ready(&why));
+
+  // The two held back are lost with their worker.
+  farm.sessions()[0]->disconnected();
+  ASSERT_TRUE(coordinator->resume(job));
+  FakeFarm other(*coordinator, 1);
+  ASSERT_TRUE(other.finish(job));
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
+  EXPECT_TRUE(coordinator->ready(&why));
 }
 
 TEST(Service, AnUnknownJobIsSaidToBeSo) {
