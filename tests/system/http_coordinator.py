@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 20  # seconds: how long a test waits for what must come; never how long it waits in vain
 
 CONFIG = """
-http-header-seconds = 0.5
-http-body-grace-seconds = 0.5
+http-header-seconds = 1
+http-body-grace-seconds = 1
 http-min-rate = 1000000
 http-heartbeat-seconds = 0.2
 http-linger-seconds = 0.3

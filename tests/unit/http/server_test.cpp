@@ -18,9 +18,9 @@ const std::string kGet = "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n";
 
 Limits quick_limits() {
   Limits limits;
-  limits.header_seconds = 0.2;
+  limits.header_seconds = 0.5;
   limits.idle_seconds = 5;
-  limits.body_grace_seconds = 0.3;
+  limits.body_grace_seconds = 1;
   limits.min_rate = 1e5;
   limits.heartbeat_seconds = 0.1;
   limits.linger_seconds = 0.2;
