@@ -156,14 +156,15 @@ def test_a_refused_action_says_why(farm, dashboard):
 def test_tiles_in_flight_are_marked_until_they_are_folded_and_the_image_follows(farm, dashboard):
     farm.jobs["j-1"] = job()
     farm.tiles = [TILE]
+    farm.workers = {"w-1": worker("w-1", "lab-01"), "w-2": worker("w-2", "lab-02")}
     page = dashboard("#/jobs/j-1")
     page.wait("document.querySelector('[data-tile=\"1\"]') && document.querySelector('live-image').dataset.painted")
     pixel = "[...document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]"
     assert page.evaluate(pixel)[:3] == [200, 120, 40]
 
     farm.image = png(64, 48, (20, 40, 240))
-    farm.emit("tile", {"job": "j-1", "tile": 0, "rect": [0, 0, 32, 32], "state": "leased", "spp": 4, "worker": "lab-02"})
-    farm.emit("tile", {"job": "j-1", "tile": 1, "rect": [32, 0, 64, 32], "state": "folded", "spp": 8, "worker": "lab-01"})
+    farm.emit("tile", {"job": "j-1", "tile": 0, "rect": [0, 0, 32, 32], "state": "leased", "spp": 4, "worker": "w-2"})
+    farm.emit("tile", {"job": "j-1", "tile": 1, "rect": [32, 0, 64, 32], "state": "folded", "spp": 8, "worker": "w-1"})
 
     page.wait("document.querySelector('[data-tile=\"0\"]') && !document.querySelector('[data-tile=\"1\"]') && document.querySelector('.flash')")
     page.wait(f"{pixel}[2] === 240")

@@ -61,6 +61,7 @@ export const report = {
     return { seconds, core_seconds: seconds * 3.97, spp: Math.max(2, 1.147 * seconds), rmse: Math.sqrt(relmse) * 0.48, relmse, relmse_ci95: [relmse / (1 + spread), relmse * (1 + spread)] };
   }),
 };
+export const doubtful = { ...report, trusted: false, verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
 
 export const diagnostics = [
   { severity: "error", file: "bath.xml", line: 14, column: 16, text: "medium \"grid\" has no parameter 'sigmat'; did you mean 'sigma_t'?", source_line: "    <float name=\"sigmat\" value=\"2\"/>", length: 13 },

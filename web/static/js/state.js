@@ -91,8 +91,9 @@ function withWorker(state, worker) {
   return { ...state, workers, colours: worker.name ? coloured(state.colours, [worker.name]) : state.colours };
 }
 
-function withTile(state, { tile, rect, state: what, spp, worker }) {
+function withTile(state, { tile, rect, state: what, spp, worker: id }) {
   const open = state.open;
+  const worker = state.workers?.get(id)?.name ?? id; // events name workers by their id, lists by their name
   const tiles = new Map(open.tiles);
   const before = tiles.get(tile);
   const others = (before?.workers ?? []).filter((name) => name !== worker);

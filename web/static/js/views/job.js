@@ -20,7 +20,7 @@ export function jobView(state, actions) {
     h("div", { class: "columns" },
       h("div", { class: "picture" }, imagePanel(state, job, actions), downloadLinks(job)),
       h("div", { class: "facts" },
-        figures(job),
+        figures(job, state.open.report),
         h("section", { class: "panel" }, h("h2", null, "Error against time"),
           errorPlot({ convergence: state.open.report?.convergence, target: job.target_error ?? state.open.report?.target_error ?? null, picked: state.open.picked, onPick: actions.pick })),
         inFlight(state, job))));

@@ -6,11 +6,13 @@ import { workerMark } from "./pieces.js";
 
 const kListed = 12;
 
-export function figures(job) {
+/** report: its verdict says in words when the error estimate is not to be trusted yet. */
+export function figures(job, report) {
   const ci = interval(job.relmse_ci95);
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
     fact("relMSE", figure(job.relmse), ci ? [ci, h("i", { key: "ci" }, "95 % interval")] : "not known yet", "key"),
+    report?.trusted === false ? h("p", { key: "verdict", class: "verdict" }, report.verdict || "This error estimate can't be trusted yet.") : null,
     fact("Samples per pixel", spp(job.spp_done), `of ${count(job.spp)}`, "key"),
     isOver(job) ? fact("Took", duration(job.elapsed_seconds), "wall clock", "key") : fact("Time left", duration(job.eta_seconds), `${duration(job.elapsed_seconds)} so far`, "key"),
     fact("RMSE", figure(job.rmse)),

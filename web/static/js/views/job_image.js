@@ -46,7 +46,7 @@ function overlay(state, width, height) {
 /** Four corner brackets just inside a rectangle. */
 function corners([x0, y0, x1, y1]) {
   const inset = 0.04 * Math.min(x1 - x0, y1 - y0);
-  const arm = 0.26 * Math.min(x1 - x0, y1 - y0);
+  const arm = 0.2 * Math.min(x1 - x0, y1 - y0);
   const [l, t, r, b] = [x0 + inset, y0 + inset, x1 - inset, y1 - inset];
   return `M${l} ${t + arm}V${t}H${l + arm} M${r - arm} ${t}H${r}V${t + arm} M${r} ${b - arm}V${b}H${r - arm} M${l + arm} ${b}H${l}V${b - arm}`;
 }

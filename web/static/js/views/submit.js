@@ -58,11 +58,11 @@ function settingsForm(submit, actions, busy) {
     h("label", { for: `set-${name}` }, label),
     h("input", { id: `set-${name}`, name, inputmode: "decimal", autocomplete: "off", placeholder: hint, disabled: busy, ".value": submit.settings[name], oninput: actions.onSetting, ...attributes }));
   return h("form", { key: "settings", class: "panel settings", onsubmit: actions.onSubmit },
-    field("spp", "Samples per pixel", "as the scene says"),
+    field("spp", "Samples per pixel", "the scene’s"),
     field("target_error", "Stop at relMSE", "no target"),
     field("time", "Stop after seconds", "no limit"),
-    field("width", "Width", "as the scene says"),
-    field("height", "Height", "as the scene says"),
+    field("width", "Width", "the scene’s"),
+    field("height", "Height", "the scene’s"),
     h("button", { key: "go", type: "submit", class: "primary", disabled: !ready }, "Render"));
 }
 
