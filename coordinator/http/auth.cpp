@@ -1,7 +1,6 @@
 #include "coordinator/http/auth.h"
 
 #include <fmt/format.h>
-#include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
 #include <openssl/rand.h>
@@ -12,17 +11,12 @@
 
 #include "common/base/check.h"
 #include "common/base/digest.h"
+#include "common/base/secret.h"
 #include "coordinator/http/limits.h"
 #include "coordinator/http/problem.h"
 
 namespace ls::http {
 namespace {
-
-// Of digests, so that neither content nor length shows in the time it takes.
-bool equal_secret(std::string_view a, std::string_view b) {
-  const Digest da = sha256(a), db = sha256(b);
-  return CRYPTO_memcmp(da.bytes.data(), db.bytes.data(), da.bytes.size()) == 0;
-}
 
 bool iequals_prefix(std::string_view text, std::string_view lower_case_prefix) {
   if (text.size() < lower_case_prefix.size()) return false;
