@@ -1,0 +1,22 @@
+// The commands. Each adds itself to the command line and sets `action` when it is the one that was asked for;
+// main() runs it and returns its exit code.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace ls::cli {
+
+using Action = std::function<int()>;
+
+void add_render(CLI::App& app, Action& action);
+void add_inspect(CLI::App& app, Action& action);
+void add_submit(CLI::App& app, Action& action);
+void add_farm_commands(CLI::App& app,
+                       Action& action);  // jobs, show, watch, pause, resume, cancel, extend, fetch, workers
+void add_merge(CLI::App& app, Action& action);
+
+// "lightshaft 0.1.0, build ..., numeric class ..."
+std::string version_text();
+
+}  // namespace ls::cli

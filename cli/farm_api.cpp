@@ -1,0 +1,205 @@
+#include "cli/farm_api.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+
+namespace ls::cli {
+namespace {
+
+using coordinator::Rejected;
+using nlohmann::json;
+
+constexpr std::size_t kMaxShownBody = 300;
+constexpr std::size_t kDigestsPerQuestion = 10'000;
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+Result<std::string> read_token(const std::string& file) {
+  std::ifstream in(file);
+  std::string token;
+  if (!(in >> token))
+    return fail(Errc::invalid_argument, fmt::format("--token-file {}: there is no token in it", file));
+  return token;
+}
+
+Errc code_of(int status) {
+  switch (status) {
+    case 400:
+    case 413:
+    case 415:
+      return Errc::invalid_argument;
+    case 401:
+      return Errc::unauthenticated;
+    case 403:
+      return Errc::permission_denied;
+    case 404:
+      return Errc::not_found;
+    case 409:
+      return Errc::failed_precondition;
+    case 503:
+      return Errc::unavailable;
+    case 507:
+      return Errc::resource_exhausted;
+    default:
+      return Errc::internal;
+  }
+}
+
+template <class T>
+T field(const json& object, const char* key, T otherwise) {
+  const auto found = object.find(key);
+  if (found == object.end()) return otherwise;
+  if constexpr (std::is_same_v<T, std::string>) {
+    return found->is_string() ? found->template get<std::string>() : otherwise;
+  } else {
+    return found->is_number_integer() ? found->template get<T>() : otherwise;
+  }
+}
+
+Diagnostic diagnostic_of(const json& d) {
+  Diagnostic out;
+  out.severity = field<std::string>(d, "severity", "error") == "warning" ? Diagnostic::Severity::warning
+                                                                         : Diagnostic::Severity::error;
+  out.place = {field<std::string>(d, "file", ""), field(d, "line", 0), field(d, "column", 0)};
+  out.text = field<std::string>(d, "text", "");
+  out.source_line = field<std::string>(d, "source_line", "");
+  out.length = field(d, "length", 1);
+  return out;
+}
+
+tl::unexpected<Rejected> refused(Error error) { return tl::unexpected(Rejected{std::move(error), {}}); }
+
+FarmApi::Answer<HttpResponse> checked(Result<HttpResponse> response) {
+  if (!response) return refused(response.error());
+  if (response->status / 100 != 2) return tl::unexpected(problem_of(*response));
+  return std::move(*response);
+}
+
+FarmApi::Answer<json> as_json(Result<HttpResponse> response) {
+  const auto good = checked(std::move(response));
+  if (!good) return tl::unexpected(good.error());
+  json j = json::parse(good->body, nullptr, false);
+  if (!j.is_object())
+    return refused(
+        {Errc::internal, "the answer is no JSON object: is this address a Lightshaft coordinator?"});
+  return j;
+}
+
+}  // namespace
+
+Rejected problem_of(const HttpResponse& response) {
+  Rejected out;
+  out.error.code = code_of(response.status);
+  const json j = json::parse(response.body, nullptr, false);
+  if (!j.is_object()) {
+    out.error.message = fmt::format("the coordinator answered with status {}: {}", response.status,
+                                    response.body.substr(0, kMaxShownBody));
+    return out;
+  }
+  out.error.message = field<std::string>(
+      j, "detail", field<std::string>(j, "title", fmt::format("status {}", response.status)));
+  if (response.status == 401)
+    out.error.message +=
+        " (give the token with --token-file FILE or in LIGHTSHAFT_TOKEN; a coordinator keeps it in the file "
+        "`token` of its data folder)";
+  if (const auto list = j.find("diagnostics"); list != j.end() && list->is_array())
+    for (const json& d : *list)
+      if (d.is_object()) out.diagnostics.push_back(diagnostic_of(d));
+  return out;
+}
+
+void FarmOptions::add_to(CLI::App& app) {
+  app.add_option("--to", url, "the coordinator's address; also LIGHTSHAFT_URL")->type_name("URL");
+  app.add_option("--token-file", token_file, "file with the token; also LIGHTSHAFT_TOKEN, the token itself")
+      ->type_name("FILE");
+  app.add_option("--ca", ca, "certificates to trust instead of the system's; also LIGHTSHAFT_CA")
+      ->type_name("FILE");
+  app.add_flag("--json", json, "answer as JSON");
+}
+
+Result<FarmApi> FarmApi::open(const FarmOptions& options) {
+  HttpClient::Options o;
+  o.url = options.url.empty() ? environment("LIGHTSHAFT_URL") : options.url;
+  if (o.url.empty())
+    return fail(Errc::invalid_argument,
+                "where is the coordinator? Give --to URL or set LIGHTSHAFT_URL, http://localhost:8080 say");
+  o.ca = options.ca.empty() ? environment("LIGHTSHAFT_CA") : options.ca;
+  o.token = environment("LIGHTSHAFT_TOKEN");
+  if (!options.token_file.empty()) {
+    auto token = read_token(options.token_file);
+    if (!token) return tl::unexpected(token.error());
+    o.token = std::move(*token);
+  }
+  auto client = HttpClient::open(std::move(o));
+  if (!client) return tl::unexpected(client.error());
+  return FarmApi(std::move(*client));
+}
+
+FarmApi::Answer<json> FarmApi::get(const std::string& path) { return as_json(client_.request("GET", path)); }
+
+FarmApi::Answer<json> FarmApi::patch(const std::string& path, const json& body) {
+  return as_json(client_.request("PATCH", path, body.dump()));
+}
+
+FarmApi::Answer<std::string> FarmApi::get_text(const std::string& path) {
+  auto response = checked(client_.request("GET", path));
+  if (!response) return tl::unexpected(response.error());
+  return std::move(response->body);
+}
+
+FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::filesystem::path& file) {
+  const auto response = checked(client_.download(path, file));
+  if (!response) return tl::unexpected(response.error());
+  return {};
+}
+
+FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Digest& text,
+                                              const std::function<void(const std::string&)>& said) {
+  std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};  // null: the scene's text
+  for (const auto& [name, file] : scene.files) by_digest.emplace(file.digest.hex(), &file);
+  for (auto next = by_digest.begin(); next != by_digest.end();) {
+    json question{{"digests", json::array()}};
+    for (; next != by_digest.end() && question["digests"].size() < kDigestsPerQuestion; ++next)
+      question["digests"].push_back(next->first);
+    const auto answer = as_json(client_.request("POST", "/api/v1/blobs/missing", question.dump()));
+    if (!answer) return tl::unexpected(answer.error());
+    for (const json& missing : answer->value("missing", json::array())) {
+      const auto found = missing.is_string() ? by_digest.find(missing.get<std::string>()) : by_digest.end();
+      if (found == by_digest.end()) continue;
+      const std::string path = "/api/v1/blobs/" + found->first;
+      if (found->second) said(fmt::format("sending {}", found->second->path.string()));
+      const auto put =
+          checked(found->second ? client_.upload(path, found->second->path)
+                                : client_.request("PUT", path, scene.text, "application/octet-stream"));
+      if (!put) return tl::unexpected(put.error());
+    }
+  }
+  return {};
+}
+
+FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& spec,
+                                      const std::function<void(const std::string&)>& said) {
+  const Digest text = sha256(scene.text);
+  if (auto sent = upload_missing(scene, text, said); !sent) return tl::unexpected(sent.error());
+  json body{{"scene", text.hex()}, {"assets", json::object()}, {"name", scene.name}};
+  for (const auto& [name, file] : scene.files) body["assets"][name] = file.digest.hex();
+  body["spec"] = json::parse(canonical_json(spec), nullptr, false);
+  return as_json(
+      client_.request("POST", "/api/v1/jobs", body.dump(-1, ' ', false, json::error_handler_t::replace)));
+}
+
+std::string job_path(const std::string& id) {
+  std::string path = "/api/v1/jobs/";
+  for (const unsigned char c : id)
+    path += std::isalnum(c) || c == '-' || c == '_' || c == '.' ? std::string(1, static_cast<char>(c))
+                                                                : fmt::format("%{:02X}", c);
+  return path;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,52 @@
+// A coordinator's HTTP interface as calls: addresses and tokens from options and environment, problem details
+// as errors.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/http_client.h"
+#include "cli/local_scene.h"
+#include "coordinator/service.h"
+
+namespace ls::cli {
+
+struct FarmOptions {
+  std::string url, token_file, ca;
+  bool json = false;
+  void add_to(CLI::App& app);
+};
+
+class FarmApi {
+ public:
+  template <class T>
+  using Answer = tl::expected<T, coordinator::Rejected>;
+  using Json = nlohmann::json;
+
+  static Result<FarmApi> open(const FarmOptions& options);
+
+  Answer<Json> get(const std::string& path);
+  Answer<Json> patch(const std::string& path, const Json& body);
+  Answer<std::string> get_text(const std::string& path);
+  Answer<void> download(const std::string& path, const std::filesystem::path& file);
+
+  // Uploads what the coordinator lacks of the scene and its files, then makes the job. `said` is told of each
+  // upload.
+  Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
+                      const std::function<void(const std::string&)>& said);
+
+ private:
+  explicit FarmApi(HttpClient client) : client_(std::move(client)) {}
+  Answer<void> upload_missing(const LocalScene& scene, const Digest& text,
+                              const std::function<void(const std::string&)>& said);
+  HttpClient client_;
+};
+
+std::string job_path(const std::string& id);  // "/api/v1/jobs/ID", escaped
+
+// A response of an error status as an error, with the diagnostics inside if there are some.
+coordinator::Rejected problem_of(const HttpResponse& response);
+
+}  // namespace ls::cli

@@ -1,0 +1,122 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "cli/commands.h"
+#include "cli/farm_api.h"
+#include "cli/farm_tables.h"
+#include "cli/farm_wait.h"
+#include "cli/job_options.h"
+#include "cli/output_file.h"
+#include "cli/say.h"
+#include "common/job/limits.h"
+
+namespace ls::cli {
+namespace {
+
+using nlohmann::json;
+
+struct Flags {
+  FarmOptions farm;
+  std::string id, spp, out, report;
+  bool quiet = false;
+};
+using Run = int (*)(FarmApi& api, const Flags& flags);
+
+std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
+
+int show_answer(const FarmApi::Answer<json>& answer, const Flags& flags, std::string (*table)(const json&)) {
+  if (!answer) return say_rejected(answer.error());
+  print(flags.farm.json ? dump(*answer) : table(*answer));
+  return kOk;
+}
+
+int jobs(FarmApi& api, const Flags& flags) { return show_answer(api.get("/api/v1/jobs"), flags, jobs_table); }
+int workers(FarmApi& api, const Flags& flags) {
+  return show_answer(api.get("/api/v1/workers"), flags, workers_table);
+}
+int show(FarmApi& api, const Flags& flags) {
+  return show_answer(api.get(job_path(flags.id)), flags, job_text);
+}
+
+int change(FarmApi& api, const Flags& flags, const json& body) {
+  const auto job = api.patch(job_path(flags.id), body);
+  if (!job) return say_rejected(job.error());
+  print(flags.farm.json ? dump(*job) : fmt::format("{} {}", flags.id, job->value("state", "")));
+  return kOk;
+}
+int pause(FarmApi& api, const Flags& flags) { return change(api, flags, {{"state", "paused"}}); }
+int resume(FarmApi& api, const Flags& flags) { return change(api, flags, {{"state", "running"}}); }
+int cancel(FarmApi& api, const Flags& flags) { return change(api, flags, {{"state", "cancelled"}}); }
+
+int extend(FarmApi& api, const Flags& flags) {
+  const auto spp = parse_whole("--spp", flags.spp, 1, kMaxSpp);
+  if (!spp) return say_error(spp.error());
+  return change(api, flags, {{"spp", *spp}});
+}
+
+int watch(FarmApi& api, const Flags& flags) {
+  const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json});
+  if (!end) return say_rejected(end.error());
+  if (const int code = say_end(*end); code != kOk) return code;
+  if (!flags.farm.json) print(job_text(*end));
+  return kOk;
+}
+
+int fetch(FarmApi& api, const Flags& flags) {
+  for (const auto& [option, file, what] :
+       {std::tuple("-o", flags.out, "/image.exr"), std::tuple("--report", flags.report, "/report")}) {
+    if (file.empty()) continue;
+    if (const auto ok = check_output(option, file); !ok) return say_error(ok.error());
+    if (const auto got = api.download(job_path(flags.id) + what, file); !got)
+      return say_rejected(got.error());
+    if (flags.farm.json) print(json{{"file", file}}.dump(-1, ' ', false, json::error_handler_t::replace));
+  }
+  return kOk;
+}
+
+CLI::App* add(CLI::App& app, Action& action, const char* name, const char* help, Run run,
+              const std::shared_ptr<Flags>& flags, bool of_a_job) {
+  CLI::App* command = app.add_subcommand(name, help);
+  flags->farm.add_to(*command);
+  if (of_a_job)
+    command->add_option("id", flags->id, "the job's id, as `submit` and `jobs` print it")
+        ->required()
+        ->type_name("ID");
+  command->callback([flags, run, &action] {
+    action = [flags, run] {
+      auto api = FarmApi::open(flags->farm);
+      return api ? run(*api, *flags) : say_error(api.error());
+    };
+  });
+  return command;
+}
+
+}  // namespace
+
+void add_farm_commands(CLI::App& app, Action& action) {
+  const auto plain = [&](const char* name, const char* help, Run run, bool of_a_job) {
+    add(app, action, name, help, run, std::make_shared<Flags>(), of_a_job);
+  };
+  plain("jobs", "the jobs of a farm", jobs, false);
+  plain("show", "one job", show, true);
+  auto watching = std::make_shared<Flags>();
+  add(app, action, "watch", "follow a job until it ends", watch, watching, true)
+      ->add_flag("--quiet", watching->quiet, "no progress bar");
+  plain("pause", "hand out no more of a job", pause, true);
+  plain("resume", "go on with a paused job", resume, true);
+  plain("cancel", "end a job for good", cancel, true);
+  auto extending = std::make_shared<Flags>();
+  add(app, action, "extend", "more samples for a job, done or not", extend, extending, true)
+      ->add_option("--spp", extending->spp, "the new total per pixel")
+      ->required()
+      ->type_name("TOTAL");
+  auto fetching = std::make_shared<Flags>();
+  CLI::App* fetch_command =
+      add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
+  fetch_command->add_option("-o,--output", fetching->out, "the image")->required()->type_name("OUT.exr");
+  fetch_command->add_option("--report", fetching->report, "its report, too")->type_name("REPORT.json");
+  plain("workers", "the workers of a farm", workers, false);
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,117 @@
+#include "cli/farm_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "cli/say.h"
+
+namespace ls::cli {
+namespace {
+
+using nlohmann::json;
+using Row = std::vector<std::string>;
+
+// What comes from elsewhere must not move the cursor or colour the terminal.
+std::string plain(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return text;
+}
+
+std::string text(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? plain(found->get<std::string>()) : "";
+}
+
+std::string number(const json& object, const char* key, const char* format) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? fmt::format(fmt::runtime(format), found->get<double>())
+                                                     : "-";
+}
+
+std::string time_of(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? show_seconds(found->get<double>()) : "-";
+}
+
+std::string percent(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? fmt::format("{:.0f} %", 100 * found->get<double>())
+                                                     : "-";
+}
+
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths;
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (widths.size() <= i) widths.push_back(0);
+      widths[i] = std::max(widths[i], row[i].size());
+    }
+  std::string out;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += fmt::format("{:<{}}", row[i], i + 1 < row.size() ? widths[i] + 2 : 0);
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += (out.empty() ? "" : "\n") + line;
+  }
+  return out;
+}
+
+std::vector<json> objects(const json& answer, const char* key) {
+  std::vector<json> all;
+  if (const auto list = answer.find(key); list != answer.end() && list->is_array())
+    std::copy_if(list->begin(), list->end(), std::back_inserter(all),
+                 [](const json& j) { return j.is_object(); });
+  return all;
+}
+
+}  // namespace
+
+std::string jobs_table(const json& answer) {
+  std::vector<Row> rows{{"ID", "STATE", "DONE", "SPP", "RELMSE", "LEFT", "NAME"}};
+  for (const json& job : objects(answer, "jobs"))
+    rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
+                    number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
+                    time_of(job, "eta_seconds"), text(job, "name")});
+  return rows.size() == 1 ? "no jobs" : table(rows);
+}
+
+std::string workers_table(const json& answer) {
+  std::vector<Row> rows{{"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "JOB", "ACTIVITY"}};
+  for (const json& w : objects(answer, "workers")) {
+    const auto rss = w.find("rss_bytes");
+    rows.push_back({text(w, "name"), text(w, "state"), number(w, "threads", "{:.0f}"),
+                    number(w, "units_done", "{:.0f}"), time_of(w, "cpu_seconds"),
+                    rss != w.end() && rss->is_number_unsigned() ? show_bytes(rss->get<std::uint64_t>()) : "-",
+                    time_of(w, "last_seen_seconds"), text(w, "job"), text(w, "activity")});
+  }
+  return rows.size() == 1 ? "no workers" : table(rows);
+}
+
+std::string job_text(const json& job) {
+  std::vector<Row> rows{{"job", text(job, "id")}, {"name", text(job, "name")}, {"state", text(job, "state")}};
+  if (const std::string stopped = text(job, "stopped"); !stopped.empty())
+    rows.push_back({"stopped by", stopped});
+  rows.push_back({"done", percent(job, "progress")});
+  rows.push_back(
+      {"samples per pixel", number(job, "spp_done", "{:.6g}") + " of " + number(job, "spp", "{:.0f}")});
+  rows.push_back({"RMSE", number(job, "rmse", "{:.4g}")});
+  std::string relmse = number(job, "relmse", "{:.4g}");
+  if (const auto ci = job.find("relmse_ci95");
+      ci != job.end() && ci->is_array() && ci->size() == 2 && (*ci)[0].is_number() && (*ci)[1].is_number())
+    relmse += fmt::format(" ({:.4g} to {:.4g})", (*ci)[0].get<double>(), (*ci)[1].get<double>());
+  rows.push_back({"relMSE", relmse});
+  rows.push_back({"time", time_of(job, "elapsed_seconds")});
+  rows.push_back({"core time", time_of(job, "core_seconds")});
+  rows.push_back({"left", time_of(job, "eta_seconds")});
+  if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
+  if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
+    for (const json& warning : *warnings)
+      if (warning.is_string()) rows.push_back({"warning", plain(warning.get<std::string>())});
+  return table(rows);
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,196 @@
+#include "cli/http_client.h"
+
+#include <curl/curl.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <mutex>
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr long kConnectSeconds = 15;
+constexpr long kStallSeconds = 60;  // without a byte
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using FilePtr = std::unique_ptr<std::FILE, CloseFile>;
+struct FreeList {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+using Headers = std::unique_ptr<curl_slist, FreeList>;
+
+void add(Headers& headers, const std::string& line) {
+  headers.reset(curl_slist_append(headers.release(), line.c_str()));
+}
+
+// What an answer's body goes to: a file if it is a success and one is wanted.
+struct Receiver {
+  CURL* curl = nullptr;
+  HttpResponse* response = nullptr;
+  std::FILE* file = nullptr;
+  bool too_large = false, write_failed = false;
+
+  static std::size_t receive(char* data, std::size_t size, std::size_t count, void* self_pointer) {
+    auto& self = *static_cast<Receiver*>(self_pointer);
+    const std::size_t bytes = size * count;
+    long status = 0;
+    curl_easy_getinfo(self.curl, CURLINFO_RESPONSE_CODE, &status);
+    if (self.file && status / 100 == 2) {
+      self.write_failed = std::fwrite(data, 1, bytes, self.file) != bytes;
+      return self.write_failed ? 0 : bytes;
+    }
+    self.too_large = self.response->body.size() + bytes > HttpClient::kMaxAnswerBytes;
+    if (self.too_large) return 0;
+    self.response->body.append(data, bytes);
+    return bytes;
+  }
+};
+
+std::size_t read_file_chunk(char* data, std::size_t size, std::size_t count, void* file) {
+  return std::fread(data, 1, size * count, static_cast<std::FILE*>(file));
+}
+
+Result<void> check_url(const std::string& url) {
+  const auto wrong = [&](std::string_view why) {
+    return fail(Errc::invalid_argument, fmt::format("the coordinator's address '{}' {}", url, why));
+  };
+  if (!url.starts_with("http://") && !url.starts_with("https://"))
+    return wrong("must begin with http:// or https://");
+  if (std::any_of(url.begin(), url.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; }))
+    return wrong("has spaces or control characters");
+  return {};
+}
+
+}  // namespace
+
+struct HttpClient::State {
+  Options options;
+  CURL* curl = nullptr;
+  ~State() { curl_easy_cleanup(curl); }
+
+  Result<HttpResponse> perform(const std::string& path, const Headers& headers, std::FILE* save);
+  void set_common(const std::string& url, const Headers& headers);
+  Headers headers() const {
+    Headers list;
+    if (!options.token.empty()) add(list, "Authorization: Bearer " + options.token);
+    return list;
+  }
+};
+
+Result<HttpClient> HttpClient::open(Options options) {
+  while (options.url.ends_with('/')) options.url.pop_back();
+  if (auto ok = check_url(options.url); !ok) return tl::unexpected(ok.error());
+  if (std::any_of(options.token.begin(), options.token.end(),
+                  [](unsigned char c) { return c <= ' ' || c >= 0x7f; }))
+    return fail(Errc::invalid_argument, "the token has characters that a token cannot have");
+  std::error_code error;
+  if (!options.ca.empty() && !fs::exists(options.ca, error))
+    return fail(Errc::invalid_argument, fmt::format("there is no CA file {}", options.ca));
+  static std::once_flag once;
+  std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
+  auto state = std::make_unique<State>();
+  state->options = std::move(options);
+  state->curl = curl_easy_init();
+  if (!state->curl) return fail(Errc::internal, "libcurl cannot be started");
+  return HttpClient(std::move(state));
+}
+
+HttpClient::HttpClient(std::unique_ptr<State> state) : state_(std::move(state)) {}
+HttpClient::HttpClient(HttpClient&&) noexcept = default;
+HttpClient::~HttpClient() = default;
+
+void HttpClient::State::set_common(const std::string& url, const Headers& headers) {
+  curl_easy_setopt(curl, CURLOPT_URL, url.c_str());
+  curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers.get());
+  curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
+  curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+  curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
+  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, kStallSeconds);
+  if (!options.ca.empty()) curl_easy_setopt(curl, CURLOPT_CAINFO, options.ca.c_str());
+}
+
+Result<HttpResponse> HttpClient::State::perform(const std::string& path, const Headers& headers,
+                                                std::FILE* save) {
+  const std::string url = options.url + path;
+  HttpResponse response;
+  Receiver receiver{curl, &response, save};
+  char problem[CURL_ERROR_SIZE] = "";
+  set_common(url, headers);
+  curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, &Receiver::receive);
+  curl_easy_setopt(curl, CURLOPT_WRITEDATA, &receiver);
+  curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, problem);
+  const CURLcode code = curl_easy_perform(curl);
+  long status = 0;
+  char* type = nullptr;
+  curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
+  curl_easy_getinfo(curl, CURLINFO_CONTENT_TYPE, &type);
+  response.status = static_cast<int>(status);
+  if (type) response.content_type = type;
+  curl_easy_reset(curl);  // of options; the connection stays
+  if (code == CURLE_OK) return response;
+  if (receiver.too_large)
+    return fail(Errc::resource_exhausted,
+                fmt::format("the answer to {} is larger than {} bytes", path, kMaxAnswerBytes));
+  if (receiver.write_failed)
+    return fail(Errc::resource_exhausted, "the answer cannot be written: is the disk full?");
+  // An upload that was refused midway: the answer says more than the broken connection.
+  if (code == CURLE_SEND_ERROR && status >= 400) return response;
+  return fail(Errc::unavailable, fmt::format("{} cannot be reached: {}", options.url,
+                                             *problem ? problem : curl_easy_strerror(code)));
+}
+
+Result<HttpResponse> HttpClient::request(std::string_view method, const std::string& path,
+                                         std::string_view body, std::string_view content_type) {
+  Headers headers = state_->headers();
+  const std::string verb(method);
+  CURL* curl = state_->curl;
+  if (verb != "GET") {
+    add(headers, fmt::format("Content-Type: {}", content_type));
+    curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body.size()));
+    curl_easy_setopt(curl, CURLOPT_COPYPOSTFIELDS, body.empty() ? "" : body.data());
+    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, verb.c_str());
+  }
+  return state_->perform(path, headers, nullptr);
+}
+
+Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file) {
+  const FilePtr source(std::fopen(file.c_str(), "rbe"));
+  std::error_code error;
+  const auto bytes = fs::file_size(file, error);
+  if (!source || error) return fail(Errc::not_found, fmt::format("{} cannot be read", file.string()));
+  Headers headers = state_->headers();
+  add(headers, "Content-Type: application/octet-stream");
+  CURL* curl = state_->curl;
+  curl_easy_setopt(curl, CURLOPT_UPLOAD, 1L);
+  curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes));
+  curl_easy_setopt(curl, CURLOPT_READFUNCTION, &read_file_chunk);
+  curl_easy_setopt(curl, CURLOPT_READDATA, source.get());
+  return state_->perform(path, headers, nullptr);
+}
+
+Result<HttpResponse> HttpClient::download(const std::string& path, const fs::path& file) {
+  const fs::path aside = file.string() + ".part";
+  FilePtr target(std::fopen(aside.c_str(), "wbe"));
+  if (!target) return fail(Errc::unavailable, fmt::format("{} cannot be written", aside.string()));
+  auto response = state_->perform(path, state_->headers(), target.get());
+  const bool closed = std::fclose(target.release()) == 0;
+  std::error_code error;
+  if (response && response->status / 100 == 2 && closed) {
+    fs::rename(aside, file, error);
+    if (!error) return response;
+  }
+  std::error_code ignored;
+  fs::remove(aside, ignored);
+  if (!response || response->status / 100 != 2) return response;
+  return fail(Errc::resource_exhausted,
+              fmt::format("{} cannot be written{}", file.string(), error ? ": " + error.message() : ""));
+}
+
+}  // namespace ls::cli

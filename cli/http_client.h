@@ -1,0 +1,51 @@
+// The one door to libcurl: requests to a coordinator's HTTP interface, one connection that is kept.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/base/error.h"
+
+namespace ls::cli {
+
+struct HttpResponse {
+  int status = 0;
+  std::string content_type;
+  std::string body;
+};
+
+class HttpClient {
+ public:
+  struct Options {
+    std::string url;    // "https://farm.example:8080"; http or https, with or without a path before /api
+    std::string token;  // sent as a bearer token; may be empty
+    std::string ca;     // file of certificates to trust instead of the system's; may be empty
+  };
+  // invalid_argument: the address, the token or the CA file can't be used.
+  static Result<HttpClient> open(Options options);
+  ~HttpClient();
+  HttpClient(HttpClient&&) noexcept;
+
+  // `path` begins with "/". Errors: unavailable (no connection, cut off, no certificate that is trusted: the
+  // message says which), resource_exhausted (the answer is larger than kMaxAnswerBytes). Any status is a
+  // response.
+  Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
+                               std::string_view content_type = "application/json");
+  // PUTs the bytes of a file, without holding them in memory.
+  Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file);
+  // Writes a 2xx answer's body to `file` by way of a temporary one beside it; of other answers the body is
+  // returned.
+  Result<HttpResponse> download(const std::string& path, const std::filesystem::path& file);
+
+  static constexpr std::size_t kMaxAnswerBytes = std::size_t{256} << 20;
+
+ private:
+  struct State;
+  explicit HttpClient(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace ls::cli

@@ -1,0 +1,36 @@
+// The options that `render` and `submit` share: what a job is asked for.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/job/settings.h"
+
+namespace ls::cli {
+
+// Numbers are kept as text until parse(), so that the messages are ours.
+struct JobOptions {
+  std::string spp, target_error, time, seed, size, integrator, priority;
+  std::vector<std::string> aov, defines, tags;
+  bool float_output = false;
+  bool strict = false;
+
+  void add_to(CLI::App& app);
+  // invalid_argument names the option, what was given and what is right.
+  Result<JobSpec> parse() const;
+};
+
+// "--spp 64" and the like. `what` is the option's name, for the message.
+Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
+                                  std::uint64_t most);
+Result<double> parse_positive(const std::string& what, const std::string& text, double most);
+Result<FrameSize> parse_size(const std::string& text);             // "640x360"
+Result<std::pair<int, int>> parse_pixel(const std::string& text);  // "12,34"
+Result<std::map<std::string, std::string>> parse_defines(
+    const std::vector<std::string>& defines);  // "name=value"
+
+}  // namespace ls::cli

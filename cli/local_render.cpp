@@ -1,0 +1,191 @@
+#include "cli/local_render.h"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "cli/interrupt.h"
+#include "cli/local_farm.h"
+#include "cli/local_world.h"
+#include "cli/output_file.h"
+#include "cli/partial_dir.h"
+#include "cli/progress.h"
+#include "cli/report.h"
+#include "cli/say.h"
+#include "cli/true_error.h"
+#include "common/image/exr_file.h"
+#include "worker/render/thread_limit.h"
+
+namespace ls::cli {
+namespace {
+
+using coordinator::JobState;
+using coordinator::JobView;
+
+constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
+
+// What is kept of the units besides the image. add() runs on the agent's thread; the rest before or after it.
+struct Keepers {
+  std::optional<PartialDir> partials;
+  std::optional<TrueError> truth;
+  std::mutex mutex;
+  std::optional<Error> trouble;  // the first; guarded by mutex
+
+  Result<void> add(const UnitResult& result) {
+    if (partials)
+      if (auto kept = partials->keep(result); !kept) return kept;
+    if (!truth) return {};
+    auto file = decode_partial_file(result.exr);
+    if (!file) return tl::unexpected(file.error());
+    return truth->add(result.unit.tile, result.unit.round, std::move(file->partial));
+  }
+};
+
+Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options, const JobView& job) {
+  if (options.partial_dir) {
+    auto folder = PartialDir::open(*options.partial_dir);
+    if (!folder) return tl::unexpected(folder.error());
+    keepers.partials = std::move(*folder);
+  }
+  if (options.reference) {
+    auto image = read_exr_rgb(*options.reference);
+    if (!image) return fail(Errc::invalid_argument, fmt::format("--reference: {}", image.error().message));
+    auto truth = TrueError::make({job.size, job.tile}, std::move(*image));
+    if (!truth)
+      return fail(truth.error().code,
+                  fmt::format("--reference {}: {}", options.reference->string(), truth.error().message));
+    keepers.truth = std::move(*truth);
+  }
+  return {};
+}
+
+ProgressFigures figures_of(const JobView& job) {
+  const double samples = job.spp_done * job.size.width * job.size.height;
+  return {std::string(to_string(job.state)),
+          job.progress,
+          job.spp_done,
+          job.elapsed_seconds > 0 ? samples / job.elapsed_seconds : 0,
+          job.error_now ? std::optional(job.error_now->relmse) : std::nullopt,
+          job.eta_seconds,
+          {}};
+}
+
+void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {
+  ProgressBar bar(quiet);
+  std::jthread shower;
+  if (bar.shown())
+    shower = std::jthread([&](const std::stop_token& token) {
+      std::mutex mutex;
+      std::condition_variable_any woken;
+      std::unique_lock lock(mutex);
+      while (!woken.wait_for(lock, token, kProgressPeriod, [&] { return token.stop_requested(); }) &&
+             !token.stop_requested())
+        if (const auto job = coordinator.job(id)) bar.show(figures_of(*job));
+    });
+  (void)coordinator.wait(id);
+}
+
+class LocalRender {
+ public:
+  LocalRender(const LocalScene& scene, const LocalRenderOptions& options)
+      : scene_(scene), options_(options) {}
+
+  int run() {
+    const auto limit = render::limit_threads(options_.threads);
+    auto farm = LocalFarm::open({options_.threads, options_.isolate});
+    if (!farm) return say_error(farm.error());
+    farm_ = std::move(*farm);
+    auto submitted = farm_->submit(scene_, options_.spec);
+    if (!submitted) return say_rejected(submitted.error());
+    job_ = std::move(*submitted);
+    const auto view = farm_->coordinator().job(job_);
+    if (!view) return say_error(view.error());
+    for (const std::string& warning : view->warnings)
+      fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
+    if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
+    if (const auto opened = open_keepers(keepers_, options_, *view); !opened)
+      return say_error(opened.error());
+    if (const auto started = start(); !started) return say_error(started.error());
+    wait_with_progress(farm_->coordinator(), job_, options_.quiet);
+    farm_->stop();
+    return finish();
+  }
+
+ private:
+  Result<void> start() {
+    interrupt_.on_signal([this] { (void)farm_->coordinator().cancel(job_); });
+    if (!keepers_.partials && !keepers_.truth) return farm_->start({});
+    return farm_->start([this](const UnitResult& result) {
+      const auto kept = keepers_.add(result);
+      if (kept) return;
+      {
+        const std::lock_guard lock(keepers_.mutex);
+        if (!keepers_.trouble) keepers_.trouble = kept.error();
+      }
+      (void)farm_->coordinator().cancel(job_);
+    });
+  }
+
+  int finish() {
+    const auto view = farm_->coordinator().job(job_);
+    if (!view) return say_error(view.error());
+    if (keepers_.trouble) return say_error(*keepers_.trouble);
+    if (const auto error = farm_->agent_error()) return say_error(*error);
+    if (view->state == JobState::failed) {
+      if (const auto fault = farm_->scene_fault()) return say_rejected(cli::scene_fault(scene_, *fault));
+      return say_error({Errc::internal, view->error});
+    }
+    const bool cut = view->state != JobState::done;
+    if (cut && view->spp_done == 0) {
+      say("lightshaft: interrupted before anything was rendered: no image is written");
+      return kFailed;
+    }
+    if (const auto written = write_results(cut); !written)
+      return say_error(Error{Errc::unavailable, written.error().message});
+    if (cut) say(fmt::format("lightshaft: interrupted: {} holds what there was", options_.out.string()));
+    return cut ? kFailed : kOk;
+  }
+
+  Result<void> write_results(bool cut) {
+    coordinator::Coordinator& coordinator = farm_->coordinator();
+    const auto image = coordinator.image_exr(job_);
+    if (!image) return tl::unexpected(image.error());
+    if (auto written = write_output(options_.out, *image); !written) return written;
+    const auto tiles = coordinator.tiles(job_);
+    if (!tiles) return tl::unexpected(tiles.error());
+    std::vector<RoundIndex> folded;
+    for (const auto& tile : *tiles) folded.push_back(tile.rounds_folded);
+    if (keepers_.partials)
+      if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
+    const auto told = coordinator.report_json(job_);
+    if (!told) return tl::unexpected(told.error());
+    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut, {}};
+    if (keepers_.truth) facts.true_error = keepers_.truth->points(folded);
+    const auto report = local_report(*told, facts);
+    if (!report) return tl::unexpected(report.error());
+    if (options_.report)
+      if (auto written = write_output(*options_.report, *report); !written) return written;
+    if (options_.quiet) return {};
+    say(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
+    print("pixels_sha256 " + pixels_digest(*report));
+    return {};
+  }
+
+  const LocalScene& scene_;
+  const LocalRenderOptions& options_;
+  Interrupt interrupt_;  // before anything that has threads
+  Keepers keepers_;
+  std::unique_ptr<LocalFarm> farm_;
+  JobId job_;
+};
+
+}  // namespace
+
+int render_locally(const LocalScene& scene, const LocalRenderOptions& options) {
+  return LocalRender(scene, options).run();
+}
+
+}  // namespace ls::cli

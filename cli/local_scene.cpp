@@ -1,0 +1,89 @@
+#include "cli/local_scene.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "common/scene/folder_assets.h"
+#include "common/scene/limits.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder that remembers what was asked of it.
+class RecordedFolder final : public AssetSource {
+ public:
+  explicit RecordedFolder(fs::path folder) : folder_(std::move(folder)) {}
+
+  Result<Asset> find(std::string_view name) override {
+    auto asset = folder_.find(name);
+    if (asset)
+      if (const auto path = folder_.path_of(name))
+        files_.insert_or_assign(std::string(name), LocalFile{*path, asset->digest, asset->bytes});
+    return asset;
+  }
+  Result<std::string> text(std::string_view name) override {
+    auto text = folder_.text(name);
+    if (text)
+      if (const auto asset = find(name); !asset) return tl::unexpected(asset.error());
+    return text;
+  }
+  std::map<std::string, LocalFile> take_files() { return std::move(files_); }
+
+ private:
+  FolderAssets folder_;
+  std::map<std::string, LocalFile> files_;
+};
+
+tl::unexpected<coordinator::Rejected> refused(const std::string& path, std::string text) {
+  Diagnostic d;
+  d.place.file = path;
+  d.text = std::move(text);
+  return tl::unexpected(coordinator::Rejected{{Errc::invalid_argument, d.text}, {std::move(d)}});
+}
+
+tl::expected<std::string, coordinator::Rejected> read_text(const std::string& path) {
+  std::error_code error;
+  const auto status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) return refused(path, "there is no such file");
+  if (error) return refused(path, "cannot be opened: " + error.message());
+  if (status.type() != fs::file_type::regular) return refused(path, "is not a regular file");
+  const auto bytes = fs::file_size(path, error);
+  if (!error && bytes > scene::kMaxTextBytes)
+    return refused(path, fmt::format("has {} bytes; a scene file may have {}", bytes, scene::kMaxTextBytes));
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return refused(path, "cannot be read");
+  return text;
+}
+
+}  // namespace
+
+tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
+    const std::string& path, const std::map<std::string, std::string>& defines, bool strict) {
+  auto text = read_text(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  RecordedFolder folder(fs::path(path).parent_path());
+  ReadResult read = read_scene(path, *text, folder, {defines, strict});
+  if (!read.scene)
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
+  return LocalScene{path, std::move(*text), std::move(*read.scene), std::move(read.diagnostics),
+                    folder.take_files()};
+}
+
+coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec) {
+  coordinator::SubmitRequest request;
+  request.scene_name = scene.name;
+  request.scene_text = scene.text;
+  for (const auto& [name, file] : scene.files) request.assets.emplace(name, file.digest);
+  request.spec = spec;
+  return request;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,34 @@
+#include "cli/local_world.h"
+
+#include "coordinator/store/memory_blobs.h"
+#include "worker/render/thread_limit.h"
+
+namespace ls::cli {
+
+tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
+                                                                  const JobSpec& spec, int threads) {
+  coordinator::MemoryBlobs blobs;
+  render::AssetFiles files;
+  for (const auto& [name, file] : scene.files) {
+    if (const auto adopted = blobs.adopt(file.digest, file.path); !adopted)
+      return tl::unexpected(coordinator::Rejected{adopted.error(), {}});
+    files.emplace(file.digest, file.path);
+  }
+  auto intake = coordinator::take_in(submit_request(scene, spec), blobs);
+  if (!intake) return tl::unexpected(std::move(intake.error()));
+  const auto limit = render::limit_threads(threads);
+  auto world = render::build_world(scene.scene, intake->job.settings, files, threads);
+  if (!world && world.error().code == Errc::invalid_argument)
+    return tl::unexpected(scene_fault(scene, world.error().message));
+  if (!world) return tl::unexpected(coordinator::Rejected{world.error(), {}});
+  return LocalWorld{std::move(intake->job), std::move(*world)};
+}
+
+coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text) {
+  Diagnostic d;
+  d.place.file = scene.name;
+  d.text = text;
+  return {{Errc::invalid_argument, text}, {std::move(d)}};
+}
+
+}  // namespace ls::cli

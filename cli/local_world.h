@@ -1,0 +1,24 @@
+// A scene made ready to trace in this process, without a farm: for `inspect` and for the replay of one
+// sample.
+#pragma once
+
+#include <memory>
+
+#include "cli/local_scene.h"
+#include "coordinator/intake.h"
+#include "worker/render/render.h"
+
+namespace ls::cli {
+
+struct LocalWorld {
+  coordinator::StoredJob job;  // settings and samples as a job would have them; warnings
+  std::shared_ptr<const render::World> world;
+};
+// The settings are resolved and the limits checked exactly as for a job.
+tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
+                                                                  const JobSpec& spec, int threads);
+
+// What is wrong with one of the scene's files, as a diagnostic of the scene as a whole.
+coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text);
+
+}  // namespace ls::cli

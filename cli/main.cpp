@@ -1,0 +1,51 @@
+// lightshaft: renders, inspects and merges on this machine, and talks to a farm. Exit codes: 0 ok, 1 failed,
+// 2 bad usage or bad scene.
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <string_view>
+
+#include "cli/commands.h"
+#include "cli/local_farm.h"
+#include "cli/say.h"
+#include "common/base/log.h"
+
+namespace {
+
+// What happens inside is told by the commands; the log of coordinator and worker is for those who look for a
+// fault.
+void set_log_level() {
+  const char* level = std::getenv("LIGHTSHAFT_LOG");
+  const std::string_view wanted = level ? level : "off";
+  ls::log_level(wanted == "debug"  ? ls::LogLevel::debug
+                : wanted == "info" ? ls::LogLevel::info
+                : wanted == "warn" ? ls::LogLevel::warn
+                                   : ls::LogLevel::off);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace ls::cli;
+  if (argc == 3 && std::string_view(argv[1]) == kRenderChildFlag) return run_render_child(argv[2]);
+  ::signal(SIGPIPE, SIG_IGN);
+  set_log_level();
+  CLI::App app("Renders light in smoke, steam, clouds and fire: on this machine, or on a farm of many.",
+               "lightshaft");
+  app.set_version_flag("--version", version_text());
+  app.require_subcommand(1);
+  app.option_defaults()->always_capture_default(false);
+  Action action;
+  add_render(app, action);
+  add_inspect(app, action);
+  add_submit(app, action);
+  add_farm_commands(app, action);
+  add_merge(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kOk : kUsage;
+  }
+  return action();
+}

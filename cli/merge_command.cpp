@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/output_file.h"
+#include "cli/say.h"
+#include "common/image/final_image.h"
+#include "common/image/merge.h"
+#include "common/protocol/limits.h"
+#include "coordinator/store/files.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Flags {
+  std::vector<std::string> partials;
+  std::string out, report;
+  bool float_output = false;
+};
+
+// A folder stands for the EXR files in it, by name: there may be more than a command line can hold.
+Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const std::string& argument : arguments) {
+    if (!fs::is_directory(argument, error)) {
+      files.emplace_back(argument);
+      continue;
+    }
+    const auto before = static_cast<std::ptrdiff_t>(files.size());
+    for (const auto& entry : fs::directory_iterator(argument, error))
+      if (entry.path().extension() == ".exr") files.push_back(entry.path());
+    if (error) return fail(Errc::invalid_argument, fmt::format("{}: {}", argument, error.message()));
+    std::sort(files.begin() + before, files.end());
+  }
+  if (files.empty()) return fail(Errc::invalid_argument, "there is no .exr file in the folders given");
+  return files;
+}
+
+Result<void> write_report(const Flags& flags, const Merged& merged, const std::string& digest,
+                          std::uint64_t clamped) {
+  const FrameSize size = merged.film.grid().frame;
+  const ImageError error = image_error(merged.film.error());
+  const nlohmann::ordered_json j{{"pixels_sha256", digest},
+                                 {"size", {size.width, size.height}},
+                                 {"spp", error.spp},
+                                 {"samples", merged.film.samples()},
+                                 {"rmse", error.rmse},
+                                 {"relmse", error.relmse},
+                                 {"relmse_ci95", {error.relmse_lo, error.relmse_hi}},
+                                 {"scene", merged.scene.hex()},
+                                 {"settings", merged.settings.hex()},
+                                 {"numeric_class", merged.numeric_class.hex()},
+                                 {"duplicates", merged.duplicates},
+                                 {"clamped_values", clamped}};
+  return write_output(flags.report, j.dump(2) + "\n");
+}
+
+int run(const Flags& flags) {
+  if (const auto ok = check_output("-o", flags.out); !ok) return say_error(ok.error());
+  const auto files = files_of(flags.partials);
+  if (!files) return say_error(files.error());
+  std::vector<PartialSource> sources;
+  for (const fs::path& file : *files)
+    sources.push_back(
+        {file.string(), [file] { return coordinator::read_file(file, limits::kMessageBytes); }});
+  const auto merged = merge_partials(sources);
+  if (!merged) return say_error(merged.error());
+  Provenance provenance;
+  provenance.scene = merged->scene;
+  // Partials name the settings by digest only.
+  provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
+  provenance.build = LIGHTSHAFT_VERSION;
+  provenance.numeric_class = merged->numeric_class;
+  const auto image = final_exr(merged->film, provenance, flags.float_output);
+  if (!image) return say_error(image.error());
+  if (const auto written = write_output(flags.out, image->exr); !written) return say_error(written.error());
+  const std::string digest = pixels_sha256(merged->film).hex();
+  if (!flags.report.empty())
+    if (const auto written = write_report(flags, *merged, digest, image->clamped); !written)
+      return say_error(written.error());
+  print("pixels_sha256 " + digest);
+  return kOk;
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* merge =
+      app.add_subcommand("merge", "fold partial images into the final one, exactly as the coordinator does");
+  merge->add_option("partials", flags->partials, "partial images, or folders of them")
+      ->required()
+      ->type_name("PARTIAL.exr...");
+  merge->add_option("-o,--output", flags->out, "the image")->required()->type_name("OUT.exr");
+  merge->add_option("--report", flags->report, "write digest and error as JSON")->type_name("REPORT.json");
+  merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
+  merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

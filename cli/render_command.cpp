@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/job_options.h"
+#include "cli/local_render.h"
+#include "cli/output_file.h"
+#include "cli/replay.h"
+#include "cli/say.h"
+#include "common/protocol/limits.h"
+#include "worker/machine.h"
+
+namespace ls::cli {
+namespace {
+
+struct Flags {
+  std::string scene, out, threads, pixel, sample, reference, report, partial_dir;
+  JobOptions job;
+  bool isolate = false, quiet = false;
+};
+
+std::optional<std::filesystem::path> path_of(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional<std::filesystem::path>(text);
+}
+
+Result<LocalRenderOptions> options_of(const Flags& flags) {
+  LocalRenderOptions options;
+  auto spec = flags.job.parse();
+  if (!spec) return tl::unexpected(spec.error());
+  options.spec = std::move(*spec);
+  options.threads = worker::usable_cpus();
+  if (!flags.threads.empty()) {
+    const auto threads = parse_whole("--threads", flags.threads, 1, limits::kThreads);
+    if (!threads) return tl::unexpected(threads.error());
+    options.threads = static_cast<int>(*threads);
+  }
+  options.isolate = flags.isolate;
+  options.quiet = flags.quiet;
+  options.strict = flags.job.strict;
+  options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ".exr" : flags.out;
+  options.report = path_of(flags.report);
+  options.partial_dir = path_of(flags.partial_dir);
+  options.reference = path_of(flags.reference);
+  return options;
+}
+
+int replay(const Flags& flags, const LocalScene& scene, const LocalRenderOptions& options) {
+  if (flags.pixel.empty() || flags.sample.empty())
+    return usage_error("--pixel and --sample belong together: one sample of one pixel");
+  const auto pixel = parse_pixel(flags.pixel);
+  if (!pixel) return say_error(pixel.error());
+  const auto sample = parse_whole("--sample", flags.sample, 0, limits::kSampleIndex);
+  if (!sample) return say_error(sample.error());
+  return replay_sample(scene, options.spec, options.threads, *pixel, *sample);
+}
+
+int run(const Flags& flags) {
+  const auto options = options_of(flags);
+  if (!options) return say_error(options.error());
+  const bool one_sample = !flags.pixel.empty() || !flags.sample.empty();
+  if (!one_sample) {
+    if (const auto ok = check_output("-o", options->out); !ok) return say_error(ok.error());
+    if (options->report)
+      if (const auto ok = check_output("--report", *options->report); !ok) return say_error(ok.error());
+  }
+  const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict);
+  if (!scene) return say_rejected(scene.error());
+  return one_sample ? replay(flags, *scene, *options) : render_locally(*scene, *options);
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* render = app.add_subcommand("render", "render a scene on this machine");
+  render->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
+  render
+      ->add_option("-o,--output", flags->out,
+                   "the image; default: the scene's name, with .exr, in this folder")
+      ->type_name("OUT.exr");
+  flags->job.add_to(*render);
+  render->add_option("--threads", flags->threads, "default: all")->type_name("N");
+  render->add_option("--pixel", flags->pixel, "with --sample: print the value of one sample of this pixel")
+      ->type_name("X,Y");
+  render->add_option("--sample", flags->sample, "its number, from 0")->type_name("N");
+  render->add_option("--reference", flags->reference, "the right image: the report has the true error, too")
+      ->type_name("REF.exr");
+  render->add_option("--report", flags->report, "write what it cost and how large the error is, as JSON")
+      ->type_name("REPORT.json");
+  render
+      ->add_option("--partial-dir", flags->partial_dir,
+                   "keep every unit's partial image: `lightshaft merge` folds them")
+      ->type_name("DIR");
+  render->add_flag("--isolate", flags->isolate, "render in a child process, which may crash");
+  render->add_flag("--quiet", flags->quiet, "only warnings and errors");
+  render->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

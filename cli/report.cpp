@@ -1,0 +1,79 @@
+#include "cli/report.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "cli/say.h"
+
+namespace ls::cli {
+namespace {
+
+using nlohmann::json;
+
+double number(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : 0;
+}
+
+std::string text(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+void add_true_error(json& report, const std::vector<TrueError::Point>& points) {
+  const auto put = [](json& object, const TrueError::Point& p) {
+    object["true_rmse"] = p.rmse;
+    object["true_relmse"] = p.relmse;
+  };
+  for (json& entry : report["convergence"])
+    for (const auto& p : points)
+      if (p.spp == number(entry, "spp")) put(entry, p);  // both are samples / pixels of whole numbers
+  put(report, points.back());
+}
+
+}  // namespace
+
+Result<std::string> local_report(const std::string& report, const LocalFacts& facts) {
+  json j = json::parse(report, nullptr, false);
+  if (!j.is_object()) return fail(Errc::internal, "the coordinator's report cannot be read");
+  j["load_seconds"] = facts.load_seconds;
+  j["peak_rss_bytes"] = facts.peak_rss_bytes;
+  j["threads"] = facts.threads;
+  if (facts.interrupted) j["stopped"] = "user";
+  if (!facts.true_error.empty()) add_true_error(j, facts.true_error);
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+std::string report_summary(const std::string& report) {
+  const json j = json::parse(report, nullptr, false);
+  if (!j.is_object()) return "";
+  std::string line =
+      fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
+                  show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
+  if (const auto relmse = j.find("relmse"); relmse != j.end() && relmse->is_number())
+    line += fmt::format(", relMSE {:.3g}", relmse->get<double>());
+  if (const auto ci = j.find("relmse_ci95");
+      ci != j.end() && ci->is_array() && ci->size() == 2 && (*ci)[0].is_number())
+    line += fmt::format(" ({:.3g} to {:.3g})", (*ci)[0].get<double>(), (*ci)[1].get<double>());
+  if (const std::string verdict = text(j, "verdict"); !verdict.empty()) line += ": " + verdict;
+  if (const auto bad = number(j, "nonfinite_samples"); bad > 0)
+    line += fmt::format("; {:g} samples were not finite and count as zero", bad);
+  return line;
+}
+
+std::string pixels_digest(const std::string& report) {
+  const json j = json::parse(report, nullptr, false);
+  return j.is_object() ? text(j, "pixels_sha256") : "";
+}
+
+std::uint64_t peak_rss_bytes() {
+  rusage own{}, children{};
+  ::getrusage(RUSAGE_SELF, &own);
+  ::getrusage(RUSAGE_CHILDREN, &children);
+  return static_cast<std::uint64_t>(std::max(own.ru_maxrss, children.ru_maxrss)) << 10;
+}
+
+}  // namespace ls::cli

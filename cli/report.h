@@ -1,0 +1,30 @@
+// The report of a local render: the coordinator's, with what only this process knows.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/true_error.h"
+#include "common/base/error.h"
+
+namespace ls::cli {
+
+struct LocalFacts {
+  double load_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+  int threads = 1;
+  bool interrupted = false;
+  std::vector<TrueError::Point> true_error;  // empty: there is no reference
+};
+// true_rmse and true_relmse stand in the points of `convergence` with the same samples, and beside rmse.
+Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
+
+// What a person wants to know at the end, one line.
+std::string report_summary(const std::string& report);
+std::string pixels_digest(const std::string& report);  // empty if there is none
+
+std::uint64_t peak_rss_bytes();  // of this process and its ended children, the larger
+
+}  // namespace ls::cli

@@ -1,0 +1,69 @@
+#include "cli/say.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace ls::cli {
+namespace {
+
+bool input_at_fault(Errc code) { return code == Errc::invalid_argument; }
+
+}  // namespace
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+void print(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+int usage_error(const std::string& text) {
+  say("lightshaft: error: " + text);
+  return kUsage;
+}
+
+int say_error(const Error& error) {
+  say("lightshaft: error: " + error.message);
+  return input_at_fault(error.code) ? kUsage : kFailed;
+}
+
+int say_rejected(const coordinator::Rejected& rejected) {
+  say_diagnostics(rejected.diagnostics);
+  if (rejected.diagnostics.empty()) say("lightshaft: error: " + rejected.error.message);
+  switch (rejected.error.code) {
+    case Errc::internal:
+    case Errc::unavailable:
+    case Errc::permission_denied:
+    case Errc::unauthenticated:
+      return kFailed;
+    default:
+      return kUsage;
+  }
+}
+
+void say_diagnostics(const std::vector<Diagnostic>& diagnostics) {
+  if (!diagnostics.empty()) fmt::print(stderr, "{}", format_diagnostics(diagnostics));
+}
+
+std::string show_bytes(std::uint64_t bytes) {
+  constexpr std::array kUnits{"B", "KiB", "MiB", "GiB", "TiB"};
+  double value = static_cast<double>(bytes);
+  std::size_t unit = 0;
+  while (value >= 1024 && unit + 1 < kUnits.size()) value /= 1024, ++unit;
+  return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, kUnits[unit]);
+}
+
+std::string show_seconds(double seconds) {
+  if (!std::isfinite(seconds) || seconds < 0) return "?";
+  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 59.5) return fmt::format("{:.0f} s", seconds);
+  if (seconds > 1e15) return "for ever";
+  const auto s = static_cast<long long>(std::llround(seconds));
+  return s < 3600 ? fmt::format("{}:{:02}", s / 60, s % 60)
+                  : fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+}
+
+}  // namespace ls::cli
