@@ -68,7 +68,8 @@ void EventHub::publish(std::string type, std::string data, std::string job) {
   s.changed.notify_all();
 }
 
-std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) {
+std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id,
+                                          std::function<void(const StreamEvent&)> on_event) {
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t id = ++state_->last_listener;
   auto listener = std::make_shared<State::Listener>();

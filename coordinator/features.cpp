@@ -25,14 +25,17 @@ bool has_meshes(const Scene& scene) {
 }
 
 bool has_area_lights(const Scene& scene) {
-  return std::any_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.emitter.has_value(); });
+  return std::any_of(scene.shapes.begin(), scene.shapes.end(),
+                     [](const Shape& s) { return s.emitter.has_value(); });
 }
 
 }  // namespace
 
 SceneFeatures features_of(const Scene& scene) {
   SceneFeatures features;
-  const auto say = [&](const char* name, bool used) { (used ? features.used : features.left_out).emplace_back(name); };
+  const auto say = [&](const char* name, bool used) {
+    (used ? features.used : features.left_out).emplace_back(name);
+  };
   say("surfaces", !scene.shapes.empty());
   say("meshes", has_meshes(scene));
   say("homogeneous media", any<HomogeneousMedium>(scene.media));

@@ -30,11 +30,13 @@ class UploadedAssets final : public AssetSource {
     const auto found = assets_.find(plain_name(name));
     if (found == assets_.end())
       return fail(Errc::not_found,
-                  fmt::format("\"{}\" was not sent along: name it among the assets, with its SHA-256{}", name, offered()));
+                  fmt::format("\"{}\" was not sent along: name it among the assets, with its SHA-256{}", name,
+                              offered()));
     const auto bytes = blobs_.size(found->second);
     if (!bytes)
-      return fail(Errc::not_found, fmt::format("the bytes of \"{}\" have not been uploaded: PUT them to /api/v1/blobs/{}",
-                                               name, found->second.hex()));
+      return fail(Errc::not_found,
+                  fmt::format("the bytes of \"{}\" have not been uploaded: PUT them to /api/v1/blobs/{}",
+                              name, found->second.hex()));
     return Asset{std::string(name), found->second, *bytes};
   }
 
@@ -42,8 +44,8 @@ class UploadedAssets final : public AssetSource {
     const auto asset = find(name);
     if (!asset) return tl::unexpected(asset.error());
     if (asset->bytes > limits::kMaxIncludeBytes)
-      return fail(Errc::resource_exhausted, fmt::format("\"{}\" has {} bytes; an included scene may have {}", name,
-                                                        asset->bytes, limits::kMaxIncludeBytes));
+      return fail(Errc::resource_exhausted, fmt::format("\"{}\" has {} bytes; an included scene may have {}",
+                                                        name, asset->bytes, limits::kMaxIncludeBytes));
     const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
     if (!bytes) return tl::unexpected(bytes.error());
     return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
@@ -72,16 +74,19 @@ struct IntegratorName {
   const char* asked;
   const char* ours;
 };
-constexpr std::array kIntegrators{IntegratorName{"volpath", "volpath"}, IntegratorName{"volpathmis", "volpath"},
-                                  IntegratorName{"volpath_distant_mis", "volpath"}, IntegratorName{"path", "path"}};
+constexpr std::array kIntegrators{
+    IntegratorName{"volpath", "volpath"}, IntegratorName{"volpathmis", "volpath"},
+    IntegratorName{"volpath_distant_mis", "volpath"}, IntegratorName{"path", "path"}};
 
-Result<std::string> integrator_of(const Scene& scene, const JobSpec& spec, std::vector<std::string>& warnings) {
+Result<std::string> integrator_of(const Scene& scene, const JobSpec& spec,
+                                  std::vector<std::string>& warnings) {
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
   const auto* known =
       std::find_if(kIntegrators.begin(), kIntegrators.end(), [&](const auto& i) { return asked == i.asked; });
   if (known == kIntegrators.end())
     return tl::unexpected(invalid(fmt::format(
-        "there is no integrator \"{}\"; there are volpath, volpathmis, volpath_distant_mis and path", asked)));
+        "there is no integrator \"{}\"; there are volpath, volpathmis, volpath_distant_mis and path",
+        asked)));
   if (known->ours == std::string("path") && !scene.media.empty())
     warnings.push_back("the integrator `path` renders without media: the scene's " +
                        std::to_string(scene.media.size()) + " media are left out");
@@ -94,8 +99,8 @@ Result<void> check_size(FrameSize size) {
   if (size.width > limits::kMaxFrameSide || size.height > limits::kMaxFrameSide ||
       std::int64_t{size.width} * size.height > limits::kMaxFramePixels)
     return fail(Errc::resource_exhausted,
-                fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width, size.height,
-                            limits::kMaxFrameSide, limits::kMaxFramePixels));
+                fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width,
+                            size.height, limits::kMaxFrameSide, limits::kMaxFramePixels));
   return {};
 }
 
@@ -103,19 +108,21 @@ Result<void> check_spec(const JobSpec& spec) {
   if (spec.target_error && !(std::isfinite(*spec.target_error) && *spec.target_error > 0))
     return tl::unexpected(invalid("target_error must be positive"));
   if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= limits::kMaxTimeSeconds))
-    return tl::unexpected(invalid(fmt::format("time must be between 0 and {} seconds", limits::kMaxTimeSeconds)));
+    return tl::unexpected(
+        invalid(fmt::format("time must be between 0 and {} seconds", limits::kMaxTimeSeconds)));
   if (spec.spp && (*spec.spp == 0 || *spec.spp > limits::kMaxSpp))
     return fail(*spec.spp == 0 ? Errc::invalid_argument : Errc::resource_exhausted,
                 fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
   if (std::abs(spec.priority) > limits::kMaxPriority)
     return tl::unexpected(invalid(fmt::format("priority must be within +-{}", limits::kMaxPriority)));
   if (!spec.aov.empty())
-    return tl::unexpected(invalid(fmt::format("there is no output \"{}\"; this version writes colour, stderr and spp",
-                                              spec.aov.front())));
+    return tl::unexpected(invalid(fmt::format(
+        "there is no output \"{}\"; this version writes colour, stderr and spp", spec.aov.front())));
   return {};
 }
 
-Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std::vector<std::string>& warnings) {
+Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec,
+                                   std::vector<std::string>& warnings) {
   RenderSettings settings;
   settings.size = spec.size.value_or(scene.film.size);
   if (auto ok = check_size(settings.size); !ok) return tl::unexpected(ok.error());
@@ -142,14 +149,15 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
     return refuse({Errc::resource_exhausted, fmt::format("the scene text has {} bytes; {} are allowed",
                                                          request.scene_text.size(), limits::kMaxSceneText)});
   if (request.assets.size() > limits::kMaxAssets)
-    return refuse({Errc::resource_exhausted,
-                   fmt::format("{} assets were named; {} are allowed", request.assets.size(), limits::kMaxAssets)});
+    return refuse({Errc::resource_exhausted, fmt::format("{} assets were named; {} are allowed",
+                                                         request.assets.size(), limits::kMaxAssets)});
   if (auto ok = check_spec(request.spec); !ok) return refuse(ok.error());
 
   UploadedAssets assets(request.assets, blobs);
   ReadResult read = read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false});
   if (!read.scene)
-    return refuse(invalid(fmt::format("the scene {} cannot be read", request.scene_name)), std::move(read.diagnostics));
+    return refuse(invalid(fmt::format("the scene {} cannot be read", request.scene_name)),
+                  std::move(read.diagnostics));
   const Scene& scene = *read.scene;
 
   Intake intake;
@@ -168,7 +176,8 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
                    fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
   for (const Asset& a : scene.assets) {
     const auto known = [&](const BlobRef& b) { return b.digest == a.digest; };
-    if (std::none_of(job.assets.begin(), job.assets.end(), known)) job.assets.push_back({a.digest, a.bytes, a.name});
+    if (std::none_of(job.assets.begin(), job.assets.end(), known))
+      job.assets.push_back({a.digest, a.bytes, a.name});
   }
   const SceneFeatures features = features_of(scene);
   job.features_used = features.used;

@@ -1,4 +1,5 @@
-// From a submission to a job that can be rendered: the scene read and checked, everything that was left open resolved.
+// From a submission to a job that can be rendered: the scene read and checked, everything that was left open
+// resolved.
 #pragma once
 
 #include <string>
@@ -11,12 +12,12 @@
 namespace ls::coordinator {
 
 struct Intake {
-  StoredJob job;  // without id and time
+  StoredJob job;           // without id and time
   std::string scene_json;  // canonical; its digest is job.scene
 };
 
-// Reads the scene with the request's assets as its only files, so a scene can never reach a path of this machine. Only
-// assets that the scene uses go into the job; each must be in `blobs`. Nothing is stored.
+// Reads the scene with the request's assets as its only files, so a scene can never reach a path of this
+// machine. Only assets that the scene uses go into the job; each must be in `blobs`. Nothing is stored.
 tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs);
 
 // The farm's view of a stored job.

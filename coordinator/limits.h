@@ -9,15 +9,15 @@
 namespace ls::coordinator::limits {
 
 // ---- blobs ----
-inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;    // one file of a scene: 64 GiB
-inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;   // in one read()
+inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;   // one file of a scene: 64 GiB
+inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // in one read()
 inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
 
 // ---- submission ----
 inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
-inline constexpr std::size_t kMaxAssets = 100'000;       // named by one request
-inline constexpr std::size_t kMaxWarnings = 100;         // kept with a job
-inline constexpr std::size_t kMaxNameBytes = 256;        // of a job or worker
+inline constexpr std::size_t kMaxAssets = 100'000;  // named by one request
+inline constexpr std::size_t kMaxWarnings = 100;    // kept with a job
+inline constexpr std::size_t kMaxNameBytes = 256;   // of a job or worker
 inline constexpr std::size_t kMaxJobs = 100'000;
 inline constexpr int kMaxFrameSide = 32768;
 inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;  // 67 million: 3.2 GB of film sums
@@ -28,10 +28,12 @@ inline constexpr int kMaxPriority = 1'000'000;
 // ---- results ----
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg
 inline constexpr std::uint32_t kMaxSegments = 1u << 20;
-inline constexpr std::size_t kMaxResultsWaiting = std::size_t{256} << 20;   // bytes not yet durable; then receive() waits
-inline constexpr std::size_t kMaxPendingPartials = std::size_t{1} << 30;    // decoded, waiting for an earlier round; then
-                                                                            // they are read again from the segments
-inline constexpr std::size_t kMaxCommitBatch = 256;                         // results that share one fdatasync
+inline constexpr std::size_t kMaxResultsWaiting = std::size_t{256}
+                                                  << 20;  // bytes not yet durable; then receive() waits
+inline constexpr std::size_t kMaxPendingPartials = std::size_t{1}
+                                                   << 30;  // decoded, waiting for an earlier round; then
+                                                           // they are read again from the segments
+inline constexpr std::size_t kMaxCommitBatch = 256;        // results that share one fdatasync
 inline constexpr int kVerifyThreads = 2;
 
 // ---- workers ----

@@ -16,7 +16,9 @@ double unix_now() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) { return Service::open(std::move(options)); }
+Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
+  return Service::open(std::move(options));
+}
 
 Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
   if (!options.clock) options.clock = std::make_shared<SystemClock>();
@@ -49,8 +51,8 @@ Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
   return service;
 }
 
-Service::Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store, File lock,
-                 std::uint64_t start)
+Service::Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store,
+                 File lock, std::uint64_t start)
     : options_(std::move(options)),
       blobs_(std::move(blobs)),
       store_(std::move(store)),
@@ -73,13 +75,14 @@ void Service::start_threads() {
     std::mutex mutex;
     std::condition_variable_any woken;
     std::unique_lock lock(mutex);
-    while (!woken.wait_for(lock, token, every, [&] { return token.stop_requested(); }) && !token.stop_requested())
+    while (!woken.wait_for(lock, token, every, [&] { return token.stop_requested(); }) &&
+           !token.stop_requested())
       tick();
   });
 }
 
-// What has been accepted is durable already and what has not been acknowledged comes again: nothing is flushed here, so
-// that a clean end and a crash are the same thing.
+// What has been accepted is durable already and what has not been acknowledged comes again: nothing is
+// flushed here, so that a clean end and a crash are the same thing.
 Service::~Service() {
   *alive_ = false;
   budget_.close();
@@ -107,7 +110,8 @@ bool Service::ready(std::string* why_not) const {
   return store_trouble_.empty();
 }
 
-std::shared_ptr<void> Service::subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) {
+std::shared_ptr<void> Service::subscribe(std::uint64_t after_id,
+                                         std::function<void(const StreamEvent&)> on_event) {
   return hub_->subscribe(after_id, std::move(on_event));
 }
 

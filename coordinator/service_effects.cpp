@@ -17,7 +17,8 @@ void Service::run_locked(Event first) {
     todo.pop_front();
     for (const Effect& effect : farm_.handle(event, now())) carry_out(effect, todo);
   }
-  // Not in the middle: what a snapshot holds must have its convergence points before it in the keeper's queue.
+  // Not in the middle: what a snapshot holds must have its convergence points before it in the keeper's
+  // queue.
   for (const EntryPtr& entry : std::exchange(folded_, {})) snapshot_if_due_locked(entry);
 }
 
@@ -32,8 +33,9 @@ void Service::on(const UnitsFreed& e, Todo&) {
     const auto held = entry->leased.find({unit.tile, unit.round});
     if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
       entry->leased.erase(held);
-    hub_->publish("tile", tile_event_json(e.job, unit.tile, entry->grid.rect(unit.tile), "free",
-                                          round_range(unit.round).s0, e.worker.value),
+    hub_->publish("tile",
+                  tile_event_json(e.job, unit.tile, entry->grid.rect(unit.tile), "free",
+                                  round_range(unit.round).s0, e.worker.value),
                   e.job.value);
   }
 }
@@ -56,8 +58,9 @@ Result<WaitingPartial> Service::partial_for_locked(JobEntry& entry, const Fold& 
   if (!waiting->place || !entry.log) return fail(Errc::internal, "an accepted partial has no place");
   const auto exr = entry.log->read(*waiting->place);
   if (!exr) return tl::unexpected(exr.error());
-  const UnitHeader expected{entry.stored.scene, entry.settings_digest, entry.stored.numeric_class.value_or(Digest{}),
-                            entry.grid.rect(e.unit.tile), e.samples};
+  const UnitHeader expected{entry.stored.scene, entry.settings_digest,
+                            entry.stored.numeric_class.value_or(Digest{}), entry.grid.rect(e.unit.tile),
+                            e.samples};
   auto partial = decode_partial(*exr, expected, entry.grid.frame);
   if (!partial) return tl::unexpected(partial.error());
   waiting->partial = std::move(*partial);
@@ -72,9 +75,11 @@ void Service::on(const Fold& e, Todo& todo) {
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
     // Never a wrong pixel: the tile stands still and the job waits.
-    entry->trouble = fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
-                                 e.unit.tile, e.unit.round, error.error().message);
-    log_error(fmt::format("job={} tile={} round={}", e.unit.job.value, e.unit.tile, e.unit.round), entry->trouble);
+    entry->trouble =
+        fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
+                    e.unit.tile, e.unit.round, error.error().message);
+    log_error(fmt::format("job={} tile={} round={}", e.unit.job.value, e.unit.tile, e.unit.round),
+              entry->trouble);
     log_job(e.unit.job, entry->trouble);
     todo.push_back(JobPaused{e.unit.job});
     return;
@@ -85,22 +90,24 @@ void Service::on(const Fold& e, Todo& todo) {
     entry->fold_seconds = elapsed_locked(*entry);
   todo.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   if (restoring_) return;
-  hub_->publish("tile", tile_event_json(e.unit.job, e.unit.tile, entry->grid.rect(e.unit.tile), "folded",
-                                        e.samples.s1, ""),
-                e.unit.job.value);
+  hub_->publish(
+      "tile",
+      tile_event_json(e.unit.job, e.unit.tile, entry->grid.rect(e.unit.tile), "folded", e.samples.s1, ""),
+      e.unit.job.value);
   publish_progress_locked(*entry);
   if (folded_.empty() || folded_.back() != entry) folded_.push_back(entry);
 }
 
 void Service::on(const DropUnwanted& e, Todo&) {
-  log_debug(fmt::format("job={} tile={} round={} worker={}", e.unit.job.value, e.unit.tile, e.unit.round, e.worker.value),
+  log_debug(fmt::format("job={} tile={} round={} worker={}", e.unit.job.value, e.unit.tile, e.unit.round,
+                        e.worker.value),
             "result dropped: " + e.why);
 }
 
 void Service::on(const DigestMismatch& e, Todo&) {
-  const std::string text = fmt::format("tile {} round {}: {} rendered {}, {} rendered {}: one of them has bad memory or lies",
-                                       e.unit.tile, e.unit.round, e.first_worker.value, e.first.hex(),
-                                       e.second_worker.value, e.second.hex());
+  const std::string text = fmt::format(
+      "tile {} round {}: {} rendered {}, {} rendered {}: one of them has bad memory or lies", e.unit.tile,
+      e.unit.round, e.first_worker.value, e.first.hex(), e.second_worker.value, e.second.hex());
   log_error(fmt::format("job={}", e.unit.job.value), text);
   log_job(e.unit.job, text);
 }
@@ -140,10 +147,12 @@ void Service::on(const Checkpoint& e, Todo&) {
   if (!entry || !entry->assembly) return;
   const ImageError error = image_error(entry->assembly->errors().at(e.round));
   entry->assembly->checkpoint_taken(e.round);
-  if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;  // known from before the restart
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp)
+    return;  // known from before the restart
   double core = entry->stored.totals.core_seconds;
-  const auto until = std::upper_bound(entry->replay.begin(), entry->replay.end(),
-                                      std::pair(entry->fold_seconds, std::numeric_limits<double>::infinity()));
+  const auto until =
+      std::upper_bound(entry->replay.begin(), entry->replay.end(),
+                       std::pair(entry->fold_seconds, std::numeric_limits<double>::infinity()));
   if (!entry->replay.empty()) core = until == entry->replay.begin() ? 0 : std::prev(until)->second;
   const ConvergencePoint point{entry->fold_seconds, core, error.spp, figures_of(error)};
   entry->points.push_back(point);

@@ -1,4 +1,5 @@
-// What is written of a job on the keeper thread: snapshots now and then, the final image and report at the end.
+// What is written of a job on the keeper thread: snapshots now and then, the final image and report at the
+// end.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,12 +19,8 @@ std::span<const std::byte> bytes_of(const std::string& text) { return std::as_by
 }  // namespace
 
 Provenance Service::provenance_of(const StoredJob& job) const {
-  return {job.scene,
-          canonical_json(job.settings),
-          job.build,
-          job.numeric_class.value_or(Digest{}),
-          job.settings.seed,
-          job.totals.render_seconds};
+  return {job.scene,         canonical_json(job.settings), job.build, job.numeric_class.value_or(Digest{}),
+          job.settings.seed, job.totals.render_seconds};
 }
 
 // All but the digest of the pixels, which takes its time.
@@ -35,8 +32,9 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
   if (!entry.assembly) return facts;
   const Film& film = entry.assembly->film();
   facts.samples = film.samples();
-  facts.job.totals.spp_done = static_cast<double>(facts.samples) / static_cast<double>(
-      std::int64_t{entry.grid.frame.width} * entry.grid.frame.height);
+  facts.job.totals.spp_done =
+      static_cast<double>(facts.samples) /
+      static_cast<double>(std::int64_t{entry.grid.frame.width} * entry.grid.frame.height);
   if (entry.clock_zero) facts.job.totals.render_seconds = elapsed_locked(entry);
   if (facts.samples > 0) facts.error = image_error(film.error());
   return facts;
@@ -45,7 +43,8 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
 void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   if (!on_disk() || entry->snapshot_running || !entry->assembly) return;
   const std::uint64_t folds = entry->assembly->folds_since_snapshot;
-  if (folds < limits::kSnapshotUnits && seconds(now() - entry->last_snapshot) < limits::kSnapshotSeconds) return;
+  if (folds < limits::kSnapshotUnits && seconds(now() - entry->last_snapshot) < limits::kSnapshotSeconds)
+    return;
   entry->snapshot_running = true;
   entry->assembly->folds_since_snapshot = 0;
   entry->last_snapshot = now();
@@ -100,7 +99,8 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
     write_snapshot_now(entry);
     if (!written) {
       lock.lock();
-      entry->trouble = "the final image cannot be written: " + written.error().message + "; then resume the job";
+      entry->trouble =
+          "the final image cannot be written: " + written.error().message + "; then resume the job";
       log_error(fmt::format("job={}", facts.job.id.value), entry->trouble);
       publish_job_locked(*entry);
       return;

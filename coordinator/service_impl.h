@@ -1,9 +1,10 @@
 // The service's inside. One mutex around the farm and all that belongs to it; slow work has its own threads:
 //
-//   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all] -> farm -> acknowledge
-//   [keeper thread: convergence points, logs, snapshots, final images; strictly in order]
+//   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all] -> farm
+//   -> acknowledge [keeper thread: convergence points, logs, snapshots, final images; strictly in order]
 //
-// A public method takes the lock; what ends in _locked expects it. Effects are carried out under the lock, in order.
+// A public method takes the lock; what ends in _locked expects it. Effects are carried out under the lock, in
+// order.
 #pragma once
 
 #include <atomic>
@@ -37,11 +38,11 @@ struct JobEntry {
   StoredJob stored;
   Digest settings_digest;
   TileGrid grid;
-  std::shared_ptr<PartialLog> log;    // none in memory
-  std::optional<Assembly> assembly;   // none once an ended job is on disk
+  std::shared_ptr<PartialLog> log;   // none in memory
+  std::optional<Assembly> assembly;  // none once an ended job is on disk
   std::vector<ConvergencePoint> points;
-  bool dormant = false;               // ended in an earlier run: the farm does not know it
-  std::uint64_t finishing = 0;        // number of the final image being made; 0: none
+  bool dormant = false;         // ended in an earlier run: the farm does not know it
+  std::uint64_t finishing = 0;  // number of the final image being made; 0: none
   bool snapshot_running = false;
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
@@ -59,9 +60,9 @@ struct Connection {
   std::uint64_t epoch = 0;
   Digest numeric_class;
   std::shared_ptr<WorkerSink> sink;
-  bool open = true;                      // under the service's lock
+  bool open = true;                                        // under the service's lock
   std::shared_ptr<const std::atomic<bool>> service_lives;  // a session may outlive the service
-  std::optional<std::uint64_t> first_lease;  // number of the first one assigned over it
+  std::optional<std::uint64_t> first_lease;                // number of the first one assigned over it
 };
 
 struct WorkerEntry {
@@ -95,8 +96,10 @@ class Service final : public Coordinator {
   Result<std::string> job_log(const JobId& id) const override;
   Result<void> wait(const JobId& id) const override;
   std::vector<WorkerView> workers() const override;
-  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) override;
-  std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) override;
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello,
+                                                 std::shared_ptr<WorkerSink> sink) override;
+  std::shared_ptr<void> subscribe(std::uint64_t after_id,
+                                  std::function<void(const StreamEvent&)> on_event) override;
   std::uint64_t last_event_id() const override;
   BlobStore& blobs() override { return *blobs_; }
   bool ready(std::string* why_not) const override;
@@ -213,7 +216,7 @@ class Service final : public Coordinator {
   std::vector<JobId> order_;  // of submission
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
-  std::string store_trouble_;  // the last result that could not be stored
+  std::string store_trouble_;     // the last result that could not be stored
   std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
   bool restoring_ = false;
   std::shared_ptr<std::atomic<bool>> alive_ = std::make_shared<std::atomic<bool>>(true);

@@ -19,7 +19,8 @@ JobId random_job_id() {
 Rejected rejected(Error error) { return {std::move(error), {}}; }
 
 tl::unexpected<Error> wrong_state(const JobId& id, JobState state, std::string_view what) {
-  return fail(Errc::failed_precondition, fmt::format("job {} is {}: it cannot be {}", id.value, to_string(state), what));
+  return fail(Errc::failed_precondition,
+              fmt::format("job {} is {}: it cannot be {}", id.value, to_string(state), what));
 }
 
 }  // namespace
@@ -34,7 +35,8 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
 
   const std::lock_guard lock(mutex_);
   if (entries_.size() >= limits::kMaxJobs)
-    return tl::unexpected(rejected({Errc::resource_exhausted, fmt::format("{} jobs are kept already", entries_.size())}));
+    return tl::unexpected(
+        rejected({Errc::resource_exhausted, fmt::format("{} jobs are kept already", entries_.size())}));
   do job.id = random_job_id();
   while (entries_.contains(job.id));
   const auto entry = make_entry(std::move(job), true);
@@ -108,7 +110,8 @@ Result<void> Service::set_priority(const JobId& id, int priority) {
 
 Result<void> Service::extend(const JobId& id, std::uint64_t spp) {
   if (spp == 0 || spp > limits::kMaxSpp)
-    return fail(Errc::invalid_argument, fmt::format("{} samples per pixel: it must be 1 to {}", spp, limits::kMaxSpp));
+    return fail(Errc::invalid_argument,
+                fmt::format("{} samples per pixel: it must be 1 to {}", spp, limits::kMaxSpp));
   const std::lock_guard lock(mutex_);
   const auto found = entry_locked(id);
   if (!found) return tl::unexpected(found.error());
@@ -140,8 +143,9 @@ Result<void> Service::extend(const JobId& id, std::uint64_t spp) {
   if (!taken) {
     if (at_end) entry.clock_zero.reset();
     entry.finishing = finishing;
-    return fail(Errc::invalid_argument,
-                fmt::format("job {} has {} samples per pixel already; ask for a larger total", id.value, before));
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("job {} has {} samples per pixel already; ask for a larger total", id.value, before));
   }
   if (by_error) entry.stored.spec.target_error.reset();
   if (by_time) entry.stored.spec.time.reset();

@@ -47,7 +47,8 @@ Result<void> Service::restore() {
     load_folded(**entry);
     auto event = restored_locked(**entry, state);
     if (!event) return tl::unexpected(event.error());
-    log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()), "restored");
+    log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()),
+             "restored");
     const double elapsed = event->elapsed_seconds;
     if (elapsed > 0) (*entry)->clock_zero = now() - from_seconds(elapsed);
     run_locked(std::move(*event));
@@ -79,7 +80,9 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
   totals.health = {};
   std::set<std::tuple<TileIndex, RoundIndex, std::uint64_t>> seen;
   for (const auto& [record, place] : entry.log->found()) {
-    if (record.tile >= entry.grid.count() || !seen.emplace(record.tile, record.round, record.samples.s1).second) continue;
+    if (record.tile >= entry.grid.count() ||
+        !seen.emplace(record.tile, record.round, record.samples.s1).second)
+      continue;
     const bool folded = record.round < event.folded[record.tile];
     if (!folded && record.samples == cut_range(record.round, spp)) {
       // What cannot be read is not accepted: it is rendered again, to the same bits.

@@ -1,4 +1,5 @@
-// The way of a result: checked on its own, made durable together with others, then told to the farm and acknowledged.
+// The way of a result: checked on its own, made durable together with others, then told to the farm and
+// acknowledged.
 #include <fmt/format.h>
 
 #include <set>
@@ -21,8 +22,9 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
       return acknowledge_locked(arrived, std::nullopt);
     const Digest numeric_class = wanted.numeric_class.value_or(from->numeric_class);
     if (numeric_class != from->numeric_class)
-      return acknowledge_locked(arrived, Error{Errc::failed_precondition,
-                                               "the job is pinned to another numeric class than this worker's"});
+      return acknowledge_locked(
+          arrived,
+          Error{Errc::failed_precondition, "the job is pinned to another numeric class than this worker's"});
     arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, numeric_class, wanted.rect,
                         wanted.samples};
     arrived.duplicate = wanted.verdict == Wanted::Verdict::duplicate;
@@ -48,8 +50,8 @@ void Service::commit_loop(const std::stop_token& token) {
   }
 }
 
-// Everything that waits shares one sync per file: under load a batch grows while the disk works, so a result waits for two
-// syncs at most.
+// Everything that waits shares one sync per file: under load a batch grows while the disk works, so a result
+// waits for two syncs at most.
 void Service::commit(std::vector<Checked> batch) {
   struct Stored {
     std::optional<PartialLog::Place> place;
@@ -114,11 +116,12 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
     entry.stored.totals.health.negative += r.health.negative;
     entry.stored.totals.health.majorant_violations += r.health.majorant_violations;
     if (entry.assembly)
-      entry.assembly->hold(r.unit.tile, r.unit.round,
-                           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest});
+      entry.assembly->hold(
+          r.unit.tile, r.unit.round,
+          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest});
   }
-  // A duplicate by the farm's book is compared there; a race that made one unstored is told as nothing: the copy that
-  // was stored stands, and this one is equal or evidence the next time.
+  // A duplicate by the farm's book is compared there; a race that made one unstored is told as nothing: the
+  // copy that was stored stands, and this one is equal or evidence the next time.
   if (wanted.verdict == Wanted::Verdict::yes && entry.log && !place)
     run_locked(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else
@@ -129,7 +132,8 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
 // The worker's fault, as far as anyone can tell: it counts against the unit and the worker.
 void Service::refuse_locked(const Arrived& a, const Error& error) {
   const UnitKey& unit = a.result.unit;
-  log_warn(fmt::format("job={} tile={} round={} worker={}", unit.job.value, unit.tile, unit.round, a.from->worker.value),
+  log_warn(fmt::format("job={} tile={} round={} worker={}", unit.job.value, unit.tile, unit.round,
+                       a.from->worker.value),
            error.message);
   log_job(unit.job, fmt::format("{} (worker {})", error.message, a.from->worker.value));
   UnitFailure failure;

@@ -85,7 +85,8 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.spp_done = job.totals.spp_done;
   v.units_done = v.units_total = job.totals.units;
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
-  if (entry.assembly) v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
+  if (entry.assembly)
+    v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
   const auto figures = entry.dormant ? std::nullopt : farm_.job(job.id);
   if (figures) {
     v.spp = figures->spp;
@@ -94,7 +95,8 @@ JobView Service::view_locked(const JobEntry& entry) const {
     const Outlook out = outlook(entry, *figures, v.elapsed_seconds, farm_.threads_connected());
     v.progress = out.progress;
     if (v.state == JobState::running || v.state == JobState::queued) v.eta_seconds = out.eta_seconds;
-    if (v.error.empty() && !entry.finishing && figures->units_leased == 0) v.error = farm_.why_waiting(job.id);
+    if (v.error.empty() && !entry.finishing && figures->units_leased == 0)
+      v.error = farm_.why_waiting(job.id);
   }
   if (v.state == JobState::done) v.progress = 1;
   return v;
@@ -209,7 +211,8 @@ Result<std::string> Service::job_log(const JobId& id) const {
   if (!lines) return tl::unexpected(lines.error());
   std::string text;
   for (const LogLine& line : *lines)
-    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)), line.text);
+    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)),
+                        line.text);
   return text;
 }
 

@@ -1,6 +1,5 @@
 // Workers: registration, messages, departure.
 #include <fmt/format.h>
-#include <openssl/crypto.h>
 
 #include <algorithm>
 #include <charconv>
@@ -8,6 +7,7 @@
 
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
+#include "common/base/secret.h"
 #include "common/protocol/limits.h"
 #include "coordinator/service_impl.h"
 #include "coordinator/views.h"
@@ -32,16 +32,11 @@ class Session final : public WorkerSession {
   std::shared_ptr<Connection> connection_;
 };
 
-// In time that tells nothing of where they differ: the digests are compared.
-bool same_token(const std::string& a, const std::string& b) {
-  const Digest x = sha256(a), y = sha256(b);
-  return CRYPTO_memcmp(x.bytes.data(), y.bytes.data(), x.bytes.size()) == 0;
-}
-
 Result<void> check_hello(const WorkerHello& hello, const std::string& join_token) {
-  if (!join_token.empty() && !same_token(hello.join_token, join_token))
+  if (!join_token.empty() && !equal_secret(hello.join_token, join_token))
     return fail(Errc::unauthenticated,
-                "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of its data folder");
+                "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of "
+                "its data folder");
   if (hello.protocol != kProtocolVersion)
     return fail(Errc::failed_precondition,
                 fmt::format("this worker speaks protocol {}, the coordinator {}: use the same build on both",
@@ -50,16 +45,18 @@ Result<void> check_hello(const WorkerHello& hello, const std::string& join_token
       hello.previous_id.value.size() > ls::limits::kIdBytes)
     return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
   if (hello.tags.size() > limits::kMaxTags)
-    return fail(Errc::invalid_argument, fmt::format("{} tags are more than {}", hello.tags.size(), limits::kMaxTags));
+    return fail(Errc::invalid_argument,
+                fmt::format("{} tags are more than {}", hello.tags.size(), limits::kMaxTags));
   if (hello.threads < 1 || hello.threads > ls::limits::kThreads)
-    return fail(Errc::invalid_argument, fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));
+    return fail(Errc::invalid_argument,
+                fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));
   return {};
 }
 
 bool well_formed(const WorkerId& id) {
   return id.value.starts_with("w-") && std::all_of(id.value.begin() + 2, id.value.end(), [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || c == '-';
-  });
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || c == '-';
+         });
 }
 
 // n of "PREFIX-n".
@@ -74,16 +71,19 @@ std::optional<std::uint64_t> lease_number(const LeaseId& id) {
 
 }  // namespace
 
-Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) {
+Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello,
+                                                        std::shared_ptr<WorkerSink> sink) {
   if (auto ok = check_hello(hello, options_.join_token); !ok) return tl::unexpected(ok.error());
   const std::lock_guard lock(mutex_);
   WorkerId id = hello.previous_id;
   const auto known = workers_.find(id);
   // An id that came with a copied folder belongs to the worker that has it.
   const bool taken = known != workers_.end() && known->second.hello.name != hello.name;
-  if (id.empty() || !well_formed(id) || taken) id.value = fmt::format("w-{:x}-{:x}", start_, last_epoch_ & 0xffffffff);
+  if (id.empty() || !well_formed(id) || taken)
+    id.value = fmt::format("w-{:x}-{:x}", start_, last_epoch_ & 0xffffffff);
   if (workers_.size() >= limits::kMaxWorkers && !workers_.contains(id))
-    return fail(Errc::resource_exhausted, fmt::format("{} workers are known; more are not taken", workers_.size()));
+    return fail(Errc::resource_exhausted,
+                fmt::format("{} workers are known; more are not taken", workers_.size()));
 
   auto connection = std::make_shared<Connection>();
   connection->worker = id;
@@ -130,11 +130,13 @@ void Service::receive(const std::shared_ptr<Connection>& from, FromWorker messag
                         [](const WorkerHello&) {},  // said at connect(); the door refuses a second one
                         [&](const WorkerProgress& m) { on_message_locked(from, m); },
                         [&](const UnitFailure& m) {
-                          log_job(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile, m.unit.round,
-                                                          from->worker.value, m.reason));
+                          log_job(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
+                                                          m.unit.round, from->worker.value, m.reason));
                           run_locked(UnitFailed{from->worker, m});
                         },
-                        [&](const LeaseReturned& m) { run_locked(LeaseCameBack{from->worker, m}); },
+                        [&](const LeaseReturned& m) {
+                          run_locked(LeaseCameBack{from->worker, m});
+                        },
                         [&](const WorkerDraining&) { run_locked(WorkerDrains{from->worker}); }},
              message);
 }
@@ -176,7 +178,8 @@ void Service::note_leased_locked(JobEntry& entry, const Lease& lease, const Work
   for (const LeaseUnit& unit : lease.units) {
     auto& holders = entry.leased[{unit.tile, unit.round}];
     if (std::find(holders.begin(), holders.end(), worker) == holders.end()) holders.push_back(worker);
-    hub_->publish("tile", tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, worker.value),
+    hub_->publish("tile",
+                  tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, worker.value),
                   lease.job.value);
   }
 }
@@ -190,7 +193,8 @@ void Service::on(const WorkerStateChanged& e, Todo&) {
 }
 
 void Service::on(const WorkerBlocked& e, Todo&) {
-  log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value), "gets no more of this job: " + e.why);
+  log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value),
+           "gets no more of this job: " + e.why);
   log_job(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 

@@ -18,12 +18,18 @@ std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_hand
 // ls_domain has to_string; the views must link without it.
 std::string_view state_word(JobState state) {
   switch (state) {
-    case JobState::queued: return "queued";
-    case JobState::running: return "running";
-    case JobState::paused: return "paused";
-    case JobState::done: return "done";
-    case JobState::failed: return "failed";
-    case JobState::cancelled: return "cancelled";
+    case JobState::queued:
+      return "queued";
+    case JobState::running:
+      return "running";
+    case JobState::paused:
+      return "paused";
+    case JobState::done:
+      return "done";
+    case JobState::failed:
+      return "failed";
+    case JobState::cancelled:
+      return "cancelled";
   }
   return "";
 }
@@ -54,7 +60,8 @@ json to_value(const JobView& v) {
            {"majorant_violations", v.health.majorant_violations}}}};
   j["rmse"] = v.error_now ? number(v.error_now->rmse) : json();
   j["relmse"] = v.error_now ? number(v.error_now->relmse) : json();
-  j["relmse_ci95"] = v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
+  j["relmse_ci95"] =
+      v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
   return j;
 }
 
@@ -102,8 +109,8 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
   std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi\n";
   for (const auto& p : points)
-    csv += fmt::format("{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse,
-                       p.error.relmse_lo, p.error.relmse_hi);
+    csv += fmt::format("{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
+                       p.error.relmse, p.error.relmse_lo, p.error.relmse_hi);
   return csv;
 }
 
@@ -117,6 +124,8 @@ std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& r
                    {"worker", worker}});
 }
 
-std::string worker_gone_json(const WorkerId& worker) { return dump(json{{"id", worker.value}, {"state", "gone"}}); }
+std::string worker_gone_json(const WorkerId& worker) {
+  return dump(json{{"id", worker.value}, {"state", "gone"}});
+}
 
 }  // namespace ls::coordinator

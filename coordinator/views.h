@@ -9,10 +9,10 @@
 namespace ls::coordinator {
 
 std::string job_json(const JobView& job);
-std::string jobs_json(const std::vector<JobView>& jobs);           // {"jobs": [...]}
+std::string jobs_json(const std::vector<JobView>& jobs);  // {"jobs": [...]}
 std::string worker_json(const WorkerView& worker);
-std::string workers_json(const std::vector<WorkerView>& workers);  // {"workers": [...]}
-std::string tiles_json(const std::vector<TileView>& tiles);        // {"tiles": [...]}
+std::string workers_json(const std::vector<WorkerView>& workers);          // {"workers": [...]}
+std::string tiles_json(const std::vector<TileView>& tiles);                // {"tiles": [...]}
 std::string convergence_csv(const std::vector<ConvergencePoint>& points);  // with a header line
 
 // Data of `tile` events. `state`: "leased", "folded" or "free".

@@ -4,11 +4,14 @@
 
 namespace ls::coordinator {
 namespace {
-std::size_t bytes_of(const WaitingPartial& w) { return w.partial ? w.partial->sums.size() * sizeof(float) : 0; }
+std::size_t bytes_of(const WaitingPartial& w) {
+  return w.partial ? w.partial->sums.size() * sizeof(float) : 0;
+}
 }  // namespace
 
 void Assembly::hold(TileIndex tile, RoundIndex round, WaitingPartial waiting) {
-  if (waiting.place && waiting_bytes_ + bytes_of(waiting) > limits::kMaxPendingPartials) waiting.partial.reset();
+  if (waiting.place && waiting_bytes_ + bytes_of(waiting) > limits::kMaxPendingPartials)
+    waiting.partial.reset();
   waiting_bytes_ += bytes_of(waiting);
   auto& slot = waiting_[{tile, round}];
   waiting_bytes_ -= bytes_of(slot);

@@ -1,5 +1,5 @@
-// One job's image in the making: the film, the accepted partials that wait for an earlier round, the error figures.
-// Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
+// One job's image in the making: the film, the accepted partials that wait for an earlier round, the error
+// figures. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,8 @@ class Assembly {
   Assembly(TileGrid grid, bool keep_relative) : film_(grid), errors_(grid.count(), keep_relative) {}
   Assembly(Film film, RoundErrors errors) : film_(std::move(film)), errors_(std::move(errors)) {}
 
-  // Keeps a partial until take(). Its pixels are dropped, if it has a place, when too many wait (kMaxPendingPartials).
+  // Keeps a partial until take(). Its pixels are dropped, if it has a place, when too many wait
+  // (kMaxPendingPartials).
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
   void forget_round(RoundIndex round);  // a cut round was reopened: what waits of it is void
@@ -39,7 +40,8 @@ class Assembly {
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
   void checkpoint_taken(RoundIndex round) { errors_.checkpoint_taken(round); }
-  // Rounds folded of each tile for a job of `spp` samples; a tail that was cut for fewer samples does not count.
+  // Rounds folded of each tile for a job of `spp` samples; a tail that was cut for fewer samples does not
+  // count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 
@@ -50,10 +52,11 @@ class Assembly {
   std::size_t waiting_bytes_ = 0;
 };
 
-// The folded state as a file: {"LSSNAP1\n", build, film, error figures}, closed by a SHA-256. Returned as nothing if it is
-// missing, damaged, of another grid or another build: then everything is folded again from the partials.
+// The folded state as a file: {"LSSNAP1\n", build, film, error figures}, closed by a SHA-256. Returned as
+// nothing if it is missing, damaged, of another grid or another build: then everything is folded again from
+// the partials.
 std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, std::string_view build);
-std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid, bool keep_relative,
-                                      std::string_view build);
+std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
+                                      bool keep_relative, std::string_view build);
 
 }  // namespace ls::coordinator

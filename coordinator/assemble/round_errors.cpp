@@ -28,8 +28,10 @@ TileError RoundErrors::at(RoundIndex round) const {
 
 void RoundErrors::checkpoint_taken(RoundIndex round) {
   for (Tile& t : tiles_) {
-    const auto later = std::find_if(t.rounds.begin(), t.rounds.end(), [&](const auto& r) { return r.first > round; });
-    if (later - t.rounds.begin() > 1) t.rounds.erase(t.rounds.begin(), later - 1);  // the last one up to `round` stays
+    const auto later =
+        std::find_if(t.rounds.begin(), t.rounds.end(), [&](const auto& r) { return r.first > round; });
+    if (later - t.rounds.begin() > 1)
+      t.rounds.erase(t.rounds.begin(), later - 1);  // the last one up to `round` stays
   }
 }
 
@@ -70,8 +72,8 @@ class Reader {
 };
 }  // namespace
 
-// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Written and read by the same build only: the
-// snapshot names its build and is left aside by another one.
+// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Written and read by the same build
+// only: the snapshot names its build and is left aside by another one.
 std::vector<std::byte> RoundErrors::save() const {
   std::vector<std::byte> out;
   for (const Tile& t : tiles_) {

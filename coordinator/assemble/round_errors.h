@@ -1,6 +1,6 @@
-// The error sums of every tile after every fold, as far as they are still needed: a checkpoint of round r sums over all
-// tiles what each said at r, or at its last round before r, though some are ahead already. So the figures of a checkpoint
-// do not depend on the order of arrival.
+// The error sums of every tile after every fold, as far as they are still needed: a checkpoint of round r
+// sums over all tiles what each said at r, or at its last round before r, though some are ahead already. So
+// the figures of a checkpoint do not depend on the order of arrival.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,13 @@ namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // `keep_relative`: also keep each fold's relative error sum for good, which the farm's stopping needs after a restart.
+  // `keep_relative`: also keep each fold's relative error sum for good, which the farm's stopping needs after
+  // a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Rounds of a tile in order; a round given again (a cut one, now in full) replaces what was said of it.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  TileError at(RoundIndex round) const;  // summed in tile order
+  TileError at(RoundIndex round) const;     // summed in tile order
   void checkpoint_taken(RoundIndex round);  // at() will not be asked for rounds before this one again
 
   // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.

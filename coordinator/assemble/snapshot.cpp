@@ -43,8 +43,8 @@ std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors
   return out;
 }
 
-std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid, bool keep_relative,
-                                      std::string_view build) {
+std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
+                                      bool keep_relative, std::string_view build) {
   constexpr std::size_t kSeal = 32;
   if (bytes.size() < kMagic.size() + kSeal) return std::nullopt;
   if (std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) return std::nullopt;

@@ -10,7 +10,8 @@ namespace ls::coordinator {
 namespace {
 
 BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
-  return {{code, fmt::format("the result of tile {} round {} was refused: {}", result.unit.tile, result.unit.round, why)}};
+  return {{code, fmt::format("the result of tile {} round {} was refused: {}", result.unit.tile,
+                             result.unit.round, why)}};
 }
 
 // The other ways a round of this tile is cut: same header, same start, an end within the round.
@@ -18,15 +19,17 @@ bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex ro
   UnitHeader other = got;
   other.samples = expected.samples;
   const SampleRange full = round_range(round);
-  return other == expected && got.samples.s0 == full.s0 && got.samples.s1 > full.s0 && got.samples.s1 <= full.s1;
+  return other == expected && got.samples.s0 == full.s0 && got.samples.s1 > full.s0 &&
+         got.samples.s1 <= full.s1;
 }
 
 }  // namespace
 
 Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame) {
   if (result.exr.size() > ls::limits::kPartialBytes)
-    return bad(result, Errc::resource_exhausted,
-               fmt::format("{} bytes are more than the {} allowed", result.exr.size(), ls::limits::kPartialBytes));
+    return bad(
+        result, Errc::resource_exhausted,
+        fmt::format("{} bytes are more than the {} allowed", result.exr.size(), ls::limits::kPartialBytes));
   if (!std::isfinite(result.cpu_seconds) || result.cpu_seconds < 0)
     return bad(result, Errc::invalid_argument, "its CPU time is not a number of seconds");
   auto partial = decode_partial(result.exr, expected, frame);
@@ -39,8 +42,8 @@ Verified verify_result(const UnitResult& result, const UnitHeader& expected, Fra
   }
   if (const Digest digest = unit_digest(*partial); digest != result.digest)
     return bad(result, Errc::invalid_argument,
-               fmt::format("its digest is {}, not {} as it says; the worker's memory or network may be bad", digest.hex(),
-                           result.digest.hex()));
+               fmt::format("its digest is {}, not {} as it says; the worker's memory or network may be bad",
+                           digest.hex(), result.digest.hex()));
   return std::move(*partial);
 }
 

@@ -8,7 +8,8 @@
 
 namespace ls::coordinator {
 
-// An honest partial of the same round, but of another sample range than is wanted now: the job was extended meanwhile.
+// An honest partial of the same round, but of another sample range than is wanted now: the job was extended
+// meanwhile.
 struct OtherRange {
   SampleRange samples;
 };

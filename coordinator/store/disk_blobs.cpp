@@ -18,7 +18,10 @@ namespace {
 class DiskUpload final : public BlobStore::Upload {
  public:
   DiskUpload(Digest digest, File file, std::filesystem::path temporary, std::filesystem::path final_path)
-      : digest_(digest), file_(std::move(file)), temporary_(std::move(temporary)), final_(std::move(final_path)) {}
+      : digest_(digest),
+        file_(std::move(file)),
+        temporary_(std::move(temporary)),
+        final_(std::move(final_path)) {}
   ~DiskUpload() override {
     if (!temporary_.empty()) ::unlink(temporary_.c_str());
   }
@@ -26,8 +29,8 @@ class DiskUpload final : public BlobStore::Upload {
   Result<void> append(std::span<const std::byte> bytes) override {
     if (temporary_.empty()) return fail(Errc::failed_precondition, "this upload has ended");
     if (bytes.size() > limits::kMaxBlobBytes - size_)
-      return fail(Errc::resource_exhausted,
-                  fmt::format("blob {} is larger than the {} bytes allowed", digest_.hex(), limits::kMaxBlobBytes));
+      return fail(Errc::resource_exhausted, fmt::format("blob {} is larger than the {} bytes allowed",
+                                                        digest_.hex(), limits::kMaxBlobBytes));
     if (auto done = write_all(file_, bytes, temporary_); !done) return done;
     hash_.update(bytes);
     size_ += bytes.size();
@@ -45,13 +48,16 @@ class DiskUpload final : public BlobStore::Upload {
  private:
   Result<void> publish() {
     if (const Digest got = hash_.finish(); got != digest_)
-      return fail(Errc::invalid_argument,
-                  fmt::format("the {} bytes received have the SHA-256 {}, not {}: damaged on the way, or the wrong file; "
-                              "send it again",
-                              size_, got.hex(), digest_.hex()));
+      return fail(
+          Errc::invalid_argument,
+          fmt::format(
+              "the {} bytes received have the SHA-256 {}, not {}: damaged on the way, or the wrong file; "
+              "send it again",
+              size_, got.hex(), digest_.hex()));
     if (::fsync(file_.fd()) != 0) return tl::unexpected(errno_error("sync", temporary_));
     if (auto made = make_folder(final_.parent_path()); !made) return made;
-    if (::rename(temporary_.c_str(), final_.c_str()) != 0) return tl::unexpected(errno_error("rename to", final_));
+    if (::rename(temporary_.c_str(), final_.c_str()) != 0)
+      return tl::unexpected(errno_error("rename to", final_));
     if (auto synced = sync_folder(final_.parent_path()); !synced) return synced;
     return sync_folder(final_.parent_path().parent_path());
   }
@@ -89,7 +95,8 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return tl::unexpected(errno_error("look at", path(digest)));
 }
 
-Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const {
+Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
+                                               std::uint64_t length) const {
   const auto bytes = size(digest);
   if (!bytes) return tl::unexpected(bytes.error());
   if (offset > *bytes)

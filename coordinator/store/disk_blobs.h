@@ -1,4 +1,5 @@
-// Blobs as files: DIR/ab/<64 hex digits>, written under DIR/tmp and renamed when digest and bytes are proven and synced.
+// Blobs as files: DIR/ab/<64 hex digits>, written under DIR/tmp and renamed when digest and bytes are proven
+// and synced.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +16,8 @@ class DiskBlobs final : public BlobStore {
 
   bool has(const Digest& digest) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
-  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const override;
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override;
   Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override;
   Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override;
 

@@ -34,14 +34,16 @@ Error errno_error(std::string_view what, const std::filesystem::path& path) {
   const int code = errno;
   const std::string reason = std::strerror(code);
   if (code == ENOSPC || code == EDQUOT || code == EFBIG)
-    return {Errc::resource_exhausted, fmt::format("the disk is full: cannot {} {} ({}); free some space and try again",
-                                                  what, path.string(), reason)};
+    return {Errc::resource_exhausted,
+            fmt::format("the disk is full: cannot {} {} ({}); free some space and try again", what,
+                        path.string(), reason)};
   if (code == ENOENT) return {Errc::not_found, fmt::format("cannot {} {}: {}", what, path.string(), reason)};
   if (code == EACCES || code == EPERM || code == EROFS)
     return {Errc::permission_denied,
             fmt::format("cannot {} {}: {}; check the folder's owner and mode", what, path.string(), reason)};
   if (code == EMFILE || code == ENFILE)
-    return {Errc::resource_exhausted, fmt::format("cannot {} {}: {}; raise `ulimit -n`", what, path.string(), reason)};
+    return {Errc::resource_exhausted,
+            fmt::format("cannot {} {}: {}; raise `ulimit -n`", what, path.string(), reason)};
   return {Errc::unavailable, fmt::format("cannot {} {}: {}", what, path.string(), reason)};
 }
 
@@ -55,7 +57,8 @@ Result<void> make_folder(const std::filesystem::path& folder) {
   return {};
 }
 
-Result<void> write_all(const File& file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
+Result<void> write_all(const File& file, std::span<const std::byte> bytes,
+                       const std::filesystem::path& path) {
   while (!bytes.empty()) {
     const ssize_t n = ::write(file.fd(), bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
@@ -70,7 +73,8 @@ Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, s
   std::vector<std::byte> bytes(length);
   std::size_t have = 0;
   while (have < length) {
-    const ssize_t n = ::pread(file.fd(), bytes.data() + have, length - have, static_cast<off_t>(offset + have));
+    const ssize_t n =
+        ::pread(file.fd(), bytes.data() + have, length - have, static_cast<off_t>(offset + have));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return tl::unexpected(errno_error("read", path));
     if (n == 0)
@@ -87,8 +91,8 @@ Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std:
   struct stat info {};
   if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
   if (static_cast<std::uint64_t>(info.st_size) > max_bytes)
-    return fail(Errc::resource_exhausted,
-                fmt::format("{} has {} bytes, more than the {} allowed here", path.string(), info.st_size, max_bytes));
+    return fail(Errc::resource_exhausted, fmt::format("{} has {} bytes, more than the {} allowed here",
+                                                      path.string(), info.st_size, max_bytes));
   return read_at(*file, 0, static_cast<std::size_t>(info.st_size), path);
 }
 
@@ -124,9 +128,10 @@ Result<File> lock_folder(const std::filesystem::path& folder) {
   if (!file) return file;
   if (::flock(file->fd(), LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return tl::unexpected(errno_error("lock", path));
-    return fail(Errc::failed_precondition,
-                fmt::format("another coordinator is using {}; stop it, or give this one a --data folder of its own",
-                            folder.string()));
+    return fail(
+        Errc::failed_precondition,
+        fmt::format("another coordinator is using {}; stop it, or give this one a --data folder of its own",
+                    folder.string()));
   }
   return file;
 }

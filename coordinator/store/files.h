@@ -42,7 +42,8 @@ Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, s
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes);
 Result<void> sync_data(const File& file, const std::filesystem::path& path);
 Result<void> sync_folder(const std::filesystem::path& folder);
-// Temporary file, fsync, rename, fsync of the folder: after a crash the old or the new content stands there, whole.
+// Temporary file, fsync, rename, fsync of the folder: after a crash the old or the new content stands there,
+// whole.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 // Holds `folder` for this process alone until destroyed. failed_precondition if another one has it.

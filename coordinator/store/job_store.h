@@ -1,5 +1,5 @@
-// What the coordinator remembers of jobs besides their pixels. Two real ones: SQLite, and memory (`lightshaft render`).
-// Thread-safe. What a put or add returned for survives kill -9 and power loss (SQLite).
+// What the coordinator remembers of jobs besides their pixels. Two real ones: SQLite, and memory (`lightshaft
+// render`). Thread-safe. What a put or add returned for survives kill -9 and power loss (SQLite).
 #pragma once
 
 #include <cstdint>
@@ -36,10 +36,10 @@ struct StoredJob {
   JobId id;
   std::string name;  // scene file name
   double submitted_unix = 0;
-  Digest scene;      // blob
+  Digest scene;  // blob
   RenderSettings settings;
-  JobSpec spec;                         // as asked; spp as last extended
-  std::optional<std::uint64_t> spp;     // resolved; nothing: until target or time
+  JobSpec spec;                      // as asked; spp as last extended
+  std::optional<std::uint64_t> spp;  // resolved; nothing: until target or time
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
   std::vector<std::string> features_used, features_left_out;
@@ -62,16 +62,18 @@ struct LogLine {
 class JobStore {
  public:
   virtual ~JobStore() = default;
-  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
+  virtual Result<void> put_job(const StoredJob& job) = 0;   // inserts or replaces
   virtual Result<std::vector<StoredJob>> jobs() const = 0;  // in order of first put
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
 
-  virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;  // the oldest beyond kLogLinesKept go
+  virtual Result<void> add_log(const JobId& job,
+                               const LogLine& line) = 0;  // the oldest beyond kLogLinesKept go
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
-  // Adds `amount` to a named counter and returns its value before; durable. For ids that must never come twice.
+  // Adds `amount` to a named counter and returns its value before; durable. For ids that must never come
+  // twice.
   virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
 };
 

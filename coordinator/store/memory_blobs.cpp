@@ -13,15 +13,17 @@
 namespace ls::coordinator {
 namespace {
 
-Error no_blob(const Digest& digest) { return {Errc::not_found, fmt::format("there is no blob {}", digest.hex())}; }
+Error no_blob(const Digest& digest) {
+  return {Errc::not_found, fmt::format("there is no blob {}", digest.hex())};
+}
 
 class MemoryUpload final : public BlobStore::Upload {
  public:
   MemoryUpload(MemoryBlobs& store, Digest digest) : store_(store), digest_(digest) {}
   Result<void> append(std::span<const std::byte> bytes) override {
     if (bytes.size() > limits::kMaxBlobRead - bytes_.size())
-      return fail(Errc::resource_exhausted,
-                  fmt::format("blob {} is larger than the {} bytes kept in memory", digest_.hex(), limits::kMaxBlobRead));
+      return fail(Errc::resource_exhausted, fmt::format("blob {} is larger than the {} bytes kept in memory",
+                                                        digest_.hex(), limits::kMaxBlobRead));
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
     return {};
   }
@@ -66,7 +68,8 @@ Result<std::uint64_t> MemoryBlobs::size(const Digest& digest) const {
                     found->second);
 }
 
-Result<std::vector<std::byte>> MemoryBlobs::read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const {
+Result<std::vector<std::byte>> MemoryBlobs::read(const Digest& digest, std::uint64_t offset,
+                                                 std::uint64_t length) const {
   const auto bytes = size(digest);
   if (!bytes) return tl::unexpected(bytes.error());
   if (offset > *bytes)
@@ -87,8 +90,8 @@ Result<std::vector<std::byte>> MemoryBlobs::read(const Digest& digest, std::uint
 
 Result<void> MemoryBlobs::put(const Digest& digest, std::span<const std::byte> bytes) {
   if (const Digest got = sha256(bytes); got != digest)
-    return fail(Errc::invalid_argument,
-                fmt::format("the {} bytes received have the SHA-256 {}, not {}", bytes.size(), got.hex(), digest.hex()));
+    return fail(Errc::invalid_argument, fmt::format("the {} bytes received have the SHA-256 {}, not {}",
+                                                    bytes.size(), got.hex(), digest.hex()));
   const std::lock_guard lock(mutex_);
   blobs_.try_emplace(digest, std::vector<std::byte>(bytes.begin(), bytes.end()));
   return {};

@@ -13,13 +13,15 @@ namespace ls::coordinator {
 
 class MemoryBlobs final : public BlobStore {
  public:
-  // From now on `digest` is read from this file. The caller has computed the digest; the file must not change.
+  // From now on `digest` is read from this file. The caller has computed the digest; the file must not
+  // change.
   Result<void> adopt(const Digest& digest, std::filesystem::path path);
   std::optional<std::filesystem::path> adopted(const Digest& digest) const;
 
   bool has(const Digest& digest) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
-  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const override;
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override;
   Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override;
   Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override;
 

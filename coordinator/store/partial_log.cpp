@@ -58,7 +58,8 @@ RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr) {
   raw.nonfinite = record.health.nonfinite;
   raw.negative = record.health.negative;
   raw.majorant_violations = record.health.majorant_violations;
-  std::memcpy(raw.worker.data(), record.worker.value.data(), std::min(record.worker.value.size(), raw.worker.size()));
+  std::memcpy(raw.worker.data(), record.worker.value.data(),
+              std::min(record.worker.value.size(), raw.worker.size()));
   raw.payload_check = check_of(exr);
   raw.header_check = header_check(raw);
   return raw;
@@ -103,7 +104,8 @@ Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folde
   while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
   for (std::uint32_t i = 0; i < count; ++i)
     if (auto done = log->scan(i, i + 1 == count); !done) return tl::unexpected(done.error());
-  if (auto started = log->start_segment(count == 0 ? 0 : count - 1); !started) return tl::unexpected(started.error());
+  if (auto started = log->start_segment(count == 0 ? 0 : count - 1); !started)
+    return tl::unexpected(started.error());
   return log;
 }
 
@@ -126,7 +128,8 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
     at += sizeof(RawHeader) + raw->bytes;
   }
   if (at == size) return {};
-  // In an older segment this is damage of the disk: what follows is rendered again, the bytes stay for whoever looks.
+  // In an older segment this is damage of the disk: what follows is rendered again, the bytes stay for
+  // whoever looks.
   cut_bytes_ += size - at;
   log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
            last ? "cut a torn record" : "left out damaged records; their units are rendered again");
@@ -152,8 +155,8 @@ Result<void> PartialLog::start_segment(std::uint32_t segment) {
 
 Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::span<const std::byte> exr) {
   if (exr.size() > ls::limits::kPartialBytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("a partial of {} bytes is larger than {}", exr.size(), ls::limits::kPartialBytes));
+    return fail(Errc::invalid_argument, fmt::format("a partial of {} bytes is larger than {}", exr.size(),
+                                                    ls::limits::kPartialBytes));
   if (size_ > 0 && size_ + sizeof(RawHeader) + exr.size() > limits::kMaxSegmentBytes) {
     if (auto done = sync(); !done) return tl::unexpected(done.error());
     if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
@@ -163,7 +166,8 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
   auto written = write_all(current_, std::as_bytes(std::span(&raw, 1)), path);
   if (written) written = write_all(current_, exr, path);
   if (!written) {
-    // Half a record must not stand before the next one; where it cannot be cut the next one opens a new segment.
+    // Half a record must not stand before the next one; where it cannot be cut the next one opens a new
+    // segment.
     if (::ftruncate(current_.fd(), static_cast<off_t>(size_)) != 0) size_ = limits::kMaxSegmentBytes;
     return tl::unexpected(written.error());
   }

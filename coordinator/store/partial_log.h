@@ -1,6 +1,6 @@
-// Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed size, closed by a
-// checksum, and the EXR bytes. What stood in a file when sync() returned survives kill -9 and power loss; a torn record
-// behind it is found at open() and cut.
+// Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed
+// size, closed by a checksum, and the EXR bytes. What stood in a file when sync() returned survives kill -9
+// and power loss; a torn record behind it is found at open() and cut.
 //
 // append() and sync() from one thread; read() from any.
 #pragma once
@@ -43,12 +43,14 @@ class PartialLog {
     Place place;
   };
 
-  // Makes the folder, scans the segments in order. Headers are checked everywhere, EXR bytes in the last segment, where a
-  // torn tail can be; full segments were synced before the next one began.
+  // Makes the folder, scans the segments in order. Headers are checked everywhere, EXR bytes in the last
+  // segment, where a torn tail can be; full segments were synced before the next one began.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // at open()
-  std::uint64_t cut_bytes() const { return cut_bytes_; }      // torn or damaged bytes that were left out at open()
+  std::uint64_t cut_bytes() const {
+    return cut_bytes_;
+  }  // torn or damaged bytes that were left out at open()
   void forget_found() { std::vector<Entry>().swap(found_); }
 
   // After an error the file is as before.

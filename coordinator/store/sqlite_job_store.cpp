@@ -33,7 +33,8 @@ Error db_error(sqlite3* db, std::string_view what) {
   const int code = sqlite3_errcode(db);
   if (code == SQLITE_FULL)
     return {Errc::resource_exhausted,
-            fmt::format("the disk is full: cannot {} ({}); free some space and try again", what, sqlite3_errmsg(db))};
+            fmt::format("the disk is full: cannot {} ({}); free some space and try again", what,
+                        sqlite3_errmsg(db))};
   return {Errc::unavailable, fmt::format("cannot {}: {}", what, sqlite3_errmsg(db))};
 }
 
@@ -46,7 +47,8 @@ class Statement {
     statement_.reset(raw);
   }
   Statement& bind(std::string_view text) {
-    sqlite3_bind_text(statement_.get(), ++bound_, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+    sqlite3_bind_text(statement_.get(), ++bound_, text.data(), static_cast<int>(text.size()),
+                      SQLITE_TRANSIENT);
     return *this;
   }
   Statement& bind(double value) {
@@ -72,7 +74,9 @@ class Statement {
   }
   std::string text(int column) const {
     const auto* chars = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
-    return chars ? std::string(chars, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))) : "";
+    return chars
+               ? std::string(chars, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column)))
+               : "";
   }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
@@ -114,8 +118,10 @@ class SqliteJobStore final : public JobStore {
 
   Result<void> add_point(const JobId& job, const ConvergencePoint& p) override {
     const std::lock_guard lock(mutex_);
-    return Statement(db_.get(), "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi) "
-                                "VALUES(?, ?, ?, ?, ?, ?, ?, ?)")
+    return Statement(
+               db_.get(),
+               "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi) "
+               "VALUES(?, ?, ?, ?, ?, ?, ?, ?)")
         .bind(job.value)
         .bind(p.seconds)
         .bind(p.core_seconds)
@@ -130,12 +136,16 @@ class SqliteJobStore final : public JobStore {
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     const std::lock_guard lock(mutex_);
     std::vector<ConvergencePoint> all;
-    Statement rows(db_.get(), "SELECT seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi FROM points "
-                              "WHERE job = ? ORDER BY n");
+    Statement rows(db_.get(),
+                   "SELECT seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi FROM points "
+                   "WHERE job = ? ORDER BY n");
     rows.bind(job.value);
     auto row = rows.step("read the convergence");
     for (; row && *row; row = rows.step("read the convergence"))
-      all.push_back({rows.real(0), rows.real(1), rows.real(2), {rows.real(3), rows.real(4), rows.real(5), rows.real(6)}});
+      all.push_back({rows.real(0),
+                     rows.real(1),
+                     rows.real(2),
+                     {rows.real(3), rows.real(4), rows.real(5), rows.real(6)}});
     if (!row) return tl::unexpected(row.error());
     return all;
   }
@@ -150,8 +160,9 @@ class SqliteJobStore final : public JobStore {
         !done)
       return done;
     if (++log_lines_ % limits::kLogLinesKept != 0) return {};
-    return Statement(db_.get(), "DELETE FROM log WHERE job = ?1 AND n NOT IN "
-                                "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)")
+    return Statement(db_.get(),
+                     "DELETE FROM log WHERE job = ?1 AND n NOT IN "
+                     "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)")
         .bind(job.value)
         .bind(static_cast<std::int64_t>(limits::kLogLinesKept))
         .run("shorten a log");
@@ -160,8 +171,10 @@ class SqliteJobStore final : public JobStore {
   Result<std::vector<LogLine>> log(const JobId& job) const override {
     const std::lock_guard lock(mutex_);
     std::vector<LogLine> all;
-    Statement rows(db_.get(), "SELECT unix, text FROM (SELECT n, unix, text FROM log WHERE job = ? ORDER BY n DESC LIMIT ?) "
-                              "ORDER BY n");
+    Statement rows(
+        db_.get(),
+        "SELECT unix, text FROM (SELECT n, unix, text FROM log WHERE job = ? ORDER BY n DESC LIMIT ?) "
+        "ORDER BY n");
     rows.bind(job.value).bind(static_cast<std::int64_t>(limits::kLogLinesKept));
     auto row = rows.step("read a log");
     for (; row && *row; row = rows.step("read a log")) all.push_back({rows.real(0), rows.text(1)});
@@ -171,8 +184,9 @@ class SqliteJobStore final : public JobStore {
 
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
     const std::lock_guard lock(mutex_);
-    Statement row(db_.get(), "INSERT INTO counters(name, value) VALUES(?1, ?2) "
-                             "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value");
+    Statement row(db_.get(),
+                  "INSERT INTO counters(name, value) VALUES(?1, ?2) "
+                  "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value");
     row.bind(counter).bind(static_cast<std::int64_t>(amount));
     const auto stepped = row.step("reserve ids");
     if (!stepped) return tl::unexpected(stepped.error());
@@ -188,7 +202,8 @@ class SqliteJobStore final : public JobStore {
 };
 
 Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
-  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK) return tl::unexpected(db_error(db, what));
+  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
+    return tl::unexpected(db_error(db, what));
   return {};
 }
 
@@ -196,22 +211,25 @@ Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
 
 Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file) {
   sqlite3* raw = nullptr;
-  const int code =
-      sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
+  const int code = sqlite3_open_v2(
+      file.c_str(), &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
   Db db(raw);
   const std::string what = fmt::format("open the job database {}", file.string());
   if (code != SQLITE_OK) return tl::unexpected(db_error(raw, what));
   sqlite3_busy_timeout(raw, 5000);  // ms; only a backup or a curious person shares the file
   // NORMAL would lose acknowledged work on power loss.
-  for (const char* sql : {"PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL", "PRAGMA foreign_keys = ON"})
+  for (const char* sql :
+       {"PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL", "PRAGMA foreign_keys = ON"})
     if (auto done = execute(raw, sql, what); !done) return tl::unexpected(done.error());
   Statement version(raw, "PRAGMA user_version");
   if (auto row = version.step(what); !row) return tl::unexpected(row.error());
   if (const auto found = version.integer(0); found > kSchemaVersion)
-    return fail(Errc::failed_precondition,
-                fmt::format("{} was written by a newer Lightshaft (schema {}, this one knows {}); use that one, or another "
-                            "--data folder",
-                            file.string(), found, kSchemaVersion));
+    return fail(
+        Errc::failed_precondition,
+        fmt::format(
+            "{} was written by a newer Lightshaft (schema {}, this one knows {}); use that one, or another "
+            "--data folder",
+            file.string(), found, kSchemaVersion));
   if (auto done = version.run(what); !done) return tl::unexpected(done.error());
   if (auto done = execute(raw, kSchema, what); !done) return tl::unexpected(done.error());
   if (auto done = execute(raw, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)

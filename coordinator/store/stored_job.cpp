@@ -10,10 +10,14 @@ namespace {
 using nlohmann::json;
 
 json to_value(const JobTotals& t) {
-  return {{"render_seconds", t.render_seconds}, {"core_seconds", t.core_seconds},
-          {"load_seconds", t.load_seconds},     {"peak_rss_bytes", t.peak_rss_bytes},
-          {"spp_done", t.spp_done},             {"units", t.units},
-          {"nonfinite", t.health.nonfinite},    {"negative", t.health.negative},
+  return {{"render_seconds", t.render_seconds},
+          {"core_seconds", t.core_seconds},
+          {"load_seconds", t.load_seconds},
+          {"peak_rss_bytes", t.peak_rss_bytes},
+          {"spp_done", t.spp_done},
+          {"units", t.units},
+          {"nonfinite", t.health.nonfinite},
+          {"negative", t.health.negative},
           {"majorant_violations", t.health.majorant_violations}};
 }
 
@@ -58,15 +62,16 @@ StoredJob stored_from(const json& j) {
   job.settings = required(parse_render_settings(j.at("settings").get<std::string>()));
   job.spec = required(parse_job_spec(j.at("spec").get<std::string>()));
   if (!j.at("spp").is_null()) job.spp = j.at("spp").get<std::uint64_t>();
-  for (const auto& a : j.at("assets")) job.assets.push_back({digest_from(a.at("digest")), a.at("bytes"), a.at("name")});
+  for (const auto& a : j.at("assets"))
+    job.assets.push_back({digest_from(a.at("digest")), a.at("bytes"), a.at("name")});
   job.warnings = j.at("warnings");
   job.features_used = j.at("features_used");
   job.features_left_out = j.at("features_left_out");
   job.state = enum_from(j.at("state"), {JobState::queued, JobState::running, JobState::paused, JobState::done,
                                         JobState::failed, JobState::cancelled});
   if (!j.at("stopped").is_null())
-    job.stopped = enum_from(j.at("stopped"),
-                            {StopReason::spp, StopReason::error, StopReason::time, StopReason::user});
+    job.stopped =
+        enum_from(j.at("stopped"), {StopReason::spp, StopReason::error, StopReason::time, StopReason::user});
   job.error = j.at("error");
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
@@ -78,7 +83,8 @@ StoredJob stored_from(const json& j) {
 
 std::string to_json(const StoredJob& job) {
   json assets = json::array();
-  for (const auto& a : job.assets) assets.push_back({{"digest", a.digest.hex()}, {"bytes", a.bytes}, {"name", a.name}});
+  for (const auto& a : job.assets)
+    assets.push_back({{"digest", a.digest.hex()}, {"bytes", a.bytes}, {"name", a.name}});
   json j{{"id", job.id.value},
          {"name", job.name},
          {"submitted_unix", job.submitted_unix},

@@ -36,7 +36,8 @@ std::string refusal(const Verified& v) {
 TEST(FakePixels, SumsOverRangesComposePerHalf) {
   const Partial whole = fake_partial(header(1, {4, 32}));
   const Partial first = fake_partial(header(1, {4, 18})), second = fake_partial(header(1, {18, 32}));
-  for (std::size_t i = 0; i < whole.sums.size(); ++i) ASSERT_EQ(whole.sums[i], first.sums[i] + second.sums[i]);
+  for (std::size_t i = 0; i < whole.sums.size(); ++i)
+    ASSERT_EQ(whole.sums[i], first.sums[i] + second.sums[i]);
 }
 
 TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
@@ -131,9 +132,10 @@ TEST(Report, HasEveryKeyOfTheContract) {
   facts.error = ImageError{};
   facts.convergence = {{1, 2, 4, {.1, .2, .1, .3}}};
   const auto j = nlohmann::json::parse(report_json(facts));
-  for (const char* key : {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse",
-                          "relmse", "relmse_ci95", "nonfinite_samples", "pixels_sha256", "features_used",
-                          "features_left_out", "numeric_class", "stopped", "convergence"})
+  for (const char* key :
+       {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse",
+        "relmse", "relmse_ci95", "nonfinite_samples", "pixels_sha256", "features_used", "features_left_out",
+        "numeric_class", "stopped", "convergence"})
     EXPECT_TRUE(j.contains(key)) << key;
   for (const char* key : {"seconds", "core_seconds", "spp", "rmse", "relmse", "relmse_ci95"})
     EXPECT_TRUE(j["convergence"][0].contains(key)) << key;

@@ -98,9 +98,13 @@ TEST(Events, TellAJobFromSubmissionToItsEndWithGrowingIds) {
     const auto events = listener.until_state("done");
     std::set<std::string> tiles;
     for (std::size_t i = 0; i < events.size(); ++i) {
-      if (i > 0) { EXPECT_EQ(events[i].id, events[i - 1].id + 1); }
+      if (i > 0) {
+        EXPECT_EQ(events[i].id, events[i - 1].id + 1);
+      }
       const auto data = nlohmann::json::parse(events[i].data);
-      if (events[i].type != "worker") { EXPECT_EQ(events[i].job, job.value); }
+      if (events[i].type != "worker") {
+        EXPECT_EQ(events[i].job, job.value);
+      }
       if (events[i].type == "tile") tiles.insert(data["state"]);
     }
     EXPECT_EQ(tiles, (std::set<std::string>{"leased", "folded"}));

@@ -1,5 +1,5 @@
-// Fake workers for whole jobs through the coordinator's public interface: they render fake_partial, in any order, twice,
-// late or wrong, as a test wishes.
+// Fake workers for whole jobs through the coordinator's public interface: they render fake_partial, in any
+// order, twice, late or wrong, as a test wishes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,7 +38,8 @@ class Mailbox {
   // Nothing within 20 s: a test hangs no longer than that.
   std::optional<std::pair<int, ToWorker>> take() {
     std::unique_lock lock(mutex_);
-    if (!arrived_.wait_for(lock, std::chrono::seconds(20), [&] { return !mail_.empty(); })) return std::nullopt;
+    if (!arrived_.wait_for(lock, std::chrono::seconds(20), [&] { return !mail_.empty(); }))
+      return std::nullopt;
     auto first = std::move(mail_.front());
     mail_.pop_front();
     return first;
@@ -81,7 +82,9 @@ class FakeFarm {
   }
 
   // May change a result, hand in more of them, or hold some back.
-  std::function<std::vector<UnitResult>(UnitResult)> tamper = [](UnitResult r) { return std::vector{std::move(r)}; };
+  std::function<std::vector<UnitResult>(UnitResult)> tamper = [](UnitResult r) {
+    return std::vector{std::move(r)};
+  };
   std::function<void(std::vector<LeaseUnit>&)> reorder = [](auto&) {};
   int results_sent = 0;
   int stop_after = -1;  // results; then run() returns false
@@ -96,7 +99,8 @@ class FakeFarm {
         ADD_FAILURE() << "the farm stands still";
         return false;
       }
-      if (const auto* ack = std::get_if<ResultAck>(&letter->second); ack && ack->refused) refusals.push_back(*ack);
+      if (const auto* ack = std::get_if<ResultAck>(&letter->second); ack && ack->refused)
+        refusals.push_back(*ack);
       const auto* assign = std::get_if<AssignLease>(&letter->second);
       if (assign && !render(letter->first, *assign)) return false;
     }
@@ -117,7 +121,8 @@ class FakeFarm {
 
   UnitResult render_unit(const Lease& lease, const LeaseUnit& unit) {
     const JobBrief& brief = briefs_.at(lease.job);
-    const Partial partial = fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
+    const Partial partial =
+        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
     UnitResult r;
     r.unit = {lease.job, unit.tile, unit.round};
     r.lease = lease.id;

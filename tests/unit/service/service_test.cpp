@@ -230,10 +230,12 @@ TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
         if (farm.results_sent == k / 2) clock->advance(std::chrono::seconds(61));
         return std::vector{r};
       };
-      ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == static_cast<std::uint64_t>(k); }));
+      ASSERT_TRUE(
+          farm.run([&] { return coordinator->job(job)->units_done == static_cast<std::uint64_t>(k); }));
       const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
       const auto snapshot = dir.path() / "jobs" / job.value / "film.snap";
-      while (!std::filesystem::exists(snapshot) && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+      while (!std::filesystem::exists(snapshot) && std::chrono::steady_clock::now() < patience)
+        std::this_thread::yield();
       ASSERT_TRUE(std::filesystem::exists(snapshot)) << k;
     }
     auto coordinator = open_at(dir.path());
@@ -329,7 +331,8 @@ TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
   WorkerHello hello;
   hello.name = "w";
   auto mail = std::make_shared<Mailbox>();
-  EXPECT_EQ(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).error().code, Errc::unauthenticated);
+  EXPECT_EQ(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).error().code,
+            Errc::unauthenticated);
   hello.join_token = "open sesame";
   EXPECT_TRUE(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)));
   ASSERT_TRUE(std::holds_alternative<Welcome>(mail->take()->second));
