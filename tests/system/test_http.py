@@ -262,6 +262,8 @@ def test_a_signal_stops_it_in_order_with_readers_connected(tmp_path, sig):
     with Coordinator(tmp_path / "data") as coordinator:
         with coordinator.events("/api/v1/events") as stream, coordinator.connect() as idle:
             stream.read_id()
+            idle.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert status_of(idle.recv(65536)) == 200  # accepted, and kept open
             assert json.loads((coordinator.data / "ports.json").read_text())["http"] == coordinator.port
             coordinator.process.send_signal(sig)
             assert coordinator.process.wait(timeout=20) == 0
