@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""What the farm costs: a job on two one-thread workers of this machine against `lightshaft render --threads 2`.
+
+usage: overhead.py [--scene SCENE.xml] [--spp N] [--pairs 7]
+Interleaved pairs, the order swapped from pair to pair; prints render_seconds of both, the median ratio, the coordinator's CPU
+time as a share of the workers', and whether the pixels are the same. Nothing else should run meanwhile. A bench, not a test.
+Without --scene the demo scene is generated; choose --spp so that a job takes at least 30 s.
+"""
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+from local_farm import LocalFarm, bin_dir  # noqa: E402
+
+
+def demo_scene(folder):
+    kit = ROOT / "scenes" / "steam_room"
+    subprocess.run([sys.executable, kit / "make_steam.py", folder / "steam.vol", "--voxel", "0.05"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, kit / "make_scene.py", folder / "steam_room.xml"], check=True)
+    return folder / "steam_room.xml"
+
+
+def cpu_seconds(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def render_alone(scene, spp, seed, folder):
+    report = folder / "alone.json"
+    subprocess.run([bin_dir() / "lightshaft", "render", scene, "--spp", str(spp), "--seed", str(seed), "--threads", "2", "--quiet",
+                    "-o", folder / "alone.exr", "--report", report], check=True)
+    return json.loads(report.read_text())
+
+
+def render_on_farm(farm, scene, spp, seed):
+    before = cpu_seconds(farm.coordinator.popen.pid)
+    env = dict(os.environ, LIGHTSHAFT_URL=f"http://127.0.0.1:{farm.http}", LIGHTSHAFT_TOKEN=farm.token)
+    out = subprocess.run([bin_dir() / "lightshaft", "submit", scene, "--spp", str(spp), "--seed", str(seed)], check=True, env=env,
+                         stdout=subprocess.PIPE, text=True).stdout
+    job = out.split()[0]
+    farm.wait_for_job(job, patience=3600)
+    return farm.report(job), cpu_seconds(farm.coordinator.popen.pid) - before
+
+
+def main():
+    args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    args.add_argument("--scene", type=pathlib.Path)
+    args.add_argument("--spp", type=int, default=32)
+    args.add_argument("--pairs", type=int, default=7)
+    options = args.parse_args()
+    ratios, shares = [], []
+    with tempfile.TemporaryDirectory() as temporary, LocalFarm() as farm:
+        folder = pathlib.Path(temporary)
+        scene = options.scene or demo_scene(folder)
+        farm.add_workers(2, threads=1, fake=False)
+        farm.wait_for_workers(2)
+        for pair in range(options.pairs):
+            if pair % 2:
+                one = render_alone(scene, options.spp, pair, folder)
+                many, coordinator = render_on_farm(farm, scene, options.spp, pair)
+            else:
+                many, coordinator = render_on_farm(farm, scene, options.spp, pair)
+                one = render_alone(scene, options.spp, pair, folder)
+            ratios.append(many["render_seconds"] / one["render_seconds"])
+            shares.append(coordinator / many["core_seconds"])
+            same = many["pixels_sha256"] == one["pixels_sha256"]
+            print(f"pair {pair + 1}: farm {many['render_seconds']:.2f} s, alone {one['render_seconds']:.2f} s, ratio {ratios[-1]:.4f}, "
+                  f"coordinator CPU {100 * shares[-1]:.2f} % of the workers', {'same pixels' if same else 'PIXELS DIFFER'}", flush=True)
+    print(f"median ratio {statistics.median(ratios):.4f}, coordinator CPU {100 * statistics.median(shares):.2f} %")
+
+
+if __name__ == "__main__":
+    main()
