@@ -19,6 +19,15 @@ std::optional<T> number(std::string_view text) {
   return value;
 }
 
+// "640x360" at 'x'.
+std::optional<std::pair<int, int>> two_numbers(std::string_view text, char between) {
+  const auto at = text.find(between);
+  if (at == std::string_view::npos) return std::nullopt;
+  const auto first = number<int>(text.substr(0, at)), second = number<int>(text.substr(at + 1));
+  if (!first || !second) return std::nullopt;
+  return std::pair(*first, *second);
+}
+
 tl::unexpected<Error> wrong(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
 
 // Fills an optional field from an option that may not have been given.
@@ -57,27 +66,21 @@ Result<double> parse_positive(const std::string& what, const std::string& text, 
 }
 
 Result<FrameSize> parse_size(const std::string& text) {
-  const auto x = text.find('x');
-  const auto width = number<int>(std::string_view(text).substr(0, x));
-  const auto height =
-      x == std::string::npos ? std::nullopt : number<int>(std::string_view(text).substr(x + 1));
-  if (!width || !height)
-    return wrong(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
-  if (*width < 1 || *height < 1) return wrong(fmt::format("--size '{}': such an image has no pixels", text));
-  if (*width > kMaxFrameSide || *height > kMaxFrameSide || std::int64_t{*width} * *height > kMaxFramePixels)
+  const auto size = two_numbers(text, 'x');
+  if (!size) return wrong(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
+  const auto [width, height] = *size;
+  if (width < 1 || height < 1) return wrong(fmt::format("--size '{}': such an image has no pixels", text));
+  if (width > kMaxFrameSide || height > kMaxFrameSide || std::int64_t{width} * height > kMaxFramePixels)
     return wrong(fmt::format("--size '{}': at most {} pixels a side and {} in all", text, kMaxFrameSide,
                              kMaxFramePixels));
-  return FrameSize{*width, *height};
+  return FrameSize{width, height};
 }
 
 Result<std::pair<int, int>> parse_pixel(const std::string& text) {
-  const auto comma = text.find(',');
-  const auto x = number<int>(std::string_view(text).substr(0, comma));
-  const auto y =
-      comma == std::string::npos ? std::nullopt : number<int>(std::string_view(text).substr(comma + 1));
-  if (!x || !y || *x < 0 || *y < 0)
+  const auto pixel = two_numbers(text, ',');
+  if (!pixel || pixel->first < 0 || pixel->second < 0)
     return wrong(fmt::format("--pixel '{}': write it as X,Y, counted from 0 at the top left", text));
-  return std::pair(*x, *y);
+  return *pixel;
 }
 
 Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::string>& defines) {

@@ -86,6 +86,8 @@ void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, 
         if (const auto job = coordinator.job(id)) bar.show(figures_of(*job));
     });
   (void)coordinator.wait(id);
+  shower = {};
+  if (const auto job = coordinator.job(id); job && bar.shown()) bar.show(figures_of(*job));
 }
 
 class LocalRender {

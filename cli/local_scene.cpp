@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "common/scene/folder_assets.h"
@@ -14,6 +16,8 @@ namespace ls::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kMostShown = 200;  // characters of names in a message
 
 // A folder that remembers what was asked of it.
 class RecordedFolder final : public AssetSource {
@@ -29,16 +33,47 @@ class RecordedFolder final : public AssetSource {
   }
   Result<std::string> text(std::string_view name) override {
     auto text = folder_.text(name);
-    if (text)
-      if (const auto asset = find(name); !asset) return tl::unexpected(asset.error());
+    if (!text) return text;
+    if (const auto asset = find(name); !asset) return tl::unexpected(asset.error());
+    texts_ += *text;
     return text;
   }
   std::map<std::string, LocalFile> take_files() { return std::move(files_); }
+  const std::string& included_texts() const { return texts_; }
 
  private:
   FolderAssets folder_;
   std::map<std::string, LocalFile> files_;
+  std::string texts_;  // bounded by the reader
 };
+
+// The $names in a text, as long as they can be.
+std::set<std::string> parameters_in(const std::string& text) {
+  const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  std::set<std::string> names;
+  for (auto at = text.find('$'); at != std::string::npos; at = text.find('$', at + 1)) {
+    auto end = at + 1;
+    while (end < text.size() && is_name(text[end])) ++end;
+    if (end > at + 1) names.insert(text.substr(at + 1, end - at - 1));
+  }
+  return names;
+}
+
+// A -D that nothing in the scene asks for is a typing error. ($ab may stand for the value of $a followed by a
+// b.)
+std::optional<std::string> unused_define(const std::map<std::string, std::string>& defines,
+                                         const std::string& texts) {
+  if (defines.empty()) return std::nullopt;
+  const std::set<std::string> used = parameters_in(texts);
+  for (const auto& [name, value] : defines) {
+    if (const auto at = used.lower_bound(name); at != used.end() && at->starts_with(name)) continue;
+    std::string there = used.empty() ? "it has no parameters" : "it has";
+    for (const auto& u : used)
+      if (there.size() < kMostShown) there += " $" + u;
+    return fmt::format("-D {}: the scene has no ${}; {}", name, name, there);
+  }
+  return std::nullopt;
+}
 
 tl::unexpected<coordinator::Rejected> refused(const std::string& path, std::string text) {
   Diagnostic d;
@@ -73,6 +108,8 @@ tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
   if (!read.scene)
     return tl::unexpected(coordinator::Rejected{
         {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
+  if (auto unused = unused_define(defines, *text + folder.included_texts()))
+    return refused(path, std::move(*unused));
   return LocalScene{path, std::move(*text), std::move(*read.scene), std::move(read.diagnostics),
                     folder.take_files()};
 }

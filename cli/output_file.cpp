@@ -25,7 +25,8 @@ Result<void> check_output(const std::string& option, const fs::path& file) {
 Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status) || fs::is_regular_file(status)) return coordinator::write_atomically(file, bytes);
+  if (!fs::exists(status) || fs::is_regular_file(status))
+    return coordinator::write_atomically(fs::absolute(file, error), bytes);
   std::ofstream out(file, std::ios::binary);  // a pipe or device: nothing can be renamed over it
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.close();

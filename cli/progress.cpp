@@ -14,7 +14,7 @@
 namespace ls::cli {
 namespace {
 
-constexpr int kBarCells = 24;
+constexpr int kBarCells = 16;
 constexpr int kNarrowestWithBar = 70;  // columns of the terminal
 
 std::string show_rate(double per_second) {

@@ -33,15 +33,10 @@ int say_error(const Error& error) {
 int say_rejected(const coordinator::Rejected& rejected) {
   say_diagnostics(rejected.diagnostics);
   if (rejected.diagnostics.empty()) say("lightshaft: error: " + rejected.error.message);
-  switch (rejected.error.code) {
-    case Errc::internal:
-    case Errc::unavailable:
-    case Errc::permission_denied:
-    case Errc::unauthenticated:
-      return kFailed;
-    default:
-      return kUsage;
-  }
+  const Errc code = rejected.error.code;
+  // resource_exhausted: more was asked for than the limits allow.
+  return input_at_fault(code) || code == Errc::resource_exhausted || !rejected.diagnostics.empty() ? kUsage
+                                                                                                   : kFailed;
 }
 
 void say_diagnostics(const std::vector<Diagnostic>& diagnostics) {

@@ -1,0 +1,124 @@
+"""The command as a farm's client, against a real coordinator and real workers."""
+
+import json
+import os
+import subprocess
+
+import pytest
+from cli_kit import FOG, digest, lightshaft, load, write_fog
+from local_farm import LocalFarm, bin_dir, wait_until
+
+
+@pytest.fixture(scope="module")
+def rendering(tmp_path_factory):
+    """A farm whose two workers render for real."""
+    with LocalFarm(tmp_path_factory.mktemp("farm")) as farm:
+        for _ in range(2):
+            farm.add_worker(fake=False)
+        yield farm
+
+
+def environment(farm, **more):
+    return {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token, **more}
+
+
+def call(farm, *arguments, code=0, **more):
+    return lightshaft(*arguments, env=environment(farm, **more), code=code)
+
+
+def test_submit_renders_the_pixels_of_render(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    alone = digest(lightshaft("render", scene, "-o", tmp_path / "alone.exr", "--spp", 20, "--seed", 3))
+
+    sent = lightshaft("submit", scene, "--to", f"http://127.0.0.1:{rendering.http}", "--token-file", rendering.data / "token",
+                      "--spp", 20, "--seed", 3, "--wait", "-o", tmp_path / "farm.exr", "--report", tmp_path / "farm.json")
+
+    job = sent.stdout.split()[0]
+    assert load(tmp_path / "farm.json")["pixels_sha256"] == alone
+    assert (tmp_path / "farm.exr").stat().st_size > 1000
+    assert call(rendering, "fetch", job, "-o", tmp_path / "again.exr").returncode == 0
+    assert (tmp_path / "again.exr").read_bytes() == (tmp_path / "farm.exr").read_bytes()
+
+
+def test_files_are_sent_once(rendering, tmp_path):
+    folder = tmp_path / "fresh"
+    folder.mkdir()
+    scene = write_fog(folder, n=7)
+
+    first = call(rendering, "submit", scene, "--spp", 2)
+    second = call(rendering, "submit", scene, "--spp", 2, "--seed", 8)
+
+    assert "fog.vol" in first.stderr and "fog.vol" not in second.stderr
+
+
+def test_a_bad_scene_is_told_before_anything_is_sent(tmp_path):
+    scene = tmp_path / "bad.xml"
+    scene.write_text(FOG.replace("gridvolume", "gridvolme"))
+
+    said = lightshaft("submit", scene, "--to", "http://127.0.0.1:9", code=2).stderr
+
+    assert "bad.xml:" in said and "gridvolume" in said and "cannot be reached" not in said
+
+
+def test_a_grid_that_only_the_worker_reads_fails_the_job_by_name(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    grid = tmp_path / "fog.vol"
+    grid.write_bytes(grid.read_bytes()[:-9])
+
+    said = call(rendering, "submit", scene, "--wait", code=1).stderr
+
+    assert "fog.vol" in said
+
+
+def test_the_coordinators_refusal_is_readable(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+
+    assert "LIGHTSHAFT_TOKEN" in call(rendering, "jobs", code=1, LIGHTSHAFT_TOKEN="wrong").stderr
+    assert "no job" in call(rendering, "show", "j-0", code=1).stderr
+    assert "1000000000 samples" in call(rendering, "submit", scene, "--spp", "1000000000", code=2).stderr
+    assert "cannot be reached" in lightshaft("jobs", "--to", "http://127.0.0.1:9", code=1).stderr
+    assert "http://" in lightshaft("jobs", "--to", "farm.example", code=2).stderr
+    without = {k: v for k, v in os.environ.items() if k != "LIGHTSHAFT_URL"}
+    assert "LIGHTSHAFT_URL" in lightshaft("jobs", env=without, code=2).stderr
+
+
+def test_a_job_is_shown_paused_resumed_extended_and_cancelled(farm, tmp_path):
+    """No worker yet, so that every state holds until the next command."""
+    scene = write_fog(tmp_path)
+    job = call(farm, "submit", scene, "--spp", 4).stdout.strip()
+
+    assert json.loads(call(farm, "show", job, "--json").stdout)["id"] == job
+    assert "fog.xml" in call(farm, "show", job).stdout
+    assert job in call(farm, "jobs").stdout
+    assert [j["id"] for j in json.loads(call(farm, "jobs", "--json").stdout)["jobs"]] == [job]
+    assert "no workers" in call(farm, "workers").stdout
+    assert "paused" in call(farm, "pause", job).stdout
+    assert json.loads(call(farm, "resume", job, "--json").stdout)["state"] in ("queued", "running")
+    call(farm, "extend", job, "--spp", 8)
+
+    farm.add_worker()
+    watched = call(farm, "watch", job, "--json").stdout.splitlines()
+    assert json.loads(watched[-1])["state"] == "done" and json.loads(watched[-1])["spp_done"] == 8
+    assert "worker-1" in call(farm, "workers").stdout
+    assert json.loads(call(farm, "workers", "--json").stdout)["workers"][0]["name"] == "worker-1"
+
+    endless = call(farm, "submit", scene, "--spp", 1_000_000).stdout.strip()
+    assert "cancelled" in call(farm, "cancel", endless).stdout
+    assert "cancelled" in call(farm, "watch", endless, code=1).stderr
+
+
+def test_watch_outlives_a_restart_of_the_coordinator(farm, tmp_path):
+    scene = write_fog(tmp_path)
+    farm.add_worker("--fake-delay", 10)
+    job = call(farm, "submit", scene, "--spp", 64).stdout.strip()
+    log = tmp_path / "watch.log"
+    with open(log, "wb") as out:
+        watching = subprocess.Popen([bin_dir() / "lightshaft", "watch", job, "--json"], stdout=out, env=environment(farm))
+    try:
+        wait_until(lambda: log.read_text().count("\n") > 0, "the watcher has seen the job")
+        farm.restart_coordinator()
+        assert watching.wait(120) == 0
+    finally:
+        watching.kill()
+
+    assert json.loads(log.read_text().splitlines()[-1])["state"] == "done"

@@ -1,0 +1,82 @@
+#include "cli/farm_api.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/farm_tables.h"
+
+namespace ls::cli {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
+  const json body{{"status", 400},
+                  {"detail", "the scene a.xml cannot be read"},
+                  {"diagnostics",
+                   {{{"severity", "error"},
+                     {"file", "a.xml"},
+                     {"line", 3},
+                     {"column", 7},
+                     {"text", "no such plugin"},
+                     {"source_line", "<bsdf/>"},
+                     {"length", 4}}}}};
+
+  const auto problem = problem_of({400, "application/problem+json", body.dump()});
+
+  EXPECT_EQ(problem.error, (Error{Errc::invalid_argument, "the scene a.xml cannot be read"}));
+  ASSERT_EQ(problem.diagnostics.size(), 1u);
+  EXPECT_EQ(problem.diagnostics[0],
+            (Diagnostic{Diagnostic::Severity::error, {"a.xml", 3, 7}, "no such plugin", "<bsdf/>", 4}));
+}
+
+TEST(Problem, SaysWhereATokenIsFound) {
+  const auto problem = problem_of({401, "", R"({"detail": "the token is wrong"})"});
+
+  EXPECT_EQ(problem.error.code, Errc::unauthenticated);
+  EXPECT_THAT(problem.error.message, HasSubstr("LIGHTSHAFT_TOKEN"));
+}
+
+TEST(Problem, StandsAnswersThatAreNoProblemDetails) {
+  EXPECT_THAT(problem_of({502, "text/html", "<html>Bad gateway" + std::string(5000, '!')}).error.message,
+              testing::AllOf(HasSubstr("502"), HasSubstr("Bad gateway")));
+  for (const char* body :
+       {"", "[]", "{}", R"({"detail": 5, "diagnostics": "x"})", R"({"diagnostics": [1, {"line": "x"}]})"})
+    EXPECT_FALSE(problem_of({500, "", body}).error.message.empty()) << body;
+}
+
+TEST(JobPath, EscapesWhatIsNoId) {
+  EXPECT_EQ(job_path("j-12ab"), "/api/v1/jobs/j-12ab");
+  EXPECT_EQ(job_path("../x?y"), "/api/v1/jobs/..%2Fx%3Fy");
+}
+
+TEST(FarmTables, StandMissingAndWrongFields) {
+  const json jobs = json::parse(
+      R"({"jobs": [{}, 5, {"id": 7, "progress": "x"}, {"id": "j-1", "progress": 0.5, "relmse": null}]})");
+
+  EXPECT_THAT(jobs_table(jobs), testing::AllOf(HasSubstr("j-1"), HasSubstr("50 %")));
+  EXPECT_EQ(jobs_table(json::object()), "no jobs");
+  EXPECT_EQ(workers_table(json::parse(R"({"workers": 3})")), "no workers");
+  EXPECT_FALSE(job_text(json::object()).empty());
+}
+
+TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
+  const json jobs{{"jobs", {{{"id", "j-1"}, {"name", "a\x1b[2Jb\nc"}}}}};
+
+  EXPECT_THAT(jobs_table(jobs), Not(HasSubstr("\x1b")));
+  EXPECT_THAT(jobs_table(jobs), HasSubstr("a [2Jb c"));
+}
+
+TEST(HttpClient, RefusesAddressesAndTokensThatCannotBeMeant) {
+  for (const char* url :
+       {"farm:8080", "ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
+    EXPECT_EQ(HttpClient::open({url, "", ""}).error().code, Errc::invalid_argument) << url;
+  EXPECT_FALSE(HttpClient::open({"http://farm", "token\r\nX-Evil: 1", ""}));
+  EXPECT_FALSE(HttpClient::open({"https://farm", "", "/no/such/file.pem"}));
+  EXPECT_TRUE(HttpClient::open({"http://farm:8080/", "abc-DEF_123", ""}));
+}
+
+}  // namespace
+}  // namespace ls::cli

@@ -1,0 +1,58 @@
+#include "cli/progress.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "cli/say.h"
+
+namespace ls::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(ProgressLine, TellsShareRateErrorAndTimeLeft) {
+  const ProgressFigures figures{"running", .426, 27.25, 3.14e6, .01234, 42.4, ""};
+
+  const std::string line = progress_line(figures, 120);
+
+  EXPECT_LT(line.size(), 80u);
+  EXPECT_EQ(line, " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123  42 s left");
+}
+
+TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
+  const std::string line = progress_line({"queued", 0, 0, 0, {}, {}, "no worker is connected"}, 120);
+
+  EXPECT_THAT(line, HasSubstr("queued"));
+  EXPECT_THAT(line, HasSubstr("no worker is connected"));
+  EXPECT_THAT(line, Not(HasSubstr("relMSE")));
+  EXPECT_THAT(line, Not(HasSubstr("left")));
+}
+
+TEST(ProgressLine, FitsTheTerminal) {
+  const ProgressFigures figures{"running", 1, 1e6, 1e9, 1e-9, 1e6, std::string(500, 'x')};
+  for (const int columns : {20, 40, 80, 200})
+    EXPECT_LT(progress_line(figures, columns).size(), static_cast<std::size_t>(columns));
+}
+
+TEST(ProgressLine, StandsImpossibleFigures) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(progress_line({"running", nan, 1, 1, nan, nan, ""}, 120), HasSubstr("  0 % ["));
+  EXPECT_THAT(progress_line({"running", 7, 1, 1, {}, {}, ""}, 120),
+              HasSubstr("100 % [################]"));
+}
+
+TEST(Say, WritesTimesAndSizesForPeople) {
+  EXPECT_EQ(show_seconds(.84), "0.8 s");
+  EXPECT_EQ(show_seconds(9.97), "10 s");
+  EXPECT_EQ(show_seconds(59.6), "1:00");
+  EXPECT_EQ(show_seconds(187), "3:07");
+  EXPECT_EQ(show_seconds(7511), "2:05:11");
+  EXPECT_EQ(show_bytes(1023), "1023 B");
+  EXPECT_EQ(show_bytes(3 << 20), "3.0 MiB");
+}
+
+}  // namespace
+}  // namespace ls::cli
