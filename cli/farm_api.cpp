@@ -187,7 +187,9 @@ FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& sp
                                       const std::function<void(const std::string&)>& said) {
   const Digest text = sha256(scene.text);
   if (auto sent = upload_missing(scene, text, said); !sent) return tl::unexpected(sent.error());
-  json body{{"scene", text.hex()}, {"assets", json::object()}, {"name", scene.name}};
+  json body{{"scene", text.hex()},
+            {"assets", json::object()},
+            {"name", std::filesystem::path(scene.name).filename().string()}};
   for (const auto& [name, file] : scene.files) body["assets"][name] = file.digest.hex();
   body["spec"] = json::parse(canonical_json(spec), nullptr, false);
   return as_json(

@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
                "lightshaft");
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
+  app.footer("LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
   app.option_defaults()->always_capture_default(false);
   Action action;
   add_render(app, action);

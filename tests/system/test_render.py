@@ -149,13 +149,15 @@ def test_one_sample_is_replayed(fog):
     assert "72 x 40" in lightshaft("render", fog, "--pixel", "72,0", "--sample", 0, code=2).stderr
 
 
-def test_ctrl_c_writes_what_there_is(fog, tmp_path):
+@pytest.mark.parametrize("flags", [(), ("--isolate",)], ids=["in process", "isolated"])
+def test_ctrl_c_writes_what_there_is(fog, tmp_path, flags):
     partials_kept = tmp_path / "partials"
     process = subprocess.Popen([bin_dir() / "lightshaft", "render", fog, "-o", tmp_path / "out.exr", "--spp", "1000000", "--report",
-                                tmp_path / "report.json", "--partial-dir", partials_kept], stderr=subprocess.PIPE, text=True)
+                                tmp_path / "report.json", "--partial-dir", partials_kept, *flags], stderr=subprocess.PIPE, text=True,
+                               start_new_session=True)
     try:
         wait_until(lambda: partials_kept.is_dir() and len(list(partials_kept.iterdir())) > 10, "ten units are rendered")
-        process.send_signal(signal.SIGINT)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to its child, too
         _, said = process.communicate(timeout=60)
     finally:
         process.kill()

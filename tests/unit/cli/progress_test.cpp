@@ -40,8 +40,7 @@ TEST(ProgressLine, FitsTheTerminal) {
 TEST(ProgressLine, StandsImpossibleFigures) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(progress_line({"running", nan, 1, 1, nan, nan, ""}, 120), HasSubstr("  0 % ["));
-  EXPECT_THAT(progress_line({"running", 7, 1, 1, {}, {}, ""}, 120),
-              HasSubstr("100 % [################]"));
+  EXPECT_THAT(progress_line({"running", 7, 1, 1, {}, {}, ""}, 120), HasSubstr("100 % [################]"));
 }
 
 TEST(Say, WritesTimesAndSizesForPeople) {
