@@ -28,7 +28,7 @@ def diffuse(name, r, g, b):
 
 
 def materials():
-    out = diffuse("plaster", .72, .69, .63) + diffuse("wood", .36, .22, .12) + diffuse("leaf", .12, .24, .07) + diffuse("clay", .45, .22, .14)
+    out = diffuse("plaster", .55, .56, .54) + diffuse("wood", .36, .22, .12) + diffuse("leaf", .12, .24, .07) + diffuse("clay", .45, .22, .14)
     out += ('  <bsdf type="twosided" id="floor"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">'
             '<rgb name="color0" value="0.46, 0.43, 0.38"/><rgb name="color1" value="0.17, 0.19, 0.2"/>'
             '<transform name="to_uv"><scale x="6" y="9"/></transform></texture></bsdf></bsdf>\n')
@@ -51,11 +51,15 @@ def room():
     # the window wall at x = 2: below, above, beside the opening 0.95..2.65 x -2..0.6
     out += box((2, 0, -3 - T), (2 + T, .95, 3 + T), p) + box((2, 2.65, -3 - T), (2 + T, 3, 3 + T), p)
     out += box((2, .95, -3 - T), (2 + T, 2.65, -2), p) + box((2, .95, .6), (2 + T, 2.65, 3 + T), p)
-    for k in range(7):
-        y = 1.0 + .235 * k
-        out += box((2.0, y, -2), (2.1, y + .075, .6), ref("wood"))
-    for z in (-1.18, -.29):
-        out += box((2.0, .95, z), (2.1, 2.65, z + .08), ref("wood"))
+    for k in range(5):
+        y = .95 + .36 * k
+        out += box((2.0, y, -2), (2.1, y + .13, .6), ref("wood"))
+    for z in (-1.2, -.28):
+        out += box((2.0, .95, z), (2.1, 2.65, z + .1), ref("wood"))
+    # The sky, as far as the window shows it: a panel that light passes, so that the sun comes through and the sky is sampled.
+    out += ('  <shape type="rectangle"><transform name="to_world"><scale x="1.3" y="0.85"/><rotate y="1" angle="-90"/>'
+            '<translate x="2.15" y="1.8" z="-0.7"/></transform><bsdf type="null"/>'
+            '<emitter type="area"><rgb name="radiance" value="1.5, 2.0, 2.9"/></emitter></shape>\n')
     return out
 
 
@@ -79,14 +83,13 @@ def scene():
     out = '<scene version="3.0.0">\n  <default name="spp" value="64"/>\n  <default name="width" value="480"/>\n  <default name="height" value="320"/>\n'
     out += '  <integrator type="volpath"><integer name="max_depth" value="16"/><integer name="rr_depth" value="5"/></integrator>\n'
     out += ('  <medium type="heterogeneous" id="steam"><volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vol"/>'
-            '<boolean name="use_grid_bbox" value="true"/></volume><float name="scale" value="1.9"/><float name="albedo" value="0.98"/>'
+            '<boolean name="use_grid_bbox" value="true"/></volume><float name="scale" value="2.6"/><float name="albedo" value="0.98"/>'
             '<phase type="hg"><float name="g" value="0.45"/></phase></medium>\n')
     out += materials() + room() + furniture()
     out += box((-1.94, .01, -2.99), (1.99, 2.99, 2.99), '<bsdf type="null"/><ref name="interior" id="steam"/>')
-    out += '  <emitter type="directional"><vector name="direction" x="-0.82" y="-0.5" z="-0.12"/><rgb name="irradiance" value="95, 78, 54"/></emitter>\n'
-    out += '  <emitter type="constant"><rgb name="radiance" value="0.9, 1.25, 1.9"/></emitter>\n'
-    out += ('  <sensor type="perspective"><float name="fov" value="62"/><string name="fov_axis" value="x"/><transform name="to_world">'
-            '<lookat origin="-0.35, 1.35, 2.75" target="0.12, 1.22, -1" up="0, 1, 0"/></transform><ref name="medium" id="steam"/>'
+    out += '  <emitter type="directional"><vector name="direction" x="-0.8" y="-0.55" z="-0.16"/><rgb name="irradiance" value="90, 71, 47"/></emitter>\n'
+    out += ('  <sensor type="perspective"><float name="fov" value="64"/><string name="fov_axis" value="x"/><transform name="to_world">'
+            '<lookat origin="-1.2, 1.45, 2.8" target="0.45, 1.2, -0.9" up="0, 1, 0"/></transform><ref name="medium" id="steam"/>'
             '<sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>'
             '<film type="hdrfilm"><integer name="width" value="$width"/><integer name="height" value="$height"/><rfilter type="gaussian"/></film></sensor>\n')
     return out + '</scene>\n'
