@@ -2,6 +2,7 @@
 
 Nothing here sleeps: a condition is watched inside the page, frame by frame, until it holds or its time is up.
 """
+import base64
 import json
 import os
 import shutil
@@ -193,7 +194,7 @@ class Page:
     def set_files(self, selector, paths):
         root = self.call("DOM.getDocument")["root"]["nodeId"]
         node = self.call("DOM.querySelector", {"nodeId": root, "selector": selector})["nodeId"]
-        self.call("DOM.setFileInputFiles", {"nodeId": node, "files": [str(path) for path in paths]})
+        self.call("DOM.setFileInputFiles", {"nodeId": node, "files": [os.path.abspath(path) for path in paths]})
 
     def complaints(self):
         """Errors of scripts, of the console and of the page's policy. A 4xx that a script asked for is no error of the page."""
@@ -210,8 +211,8 @@ class Page:
                 out.append(f"blocked: {params['blockedReason']}")
         return out
 
-    def screenshot(self, path):
-        import base64
-        data = self.call("Page.captureScreenshot", {"format": "png", "captureBeyondViewport": True})["data"]
+    def screenshot(self, path, whole=True):
+        """Of the whole page, or of what fits the window."""
+        data = self.call("Page.captureScreenshot", {"format": "png", "captureBeyondViewport": whole})["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))

@@ -41,3 +41,23 @@ def test_figures_are_written_for_people(modules, call, shown):
     ("bath.xml", "bath.xml", "bath.xml"), ("a/meshes/x.obj", "a/s.xml", "meshes/x.obj"), ("t/x.png", "a/s.xml", "../t/x.png"), ("x.obj", "a/b/s.xml", "../../x.obj")])
 def test_files_are_named_as_seen_from_the_scene(modules, path, main, name):
     assert modules.evaluate(f"import('/js/bundle.js').then(({{ relative }}) => relative({json.dumps(path)}, {json.dumps(main)}))") == name
+
+
+@pytest.mark.parametrize("before, after, touched", [
+    ("abc", "bcd", "ad"),  # the first goes and one comes: what stays is not moved
+    ("abc", "abc", ""), ("abc", "ac", "b"), ("", "ab", "ab"), ("ab", "", "ab"), ("ab", "axb", "x")])
+def test_patch_touches_only_what_changed(modules, before, after, touched):
+    """A moved element would start its animation again and lose the focus."""
+    found = modules.evaluate(f"""(async () => {{
+      const {{ h, patch }} = await import("/js/dom.js");
+      const place = document.createElement("div");
+      const show = (keys) => patch(place, ...[...keys].map((key) => h("p", {{ key, id: key }}, key)));
+      show({json.dumps(before)});
+      const watcher = new MutationObserver(() => {{}});
+      watcher.observe(place, {{ childList: true }});
+      show({json.dumps(after)});
+      const nodes = watcher.takeRecords().flatMap((record) => [...record.addedNodes, ...record.removedNodes]);
+      return [nodes.map((node) => node.id).sort().join(""), place.textContent];
+    }})()""")
+
+    assert found == [touched, after]

@@ -34,14 +34,19 @@ function patchChildren(parent, nodes) {
     const at = loose.findIndex((element) => nodeOf.get(element)?.tag === node.tag);
     return at < 0 ? undefined : loose.splice(at, 1)[0];
   };
-  nodes.forEach((node, i) => {
+  const elements = nodes.map((node) => {
     const old = node.key === null ? takeLoose(node) : takeKeyed(keyed, node);
     const element = old ?? create(node, parent);
     if (old) update(element, nodeOf.get(element), node);
     nodeOf.set(element, node);
+    return element;
+  });
+  // What goes, goes first: then what stays is in its place already. Moving an element would restart its animation.
+  const staying = new Set(elements);
+  for (const child of [...parent.childNodes]) if (!staying.has(child)) child.remove();
+  elements.forEach((element, i) => {
     if (parent.childNodes[i] !== element) parent.insertBefore(element, parent.childNodes[i] ?? null);
   });
-  while (parent.childNodes.length > nodes.length) parent.lastChild.remove();
 }
 
 function reusable(parent) {
