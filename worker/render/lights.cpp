@@ -8,16 +8,18 @@
 namespace ls::render {
 namespace {
 
-// The part of the sphere's surface seen from x, as 1 - cos of the half angle, without cancellation (STABILITY
-// N26).
-struct Cone {
-  float one_minus_cos;  // 2 means x is inside: the whole sphere of directions
-};
-Cone cone_of(const Sphere& s, const V3& x) {
+// The directions from x to the sphere's emitting side, as 1 - cos of their half angle, without cancellation
+// (STABILITY N26): 2 is every direction, for an inner side seen from inside; 0 is none, where the emitting
+// side is turned away. Points on the surface itself, good to a few units in the last place of the world,
+// count to the side that emits: sampling and density must agree on them.
+float one_minus_cos(const Sphere& s, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
-  const double d2 = f.dot(f), sin2 = s.radius * s.radius / d2;
-  if (!(sin2 < 1)) return {2};
-  return {static_cast<float>(sin2 / (1 + std::sqrt(1 - sin2)))};
+  const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20);
+  const bool inside = d2 < margin * margin;
+  if (inside != (sign < 0)) return 0;
+  if (inside) return 2;
+  const double sin2 = std::min(1., s.radius * s.radius / d2);
+  return static_cast<float>(sin2 / (1 + std::sqrt(1 - sin2)));
 }
 
 }  // namespace
@@ -101,17 +103,22 @@ std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, c
 
 std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3& x) const {
   const Sphere& sphere = geometry_->spheres[l.primitive];
-  const Cone cone = cone_of(sphere, x);
-  const bool inside = cone.one_minus_cos == 2;
-  if (inside != (l.sign < 0)) return std::nullopt;  // the emitting side is turned away
+  const float cone = one_minus_cos(sphere, l.sign, x);
+  if (!(cone > 0)) return std::nullopt;
   const V3 axis = normalize(V3(sphere.center - V3d(x)));
-  const float one_minus = cone.one_minus_cos * u.x, cosine = 1 - one_minus;
+  const float one_minus = cone * u.x, cosine = 1 - one_minus;
   const float sine = std::sqrt(std::max(0.f, one_minus * (2 - one_minus)));
   const float angle = kTwoPi * u.y;
   LightSample s;
   const Frame frame = dot(axis, axis) > 0 ? Frame(axis) : Frame(V3(0, 0, 1));
   s.direction = normalize(frame.to_world({sine * std::cos(angle), sine * std::sin(angle), cosine}));
-  const double t = intersect(sphere, V3d(x), V3d(s.direction), 0, std::numeric_limits<double>::infinity());
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  double t = intersect(sphere, V3d(x), V3d(s.direction), 0, kEndless);
+  if (l.sign < 0) {
+    // From inside the far wall, also if x lies on the near one and rounding put it just outside.
+    const double far = intersect(sphere, V3d(x), V3d(s.direction), t, kEndless);
+    if (std::isfinite(far)) t = far;
+  }
   // At the rim rounding may miss the sphere: the nearest point of the ray stands for it.
   const double reach = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * reach - sphere.center).normalized();
@@ -119,7 +126,7 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   const V3 target = offset_point(p, V3(n), V3(n) * l.sign), f = target - x;
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
-  s.pdf = l.probability / (kTwoPi * cone.one_minus_cos);
+  s.pdf = l.probability / (kTwoPi * cone);
   s.radiance = area_radiance(l, {0, 0});
   if (!(s.distance > 0) || !std::isfinite(s.pdf)) return std::nullopt;
   return s;
@@ -178,8 +185,8 @@ C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
 float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction) const {
   const Light& l = lights_[geometry_->surfaces[hit.surface].light];
   if (l.kind == Kind::sphere) {
-    const Cone cone = cone_of(geometry_->spheres[l.primitive], x);
-    return l.probability / (kTwoPi * cone.one_minus_cos);
+    const float cone = one_minus_cos(geometry_->spheres[l.primitive], l.sign, x);
+    return cone > 0 ? l.probability / (kTwoPi * cone) : 0;
   }
   const V3 f = hit.p - x;
   const float cosine = std::abs(dot(direction, hit.ng));

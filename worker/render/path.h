@@ -22,9 +22,12 @@ namespace ls::render {
 // A scene that stacks more null boundaries than this in one path is cut off there, counted as a rejected
 // sample.
 inline constexpr int kMaxSegments = 1 << 16;
-// Beyond this depth roulette may end even paths that lost nothing: a closed white room has no other end.
-inline constexpr int kForcedRouletteDepth = 64;
-inline constexpr float kForcedSurvival = .97f;
+// Beyond this depth roulette may end even paths that lost nothing: a closed white room has no other end. Its
+// variance is finite only while fewer paths live on by nature than by q: after n scatterings in a white slab of
+// optical depth tau a share exp(-n pi^2 / (3 (tau + 1.42)^2)) is still inside, so that .9998 is good to tau = 127
+// (and .97 would only be to 9).
+inline constexpr int kForcedRouletteDepth = 1024;
+inline constexpr float kForcedSurvival = .9998f;
 
 struct SampleOutcome {
   C3 radiance{0, 0, 0};
