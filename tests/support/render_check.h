@@ -1,0 +1,90 @@
+// Renders a scene to the mean of its pixels, with a standard error that the low-discrepancy sequences don't
+// fool: the two halves of every pixel and all pixels are independent, so (A - B)^2 / 4 estimates each pixel's
+// squared error without bias.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "tests/support/scene_kit.h"
+#include "worker/render/render.h"
+
+namespace ls::test {
+
+inline RenderSettings settings_of(const Scene& s, std::uint64_t seed = 0) {
+  RenderSettings r;
+  r.size = s.film.size;
+  r.seed = seed;
+  r.integrator = s.integrator.name;
+  r.max_depth = s.integrator.max_depth;
+  r.rr_depth = s.integrator.rr_depth;
+  return r;
+}
+
+struct Estimate {
+  std::array<double, 3> mean{}, standard_error{};
+  // Of the standard error (Satterthwaite, from the fourth powers of the differences): small where a few
+  // pixels rule.
+  std::array<double, 3> freedom{};
+  render::Health health;
+  std::string variant;
+  double seconds = 0;
+};
+
+// Throws std::runtime_error with the renderer's message if the world can't be built: a test's own mistake.
+inline std::shared_ptr<const render::World> world_of(const SceneKit& kit, std::uint64_t seed = 0,
+                                                     int threads = 1) {
+  auto w = render::build_world(kit.scene, settings_of(kit.scene, seed), kit.files, threads);
+  if (!w) throw std::runtime_error(w.error().message);
+  return *w;
+}
+
+inline Estimate estimate(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed = 0, int threads = 2) {
+  const auto world = world_of(kit, seed, threads);
+  const FrameSize size = kit.scene.film.size;
+  const auto rows = static_cast<std::size_t>(size.height);
+  std::vector<render::TileResult> results(rows);
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t y; (y = next++) < rows;) {
+      const int top = static_cast<int>(y);
+      results[y] = render::render_tile(*world, {0, top, size.width, top + 1}, {0, spp}, nullptr, nullptr);
+    }
+  };
+  {
+    std::vector<std::jthread> pool;
+    for (int i = 0; i < threads; ++i) pool.emplace_back(work);
+  }
+  Estimate e;
+  e.variant = render::describe(*world).variant;
+  const double per_half = static_cast<double>(spp) / 2,
+               pixels = static_cast<double>(size.width) * size.height;
+  const auto width = static_cast<std::size_t>(size.width);
+  for (std::size_t c = 0; c < 3; ++c) {
+    double sum = 0, square = 0, fourth = 0;
+    for (const auto& r : results) {
+      for (std::size_t x = 0; x < width; ++x) {
+        const double a = r.sums[c * width + x] / per_half, b = r.sums[(3 + c) * width + x] / per_half;
+        const double v = (a - b) * (a - b) / 4;
+        sum += (a + b) / 2;
+        square += v;
+        fourth += v * v;
+      }
+    }
+    e.mean[c] = sum / pixels;
+    e.standard_error[c] = std::sqrt(square) / pixels;
+    e.freedom[c] = fourth > 0 ? 3 * square * square / fourth : pixels;
+  }
+  for (const auto& r : results) {
+    e.health.nonfinite += r.health.nonfinite;
+    e.health.negative += r.health.negative;
+    e.health.majorant_violations += r.health.majorant_violations;
+  }
+  return e;
+}
+
+}  // namespace ls::test
