@@ -54,12 +54,12 @@ void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
   v.field({.name = "alpha_u",
            .doc = "roughness along u",
-           .range = {.min = 0, .max = 1, .open_min = true},
+           .range = kPositive,
            .fallback = {.1, .1, .1}},
           b.alpha_u);
   v.field({.name = "alpha_v",
            .doc = "roughness along v",
-           .range = {.min = 0, .max = 1, .open_min = true},
+           .range = kPositive,
            .fallback = {.1, .1, .1}},
           b.alpha_v);
   v.field(
@@ -83,7 +83,7 @@ void describe(V& v, T& b) {
 template <class V, Of<RoughPlasticBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha", .doc = "roughness", .range = {.min = 0, .max = 1, .open_min = true}}, b.alpha);
+  v.field({.name = "alpha", .doc = "roughness", .range = kPositive}, b.alpha);
   v.field(
       {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
       b.int_ior);

@@ -1,0 +1,177 @@
+#include "common/scene/format_doc.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "common/scene/describe_fields.h"
+#include "common/scene/known.h"
+#include "common/scene/materials.h"
+
+namespace ls {
+namespace scene {
+namespace {
+
+std::string text_of(const std::array<double, 3>& v) {
+  return v[0] == v[1] && v[1] == v[2] ? fmt::format("{}", v[0]) : fmt::format("{}, {}, {}", v[0], v[1], v[2]);
+}
+
+// What a parameter is called in the file, and its default in words.
+struct Column {
+  std::string_view type;
+  std::string value;
+};
+Column column(const Field&, double x) { return {"float", fmt::format("{}", x)}; }
+Column column(const Field&, int x) { return {"integer", fmt::format("{}", x)}; }
+Column column(const Field&, std::uint64_t x) { return {"integer", fmt::format("{}", x)}; }
+Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; }
+Column column(const Field&, const std::string& x) { return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)}; }
+Column column(const Field&, const Vec3& x) { return {"rgb, vector", text_of(x)}; }
+Column column(const Field&, const Transform&) { return {"transform", "identity"}; }
+Column column(const Field&, const UvTransform&) { return {"transform", "identity"}; }
+Column column(const Field&, AssetIndex) { return {"string", ""}; }
+Column column(const Field& f, TextureIndex) { return {"rgb, texture", text_of(f.fallback)}; }
+Column column(const Field&, const std::optional<TextureIndex>&) { return {"texture", "none"}; }
+Column column(const Field& f, VolumeIndex) { return {"rgb, volume", text_of(f.fallback)}; }
+template <class E>
+  requires std::is_enum_v<E>
+Column column(const Field&, E x) {
+  std::string all;
+  for (const auto& [name, value] : NamesOf<E>::all) all += fmt::format("{}{}", all.empty() ? "" : ", ", value == x ? fmt::format("**{}**", name) : std::string(name));
+  return {"string", all};
+}
+// Nested objects and what follows from the plugin's name.
+template <class T>
+  requires(!std::is_enum_v<T>)
+Column column(const Field&, const T&) {
+  return {"(nested)", ""};
+}
+
+std::string range_of(const Field& f) {
+  const std::string low = std::isinf(f.range.min) ? "" : fmt::format("{} {}", f.range.open_min ? ">" : "≥", f.range.min);
+  const std::string high = std::isinf(f.range.max) ? "" : fmt::format("{} {}", f.range.open_max ? "<" : "≤", f.range.max);
+  return low.empty() || high.empty() ? low + high : fmt::format("{}, {}", low, high);
+}
+
+class Rows {
+ public:
+  template <class T>
+  void field(const Field& f, const T& value) {
+    const auto [type, shown] = column(f, value);
+    const std::string names = f.named_ior ? fmt::format("{}, string", type) : std::string(type);
+    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, f.derived ? "(nested)" : names, f.required ? "needed" : f.derived ? "" : shown, f.unit,
+                         range_of(f), f.doc);
+  }
+  std::string take() const {
+    return text_.empty() ? "No parameters.\n\n" : fmt::format("| parameter | given as | default | unit | range | meaning |\n|---|---|---|---|---|---|\n{}\n", text_);
+  }
+
+ private:
+  std::string text_;
+};
+
+template <class T>
+void add_type(std::string& out) {
+  const TypeInfo& info = kInfo<T>;
+  out += fmt::format("### {} `{}`\n\n{}.\n\n", info.kind, info.plugins.empty() ? info.name : info.plugins, info.doc);
+  Rows rows;
+  const T value{};
+  describe(rows, value);
+  out += rows.take();
+}
+template <class... Ts>
+void add_types(std::string& out, const std::variant<Ts...>*) {
+  (add_type<Ts>(out), ...);
+}
+template <class V>
+void add_variant(std::string& out, std::string_view title) {
+  out += fmt::format("## {}\n\n", title);
+  add_types(out, static_cast<const V*>(nullptr));
+}
+
+constexpr std::string_view kPreamble = R"(# Scene format
+
+<!-- Made by scene_format_markdown() from the table in common/scene/describe_fields.h; do not edit. -->
+
+Scenes are Mitsuba 3 XML files, with Mitsuba's meaning and defaults. What a parameter is called, what it may be and what it is
+if it is not given stands below: this page is made from the same table that reads the files. Lengths are scene units, angles
+degrees, colours linear RGB.
+
+What is not known is an error with a place and a suggestion, never skipped. A parameter that the dialect has but that means
+nothing here is a warning that names it; `--strict` makes warnings errors. Up to 20 are told at once.
+
+```
+bath.xml:14:16: error: medium "homogeneous" has no parameter 'sigmat'; did you mean 'sigma_t'?
+  14 |     <float name="sigmat" value="2"/>
+     |                  ^~~~~~
+```
+
+## Notation
+
+- Values: `<float>`, `<integer>`, `<boolean>`, `<string>`, `<rgb>`, `<spectrum>`, `<vector>`, `<point>`, each with `name` and
+  `value`; vectors and points also by `x`, `y`, `z`. Numbers are parted by commas or blanks. A colour is one number (grey), three,
+  or `#rrggbb` (8-bit sRGB). A `<spectrum>` must be the same at all wavelengths.
+- `<transform name="to_world">` holds `<translate>`, `<rotate>`, `<scale>`, `<lookat>`, `<matrix>` (9 or 16 numbers, row by row),
+  each applied after those before it.
+- Objects have a `type`, and may have an `id`; `<ref id="..."/>` stands for the object, wherever it is defined. `<alias id="old"
+  as="new"/>` gives it another id.
+- `$name` in any attribute is replaced by the value of `-D name=value` or, if that is not given, of `<default name="name"
+  value="..."/>` before it.
+- `<include filename="..."/>` puts in the objects of another file, `<path value="folder"/>` adds a folder in which files are
+  looked for. Names are relative to the main scene file, those in an included file first to the folder of that file.
+- Files of version 0.x are read with their camelCase names as far as their plugins are those of Mitsuba 3.
+
+)";
+
+constexpr std::string_view kCanonical = R"(## Canonical form
+
+A scene that was read travels as canonical JSON: every field written, keys sorted, numbers in the shortest form that reads back
+to the same bits, files named by SHA-256. Objects that nothing uses are left out. The SHA-256 of this text is the scene's digest.
+A grid of an OpenVDB file is placed by the file's own transform, then by `to_world`.
+)";
+
+std::string meaningless_section() {
+  std::string out = "## Accepted without effect\n\n| object | parameters | why |\n|---|---|---|\n";
+  for (const MeaninglessRow& row : meaningless_table())
+    out += fmt::format("| {}{} | `{}` | {} |\n", row.tag, row.plugin.empty() ? "" : fmt::format(" `{}`", row.plugin), fmt::join(row.parameters, "`, `"), row.because);
+  return out + "\n";
+}
+
+std::string names_section() {
+  return fmt::format("## Names\n\nIndices of refraction: {}.\n\nMetals (`material` of `conductor` and `roughconductor`, instead of `eta` and `k`): {}.\n\n",
+                     fmt::join(named_iors(), ", "), fmt::join(named_metals(), ", "));
+}
+
+}  // namespace
+}  // namespace scene
+
+std::string scene_format_markdown() {
+  using namespace scene;
+  std::string out(kPreamble);
+  add_variant<Geometry>(out, "Shapes");
+  out += "Every shape has besides:\n\n";
+  Rows common;
+  const Shape shape;
+  describe(common, shape);
+  out += common.take();
+  add_variant<Bsdf>(out, "Surfaces");
+  add_variant<Texture>(out, "Textures");
+  out += "## Light\n\n";
+  add_type<AreaEmitter>(out);
+  add_types(out, static_cast<const Emitter*>(nullptr));
+  add_variant<Medium>(out, "Media");
+  add_variant<Phase>(out, "Phase functions");
+  add_variant<Volume>(out, "Volumes");
+  out += "## Camera and integrator\n\n";
+  add_type<Sensor>(out);
+  add_type<FilmSettings>(out);
+  add_types(out, static_cast<const ReconstructionFilter*>(nullptr));
+  add_type<IntegratorSettings>(out);
+  out += "`volpathmis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and `direct` means `path` with max_depth 2; `moment` and `aov` mean the\n"
+         "integrator within them. A sampler of any name gives `sample_count` (default 4) samples a pixel.\n\n";
+  out += meaningless_section() + names_section();
+  return out += kCanonical;
+}
+
+}  // namespace ls
