@@ -21,6 +21,7 @@ struct LocalMesh {
 };
 struct Placed {
   LocalMesh mesh;
+  bool normals_given = false;  // by the file
   std::optional<Sphere> sphere;
   std::optional<Disk> disk;
 };
@@ -44,23 +45,23 @@ LocalMesh rectangle() {
   return m;
 }
 
-// Six faces; each is spanned by an axis a and b = n x a, and has the unit square as its uv.
+// Six faces; each has the unit square as its uv, u along a and v along a x n (as Mitsuba 3.9.1's cube).
 LocalMesh cube() {
   struct Face {
     V3d n, a;
   };
-  const Face faces[6] = {{{0, -1, 0}, {0, 0, -1}}, {{0, 1, 0}, {0, 0, -1}},  {{1, 0, 0}, {0, 0, -1}},
-                         {{0, 0, 1}, {1, 0, 0}},   {{-1, 0, 0}, {0, 0, -1}}, {{0, 0, -1}, {1, 0, 0}}};
+  const Face faces[6] = {{{0, -1, 0}, {0, 0, 1}}, {{0, 1, 0}, {-1, 0, 0}}, {{1, 0, 0}, {0, 1, 0}},
+                         {{0, 0, 1}, {0, 1, 0}},  {{-1, 0, 0}, {0, 1, 0}}, {{0, 0, -1}, {0, -1, 0}}};
   const V2 corners[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   LocalMesh m;
   for (const Face& f : faces) {
     const auto base = static_cast<std::uint32_t>(m.positions.size());
-    const V3d b = f.n.cross(f.a);
+    const V3d b = f.a.cross(f.n);
     for (const V2& uv : corners) {
       m.positions.push_back(f.n + f.a * (2. * uv.x - 1) + b * (2. * uv.y - 1));
       m.uvs.push_back(uv);
     }
-    for (std::uint32_t k : {0u, 1u, 2u, 0u, 2u, 3u}) m.indices.push_back(base + k);
+    for (std::uint32_t k : {0u, 2u, 1u, 0u, 3u, 2u}) m.indices.push_back(base + k);
   }
   return m;
 }
@@ -113,42 +114,67 @@ void transform(LocalMesh& m, const Affine& to_scene) {
   }
 }
 
+// Where a file has no normals the dialect makes smooth ones: each vertex's triangles weighted by their angle
+// there (Thuermer and Wuethrich 1998).
+void smooth(LocalMesh& m) {
+  m.normals.assign(m.positions.size(), V3d(0));
+  for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
+    const std::uint32_t* v = &m.indices[i];
+    const V3d n = (m.positions[v[1]] - m.positions[v[0]]).cross(m.positions[v[2]] - m.positions[v[0]]);
+    const double l = n.length();
+    if (!(l > 0) || !std::isfinite(l)) continue;
+    for (int k = 0; k < 3; ++k) {
+      const V3d a = m.positions[v[(k + 1) % 3]] - m.positions[v[k]],
+                b = m.positions[v[(k + 2) % 3]] - m.positions[v[k]];
+      m.normals[v[k]] += n / l * std::atan2(a.cross(b).length(), a.dot(b));
+    }
+  }
+  for (V3d& n : m.normals) {
+    if (const double l = n.length(); l > 0) n /= l;
+  }
+}
+
 Result<Placed> place(const Shape& shape, const AssetLoader& files) {
   const Affine m(shape.to_world);
   if (!m.finite() || m.determinant() == 0) return fail(Errc::invalid_argument, "its to_world has no inverse");
   Placed out;
-  auto ok = std::visit(overloaded{[&](const RectangleShape&) -> Result<void> {
-                                    out.mesh = rectangle();
-                                    return {};
-                                  },
-                                  [&](const CubeShape&) -> Result<void> {
-                                    out.mesh = cube();
-                                    return {};
-                                  },
-                                  [&](const SphereShape& s) -> Result<void> {
-                                    auto r = place_sphere(s, m);
-                                    if (!r) return tl::unexpected(r.error());
-                                    out.sphere = *r;
-                                    return {};
-                                  },
-                                  [&](const DiskShape&) -> Result<void> {
-                                    Disk d;
-                                    d.center = m.point({0, 0, 0});
-                                    d.u = m.vector({1, 0, 0});
-                                    d.v = m.vector({0, 1, 0});
-                                    d.n = m.normal({0, 0, 1}).normalized();
-                                    out.disk = d;
-                                    return {};
-                                  },
-                                  [&](const MeshShape& s) -> Result<void> {
-                                    auto r = load(s, files);
-                                    if (!r) return tl::unexpected(r.error());
-                                    out.mesh = std::move(*r);
-                                    return {};
-                                  }},
-                       shape.geometry);
+  auto ok = std::visit(
+      overloaded{
+          [&](const RectangleShape&) -> Result<void> {
+            out.mesh = rectangle();
+            return {};
+          },
+          [&](const CubeShape&) -> Result<void> {
+            out.mesh = cube();
+            return {};
+          },
+          [&](const SphereShape& s) -> Result<void> {
+            auto r = place_sphere(s, m);
+            if (!r) return tl::unexpected(r.error());
+            out.sphere = *r;
+            return {};
+          },
+          [&](const DiskShape&) -> Result<void> {
+            Disk d;
+            d.center = m.point({0, 0, 0});
+            d.u = m.vector({1, 0, 0});
+            d.v = m.vector({0, 1, 0});
+            d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);  // +z, also mirrored
+            out.disk = d;
+            return {};
+          },
+          [&](const MeshShape& s) -> Result<void> {
+            auto r = load(s, files);
+            if (!r) return tl::unexpected(r.error());
+            out.mesh = std::move(*r);
+            return {};
+          }},
+      shape.geometry);
   if (!ok) return tl::unexpected(ok.error());
   transform(out.mesh, m);
+  out.normals_given = !out.mesh.normals.empty();
+  const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
+  if (mesh && !mesh->face_normals && !out.normals_given) smooth(out.mesh);
   return out;
 }
 
@@ -164,14 +190,16 @@ void add_bounds(const Placed& p, Bounds& b) {
   }
 }
 
-// +1 or -1: what takes the winding normal of a mesh to the one that the dialect means.
-float orientation_of(const Shape& shape) {
+// +1 or -1: what takes the winding normal of a mesh, or the outward normal of a sphere, to the one that the
+// dialect means (checked against Mitsuba 3.9.1; there a mirrored sphere is inside out).
+float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
   // A rectangle's normal is its transformed +z and a mesh with normals follows them; the winding of a
   // mirrored one is reversed.
-  const bool analytic = std::holds_alternative<RectangleShape>(shape.geometry) ||
-                        std::holds_alternative<CubeShape>(shape.geometry);
-  if (analytic && Affine(shape.to_world).determinant() < 0) sign = -sign;
+  const bool follows = std::holds_alternative<RectangleShape>(shape.geometry) ||
+                       std::holds_alternative<CubeShape>(shape.geometry) ||
+                       std::holds_alternative<SphereShape>(shape.geometry) || vertex_normals;
+  if (follows && Affine(shape.to_world).determinant() < 0) sign = -sign;
   return sign;
 }
 
@@ -217,14 +245,14 @@ void append(Geometry& g, Placed& p, std::uint32_t surface) {
   }
 }
 
-SurfaceInfo surface_info(const Scene& scene, const Shape& s) {
+SurfaceInfo surface_info(const Scene& scene, const Shape& s, bool vertex_normals) {
   SurfaceInfo info;
   info.bsdf = s.bsdf;
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
   info.transition = s.is_medium_transition;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;
-  info.orientation = orientation_of(s);
+  info.orientation = orientation_of(s, vertex_normals);
   return info;
 }
 
@@ -251,8 +279,8 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
     auto p = place(scene.shapes[i], files);
     if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
     add_bounds(*p, bounds);
+    g.surfaces.push_back(surface_info(scene, scene.shapes[i], p->normals_given));
     placed.push_back(std::move(*p));
-    g.surfaces.push_back(surface_info(scene, scene.shapes[i]));
   }
   if (!bounds.empty() && !(std::isfinite(bounds.lo.x + bounds.lo.y + bounds.lo.z) &&
                            std::isfinite(bounds.hi.x + bounds.hi.y + bounds.hi.z))) {
