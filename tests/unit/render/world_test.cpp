@@ -1,0 +1,246 @@
+// Whole worlds: every variant, every power-of-two scale and every thread count gives the same bits; what
+// cannot be built says so.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/render_check.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneKit;
+using test::translate;
+using test::operator*;
+using testing::HasSubstr;
+
+struct Named {
+  const char* name;
+  SceneKit kit;
+  std::size_t variants;  // that cover it
+};
+
+// A floor, a light of each of some kinds, and a place for a medium.
+SceneKit room() {
+  SceneKit kit({12, 8});
+  const BsdfIndex white = kit.diffuse(.6);
+  const BsdfIndex metal = kit.bsdf(RoughConductorBsdf{Microfacet::ggx,
+                                                      kit.texture({.3, .3, .3}),
+                                                      kit.texture({.3, .3, .3}),
+                                                      {.2, .9, 1.1},
+                                                      {3.9, 2.4, 2.2},
+                                                      kit.texture({1, 1, 1})});
+  const TextureIndex light = kit.texture({3, 2, 1});
+  kit.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(3), white);
+  kit.shape(SphereShape{}, translate({.6, .8, -.5}) * test::scale(.4), metal);
+  kit.shape(SphereShape{}, translate({-.7, .9, -.6}) * test::scale(.3), kit.glass(1.5));
+  kit.shape(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(180) * test::scale(.5), white).emitter =
+      AreaEmitter{light};
+  kit.scene.emitters.push_back(PointEmitter{{1, -1, 1}, {1, 1, 1}});
+  kit.scene.emitters.push_back(DirectionalEmitter{{.3, .2, -1}, {.5, .5, .5}});
+  kit.environment(.1);
+  kit.look({0, -5, 1}, {0, 0, 0}, 40);
+  return kit;
+}
+std::vector<float> cloud() {
+  std::vector<float> v(6 * 5 * 4);
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] = static_cast<float>((i * 7919) % 11) / 5.f;
+  return v;
+}
+SceneKit with_medium(auto make) {
+  SceneKit kit = room();
+  const MediumIndex m = make(kit);
+  const BsdfIndex null = kit.null();
+  kit.container(CubeShape{}, test::rotate_x(15) * test::scale(.9), null, m);
+  return kit;
+}
+const Transform kBox = translate({-1, -1, -1}) * test::scale(2);
+
+std::vector<Named> scenes() {
+  std::vector<Named> all;
+  all.push_back({"surfaces", room(), 5});
+  all.push_back({"homogeneous grey", with_medium([](SceneKit& k) {
+                   return k.homogeneous({.8, .8, .8}, {.9, .5, .2}, .3);
+                 }),
+                 4});
+  all.push_back({"homogeneous chromatic", with_medium([](SceneKit& k) {
+                   return k.homogeneous({0, .8, 3}, {.9, .9, .9}, -.3);
+                 }),
+                 2});
+  all.push_back({"grey grid", with_medium([](SceneKit& k) {
+                   return k.heterogeneous(k.grid({6, 5, 4}, cloud(), kBox), {.9, .6, .9}, 1, .5);
+                 }),
+                 2});
+  all.push_back({"chromatic grid", with_medium([](SceneKit& k) {
+                   return k.heterogeneous(k.constant({0, 1, 4}), {.9, .9, .9}, 1, .5);
+                 }),
+                 1});
+  return all;
+}
+
+TileResult render(const World& w, const char* variant = nullptr) {
+  const PixelRect all{0, 0, 12, 8};
+  return variant ? render_tile_as(w, variant, all, {0, 32}) : render_tile(w, all, {0, 32}, nullptr, nullptr);
+}
+
+TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
+  for (const Named& n : scenes()) {
+    const auto world = test::world_of(n.kit);
+    const auto names = covering_variants(*world);
+    const TileResult first = render(*world);
+    EXPECT_EQ(names.size(), n.variants) << n.name;
+    EXPECT_EQ(names.front(), describe(*world).variant);
+    EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
+        << n.name;
+    for (const std::string& name : names) {
+      EXPECT_EQ(render(*world, name.c_str()).sums, first.sums) << n.name << " as " << name;
+    }
+  }
+}
+
+TEST(World, ASubsetOfATileIsThatPartOfTheTile) {
+  const auto world = test::world_of(room());
+  const TileResult all = render(*world), part = render_tile(*world, {3, 2, 7, 5}, {0, 32}, nullptr, nullptr);
+  for (std::size_t plane = 0; plane < 6; ++plane)
+    for (std::size_t y = 2; y < 5; ++y)
+      for (std::size_t x = 3; x < 7; ++x)
+        ASSERT_EQ(part.sums[plane * 12 + (y - 2) * 4 + x - 3], all.sums[plane * 96 + y * 12 + x]);
+}
+
+TEST(World, BuiltByOneThreadOrTwoItGivesTheSamePixels) {
+  for (const Named& n : scenes()) {
+    EXPECT_EQ(render(*test::world_of(n.kit, 0, 1)).sums, render(*test::world_of(n.kit, 0, 2)).sums) << n.name;
+  }
+}
+
+TEST(World, AnotherSeedGivesOtherSamples) {
+  EXPECT_NE(render(*test::world_of(room(), 0)).sums, render(*test::world_of(room(), 1)).sums);
+}
+
+TEST(World, TheSamplesOfASampleRangeAreThoseThatReplayGives) {
+  const auto world = test::world_of(room());
+  const TileResult r = render_tile(*world, {5, 3, 6, 4}, {0, 8}, nullptr, nullptr);
+  double even[3] = {}, odd[3] = {};
+  for (std::uint64_t s = 0; s < 8; ++s) {
+    const SampleValue v = render_sample(*world, 5, 3, s);
+    for (int c = 0; c < 3; ++c) (s % 2 ? odd : even)[c] += v.rgb[c];
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_EQ(r.sums[c], static_cast<float>(even[c]));
+    EXPECT_EQ(r.sums[3 + c], static_cast<float>(odd[c]));
+  }
+}
+
+// The whole scene 2^k times as large, media thinner by as much, lights as bright as they must be.
+SceneKit scaled(SceneKit kit, int k) {
+  const double f = std::ldexp(1., k);
+  const auto move = [&](Transform& t) { t = test::scale(f) * t; };
+  for (Shape& s : kit.scene.shapes) move(s.to_world);
+  for (Emitter& e : kit.scene.emitters) {
+    if (auto* p = std::get_if<PointEmitter>(&e)) {
+      for (double& x : p->position) x *= f;
+      for (double& x : p->intensity) x *= f * f;
+    }
+  }
+  for (ls::Medium& m : kit.scene.media) std::visit([&](auto& v) { v.scale /= f; }, m);
+  for (Volume& v : kit.scene.volumes) {
+    if (auto* g = std::get_if<GridVolume>(&v)) move(g->to_world);
+  }
+  for (int row = 0; row < 3; ++row) kit.scene.sensor.to_world.m[static_cast<std::size_t>(4 * row + 3)] *= f;
+  kit.scene.sensor.near_clip *= f;
+  kit.scene.sensor.far_clip *= f;
+  kit.scene.sensor.focus_distance *= f;
+  kit.scene.sensor.aperture_radius *= f;
+  return kit;
+}
+
+TEST(World, ScalingASceneByAPowerOfTwoChangesNoBit) {
+  for (const Named& n : scenes()) {
+    // A volume without a file fills the unit cube whatever the scene's scale (as in the dialect).
+    if (std::string(n.name) == "chromatic grid") continue;
+    const auto reference = render(*test::world_of(n.kit)).sums;
+    for (int k = -13; k <= 13; ++k) {
+      ASSERT_EQ(render(*test::world_of(scaled(n.kit, k))).sums, reference) << n.name << " times 2^" << k;
+    }
+  }
+}
+
+TEST(World, AThinLensScalesWithTheScene) {
+  SceneKit kit = room();
+  kit.scene.sensor.aperture_radius = .2;
+  kit.scene.sensor.focus_distance = 5;
+  const auto reference = render(*test::world_of(kit)).sums;
+  for (const int k : {-13, -1, 1, 13})
+    EXPECT_EQ(render(*test::world_of(scaled(kit, k))).sums, reference) << k;
+}
+
+// ---- what cannot be built
+
+std::string error_of(const SceneKit& kit) {
+  const auto w = build_world(kit.scene, test::settings_of(kit.scene), kit.files, 1);
+  return w ? "" : w.error().message;
+}
+
+TEST(World, RefusesReferencesToWhatTheSceneDoesNotHave) {
+  SceneKit kit = room();
+  kit.scene.shapes[0].bsdf = {99};
+  EXPECT_THAT(error_of(kit), HasSubstr("does not have"));
+  kit = room();
+  kit.scene.shapes[0].interior = MediumIndex{5};
+  EXPECT_THAT(error_of(kit), HasSubstr("does not have"));
+  kit = room();
+  kit.scene.sensor.medium = MediumIndex{0};
+  EXPECT_THAT(error_of(kit), HasSubstr("does not have"));
+  kit = room();
+  kit.scene.shapes[3].emitter->radiance = {77};
+  EXPECT_THAT(error_of(kit), HasSubstr("does not have"));
+}
+
+TEST(World, RefusesShapesWithoutAnInverseOrBeyondAllBounds) {
+  SceneKit kit = room();
+  kit.scene.shapes[1].to_world = test::scale(1, 0, 1);
+  EXPECT_THAT(error_of(kit), HasSubstr("shape 2: its to_world has no inverse"));
+  kit = room();
+  kit.scene.shapes[0].to_world.m[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error_of(kit), HasSubstr("shape 1"));
+  kit = room();
+  kit.scene.shapes[1].to_world = test::scale(1, 2, 1);
+  EXPECT_THAT(error_of(kit), HasSubstr("uniformly"));
+}
+
+TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
+  const auto with_grid = [](float value, const Transform& t) {
+    return with_medium([&](SceneKit& k) {
+      return k.heterogeneous(k.grid({2, 2, 2}, std::vector<float>(8, value), t), {1, 1, 1});
+    });
+  };
+  EXPECT_THAT(error_of(with_grid(std::nanf(""), kBox)), HasSubstr("grid.vol"));
+  EXPECT_THAT(error_of(with_grid(std::numeric_limits<float>::infinity(), kBox)), HasSubstr("grid.vol"));
+  EXPECT_THAT(error_of(with_grid(1, test::scale(0))), HasSubstr("inverse"));
+  EXPECT_EQ(error_of(with_grid(1, kBox)), "");
+}
+
+TEST(World, NamesAFileThatWasNotBrought) {
+  SceneKit kit = scenes()[3].kit;
+  kit.files.clear();
+  EXPECT_THAT(error_of(kit), HasSubstr("grid.vol"));
+}
+
+TEST(World, CountsNegativeDensitiesThatItMadeZero) {
+  SceneKit kit = with_medium([](SceneKit& k) {
+    return k.heterogeneous(k.grid({2, 1, 1}, {-1, 1}, kBox), {1, 1, 1});
+  });
+  EXPECT_EQ(describe(*test::world_of(kit)).clamped_inputs, 1u);
+}
+
+TEST(World, AnEmptySceneIsItsSky) {
+  SceneKit kit({2, 2});
+  kit.environment(.25);
+  const TileResult r = render_tile(*test::world_of(kit), {0, 0, 2, 2}, {0, 4}, nullptr, nullptr);
+  for (const float s : r.sums) EXPECT_EQ(s, .5f);  // two samples a half
+}
+
+}  // namespace
+}  // namespace ls::render
