@@ -109,6 +109,17 @@ TEST(World, ASubsetOfATileIsThatPartOfTheTile) {
         ASSERT_EQ(part.sums[plane * 12 + (y - 2) * 4 + x - 3], all.sums[plane * 96 + y * 12 + x]);
 }
 
+TEST(World, RoundsContinueTheSequenceWhateverTheirGrouping) {
+  const auto world = test::world_of(room());
+  const PixelRect all{0, 0, 12, 8};
+  const auto sums = [&](SampleRange r) { return render_tile(*world, all, r, nullptr, nullptr).sums; };
+  const auto whole = sums({0, 16}), first = sums({0, 4}), second = sums({4, 16});
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    // Three roundings to float32 of sums in double.
+    ASSERT_NEAR(whole[i], double{first[i]} + second[i], 3 * 0x1p-24 * whole[i]);
+  }
+}
+
 TEST(World, BuiltByOneThreadOrTwoItGivesTheSamePixels) {
   for (const Named& n : scenes()) {
     EXPECT_EQ(render(*test::world_of(n.kit, 0, 1)).sums, render(*test::world_of(n.kit, 0, 2)).sums) << n.name;
