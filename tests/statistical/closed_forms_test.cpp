@@ -75,8 +75,10 @@ TEST_P(ClosedForm, IsMatchedInEveryChannel) {
   EXPECT_EQ(e.health.majorant_violations, 0u);
   for (std::size_t k = 0; k < 3; ++k) {
     const double got = c.complement ? 1 - e.mean[k] : e.mean[k], off = std::abs(got - c.expected[k]);
+    const double rounding = kRounding * std::abs(c.expected[k]);
+    const double freedom = e.standard_error[k] < rounding / 4 ? kLeastFreedom : e.freedom[k];
     const double half =
-        student(z, e.freedom[k]) * e.standard_error[k] + (kRounding + c.slack) * std::abs(c.expected[k]);
+        student(z, freedom) * e.standard_error[k] + rounding + c.slack * std::abs(c.expected[k]);
     fmt::print("{:<44} {} {:>15.9g} {:>15.9g} {:>10.2e} {:>7.2f} {:>8.3f}%\n", c.name, "RGB"[k],
                c.expected[k], got, e.standard_error[k],
                e.standard_error[k] > 0 ? (got - c.expected[k]) / e.standard_error[k] : 0.,
