@@ -19,8 +19,8 @@ constexpr double kFalsePositives = 1e-3;
 // case.
 constexpr double kRounding = 0x1p-16;
 // Fewer than this and the standard error itself is not known well enough for the quantile below. Not asked
-// where the error is a quarter of float32's own: there the few pixels whose sums round differently are all
-// that varies.
+// where the error is below what is allowed for float32: there the few pixels whose sums round differently are
+// all that varies.
 constexpr double kLeastFreedom = 40;
 
 const std::vector<Case>& table() {
@@ -76,7 +76,7 @@ TEST_P(ClosedForm, IsMatchedInEveryChannel) {
   for (std::size_t k = 0; k < 3; ++k) {
     const double got = c.complement ? 1 - e.mean[k] : e.mean[k], off = std::abs(got - c.expected[k]);
     const double rounding = kRounding * std::abs(c.expected[k]);
-    const double freedom = e.standard_error[k] < rounding / 4 ? kLeastFreedom : e.freedom[k];
+    const double freedom = e.standard_error[k] < rounding ? kLeastFreedom : e.freedom[k];
     const double half =
         student(z, freedom) * e.standard_error[k] + rounding + c.slack * std::abs(c.expected[k]);
     fmt::print("{:<44} {} {:>15.9g} {:>15.9g} {:>10.2e} {:>7.2f} {:>8.3f}%\n", c.name, "RGB"[k],
