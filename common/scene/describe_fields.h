@@ -52,15 +52,9 @@ void describe(V& v, T& b) {
 template <class V, Of<RoughConductorBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u",
-           .doc = "roughness along u",
-           .range = kPositive,
-           .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_u", .doc = "roughness along u", .range = kPositive, .fallback = {.1, .1, .1}},
           b.alpha_u);
-  v.field({.name = "alpha_v",
-           .doc = "roughness along v",
-           .range = kPositive,
-           .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_v", .doc = "roughness along v", .range = kPositive, .fallback = {.1, .1, .1}},
           b.alpha_v);
   v.field(
       {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 #include <utility>
 
 #include "common/scene/limits.h"
@@ -18,7 +19,19 @@ bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) |
 class Parameters {
  public:
   Parameters(const std::map<std::string, std::string>& defines, Report& report)
-      : values_(defines), report_(report) {}
+      : values_(defines), report_(report) {
+    for (const auto& [name, value] : defines) unused_.insert(name);
+  }
+
+  // Something defined from outside that nothing asks for is a typing error, but no reason to stop.
+  void warn_of_unused(const Span& at) const {
+    std::vector<std::string> known;
+    for (const auto& [name, value] : values_)
+      if (!unused_.contains(name)) known.push_back(name);
+    for (const std::string& name : unused_)
+      report_.warning(at, fmt::format("nothing in the scene asks for ${}, which was defined for it{}", name,
+                                      known.empty() ? "; it has no parameters" : suggestion(name, known)));
+  }
 
   bool declare(const Element& e, std::string name, std::string value) {
     if (name.empty()) return complain(e.at, "<default> needs a name");
@@ -40,6 +53,7 @@ class Parameters {
       } else {
         const auto found = longest_at(a.value, i + 1);
         if (found == values_.end()) return undefined(a, i + 1);
+        unused_.erase(found->first);
         out += found->second;
         i += 1 + found->first.size();
       }
@@ -85,6 +99,7 @@ class Parameters {
   }
 
   Values values_;
+  std::set<std::string> unused_;  // of those from outside
   Report& report_;
   std::size_t total_ = 0;
 };
@@ -130,6 +145,7 @@ class Loader {
         version->value[0] < '2' && (version->value.size() == 1 || version->value[1] == '.');
     return expand(root, old_names);
   }
+  void warn_of_unused_defines(const Element& root) const { parameters_.warn_of_unused(root.at); }
 
   std::vector<std::string> search_paths;
 
@@ -267,6 +283,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   if (!loader.load(std::string(file_name), std::string(text.substr(0, kMaxTextBytes + 1)), nullptr,
                    document.root))
     return std::nullopt;
+  loader.warn_of_unused_defines(document.root);
   document.search_paths = std::move(loader.search_paths);
   return document;
 }

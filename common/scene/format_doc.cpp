@@ -26,7 +26,9 @@ Column column(const Field&, double x) { return {"float", fmt::format("{}", x)}; 
 Column column(const Field&, int x) { return {"integer", fmt::format("{}", x)}; }
 Column column(const Field&, std::uint64_t x) { return {"integer", fmt::format("{}", x)}; }
 Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; }
-Column column(const Field&, const std::string& x) { return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)}; }
+Column column(const Field&, const std::string& x) {
+  return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};
+}
 Column column(const Field&, const Vec3& x) { return {"rgb, vector", text_of(x)}; }
 Column column(const Field&, const Transform&) { return {"transform", "identity"}; }
 Column column(const Field&, const UvTransform&) { return {"transform", "identity"}; }
@@ -35,22 +37,22 @@ Column column(const Field& f, TextureIndex) { return {"rgb, texture", text_of(f.
 Column column(const Field&, const std::optional<TextureIndex>&) { return {"texture", "none"}; }
 Column column(const Field& f, VolumeIndex) { return {"rgb, volume", text_of(f.fallback)}; }
 template <class E>
-  requires std::is_enum_v<E>
-Column column(const Field&, E x) {
+requires std::is_enum_v<E> Column column(const Field&, E x) {
   std::string all;
-  for (const auto& [name, value] : NamesOf<E>::all) all += fmt::format("{}{}", all.empty() ? "" : ", ", value == x ? fmt::format("**{}**", name) : std::string(name));
+  for (const auto& [name, value] : NamesOf<E>::all)
+    all += fmt::format("{}{}", all.empty() ? "" : ", ",
+                       value == x ? fmt::format("**{}**", name) : std::string(name));
   return {"string", all};
 }
 // Nested objects and what follows from the plugin's name.
 template <class T>
-  requires(!std::is_enum_v<T>)
-Column column(const Field&, const T&) {
-  return {"(nested)", ""};
-}
+requires(!std::is_enum_v<T>) Column column(const Field&, const T&) { return {"(nested)", ""}; }
 
 std::string range_of(const Field& f) {
-  const std::string low = std::isinf(f.range.min) ? "" : fmt::format("{} {}", f.range.open_min ? ">" : "≥", f.range.min);
-  const std::string high = std::isinf(f.range.max) ? "" : fmt::format("{} {}", f.range.open_max ? "<" : "≤", f.range.max);
+  const std::string low =
+      std::isinf(f.range.min) ? "" : fmt::format("{} {}", f.range.open_min ? ">" : "≥", f.range.min);
+  const std::string high =
+      std::isinf(f.range.max) ? "" : fmt::format("{} {}", f.range.open_max ? "<" : "≤", f.range.max);
   return low.empty() || high.empty() ? low + high : fmt::format("{}, {}", low, high);
 }
 
@@ -60,11 +62,18 @@ class Rows {
   void field(const Field& f, const T& value) {
     const auto [type, shown] = column(f, value);
     const std::string names = f.named_ior ? fmt::format("{}, string", type) : std::string(type);
-    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, f.derived ? "(nested)" : names, f.required ? "needed" : f.derived ? "" : shown, f.unit,
-                         range_of(f), f.doc);
+    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, f.derived ? "(nested)" : names,
+                         f.required  ? "needed"
+                         : f.derived ? ""
+                                     : shown,
+                         f.unit, range_of(f), f.doc);
   }
   std::string take() const {
-    return text_.empty() ? "No parameters.\n\n" : fmt::format("| parameter | given as | default | unit | range | meaning |\n|---|---|---|---|---|---|\n{}\n", text_);
+    return text_.empty() ? "No parameters.\n\n"
+                         : fmt::format(
+                               "| parameter | given as | default | unit | range | meaning "
+                               "|\n|---|---|---|---|---|---|\n{}\n",
+                               text_);
   }
 
  private:
@@ -74,7 +83,8 @@ class Rows {
 template <class T>
 void add_type(std::string& out) {
   const TypeInfo& info = kInfo<T>;
-  out += fmt::format("### {} `{}`\n\n{}.\n\n", info.kind, info.plugins.empty() ? info.name : info.plugins, info.doc);
+  out += fmt::format("### {} `{}`\n\n{}.\n\n", info.kind, info.plugins.empty() ? info.name : info.plugins,
+                     info.doc);
   Rows rows;
   const T value{};
   describe(rows, value);
@@ -134,13 +144,17 @@ A grid of an OpenVDB file is placed by the file's own transform, then by `to_wor
 std::string meaningless_section() {
   std::string out = "## Accepted without effect\n\n| object | parameters | why |\n|---|---|---|\n";
   for (const MeaninglessRow& row : meaningless_table())
-    out += fmt::format("| {}{} | `{}` | {} |\n", row.tag, row.plugin.empty() ? "" : fmt::format(" `{}`", row.plugin), fmt::join(row.parameters, "`, `"), row.because);
+    out += fmt::format("| {}{} | `{}` | {} |\n", row.tag,
+                       row.plugin.empty() ? "" : fmt::format(" `{}`", row.plugin),
+                       fmt::join(row.parameters, "`, `"), row.because);
   return out + "\n";
 }
 
 std::string names_section() {
-  return fmt::format("## Names\n\nIndices of refraction: {}.\n\nMetals (`material` of `conductor` and `roughconductor`, instead of `eta` and `k`): {}.\n\n",
-                     fmt::join(named_iors(), ", "), fmt::join(named_metals(), ", "));
+  return fmt::format(
+      "## Names\n\nIndices of refraction: {}.\n\nMetals (`material` of `conductor` and `roughconductor`, "
+      "instead of `eta` and `k`): {}.\n\n",
+      fmt::join(named_iors(), ", "), fmt::join(named_metals(), ", "));
 }
 
 }  // namespace
@@ -168,8 +182,10 @@ std::string scene_format_markdown() {
   add_type<FilmSettings>(out);
   add_types(out, static_cast<const ReconstructionFilter*>(nullptr));
   add_type<IntegratorSettings>(out);
-  out += "`volpathmis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and `direct` means `path` with max_depth 2; `moment` and `aov` mean the\n"
-         "integrator within them. A sampler of any name gives `sample_count` (default 4) samples a pixel.\n\n";
+  out +=
+      "`volpathmis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and `direct` means `path` "
+      "with max_depth 2; `moment` and `aov` mean the\n"
+      "integrator within them. A sampler of any name gives `sample_count` (default 4) samples a pixel.\n\n";
   out += meaningless_section() + names_section();
   return out += kCanonical;
 }

@@ -135,6 +135,21 @@ std::vector<std::string> meaningless_parameters(std::string_view tag, std::strin
   return all;
 }
 
+std::string_view replacement(std::string_view tag, std::string_view parameter) {
+  static constexpr std::string_view kCoefficients =
+      "Mitsuba 3 describes media by sigma_t = sigma_a + sigma_s and albedo = sigma_s / sigma_t";
+  static constexpr struct {
+    std::string_view tag, parameter, instead;
+  } rows[] = {
+      {"medium", "sigma_a", kCoefficients},
+      {"medium", "sigma_s", kCoefficients},
+      {"medium", "density", "the density is the volume `sigma_t`; `scale` multiplies it"},
+  };
+  for (const auto& row : rows)
+    if (row.tag == tag && row.parameter == parameter) return row.instead;
+  return {};
+}
+
 const std::vector<std::string>& supported_plugins(std::string_view tag) {
   const auto it = plugins().find(tag);
   return it == plugins().end() ? kNone : it->second.supported;

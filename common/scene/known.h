@@ -12,6 +12,9 @@ std::string_view meaningless_because(std::string_view tag, std::string_view plug
                                      std::string_view parameter);
 std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin);
 
+// What to write instead of a parameter that older dialects have, or neighbouring ones; empty if it is none.
+std::string_view replacement(std::string_view tag, std::string_view parameter);
+
 // The plugins of a tag that can be read, and those that the dialect has besides.
 const std::vector<std::string>& supported_plugins(std::string_view tag);
 bool is_unsupported_plugin(std::string_view tag, std::string_view plugin);

@@ -62,10 +62,10 @@ const Element* Params::take(std::string_view name) {
   return nullptr;
 }
 
-std::vector<Params::Nested> Params::take_nested(std::string_view tag) {
+std::vector<Params::Nested> Params::take_nested(std::string_view tag, Names names) {
   std::vector<Nested> out;
   for (Child& c : children_)
-    if (!c.taken && c.object && c.object->tag == tag) {
+    if (!c.taken && c.object && c.object->tag == tag && (names == Names::any || c.name.empty())) {
       c.taken = true;
       out.push_back({c.object, c.element});
     }
@@ -88,6 +88,9 @@ void Params::left_over(const Child& c) {
     return reader_.report().error(c.element->at,
                                   fmt::format("{} has no use for a <{}> without a name", title(),
                                               c.object ? c.object->tag : c.element->tag));
+  if (const auto instead = replacement(object_.tag, c.name); !instead.empty())
+    return reader_.report().error(value_place(*c.element, "name"),
+                                  fmt::format("{} has no parameter '{}': {}", title(), c.name, instead));
   // Known parameters first, then those that would only be warned about.
   std::string hint = suggestion(c.name, known_);
   if (const auto near = nearest_name(c.name, known_); !near)

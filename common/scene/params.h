@@ -31,7 +31,8 @@ class Params {
     const Element* object;
     const Element* use;
   };
-  std::vector<Nested> take_nested(std::string_view tag);
+  enum class Names { any, none };  // none: only those without a name
+  std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
   // Reports what nobody took.
   void finish();
 

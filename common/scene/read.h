@@ -14,8 +14,8 @@
 
 namespace ls {
 
-// How the reader reaches the files a scene names. Two real ones: a folder on disk (the command line), and the assets of
-// an upload (the coordinator, which never opens a path that a scene wrote).
+// How the reader reaches the files a scene names. Two real ones: a folder on disk (the command line), and the
+// assets of an upload (the coordinator, which never opens a path that a scene wrote).
 class AssetSource {
  public:
   virtual ~AssetSource() = default;
@@ -26,7 +26,7 @@ class AssetSource {
 };
 
 struct ReadOptions {
-  std::map<std::string, std::string> defines;  // $name -> value
+  std::map<std::string, std::string> defines;  // $name -> value; one that nothing asks for is warned about
   bool strict = false;                         // warnings become errors
 };
 
@@ -35,6 +35,7 @@ struct ReadResult {
   std::vector<Diagnostic> diagnostics;
 };
 
-ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSource& assets, const ReadOptions& options = {});
+ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSource& assets,
+                      const ReadOptions& options = {});
 
 }  // namespace ls

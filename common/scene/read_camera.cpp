@@ -37,16 +37,25 @@ void Reader::read_sensor(const Element& e) {
   if (!std::isfinite(determinant3(s.to_world)) || determinant3(s.to_world) == 0)
     report_.error(e.at, "to_world flattens the camera's space: it can't be inverted");
 
-  const auto media = p.take_nested("medium");
-  if (const Element* use = p.take("medium"))
-    if (const Element* object = resolve(*use)) s.medium = medium(*object, *use);
-  if (!media.empty()) s.medium = medium(*media[0].object, *media[0].use);
+  read_sensor_medium(p, s);
   const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
   if (films.size() > 1) report_.error(films[1].use->at, "this sensor has a second film");
   if (samplers.size() > 1) report_.error(samplers[1].use->at, "this sensor has a second sampler");
   if (!films.empty()) read_film(*films[0].object);
   if (!samplers.empty()) read_sampler(*samplers[0].object);
   p.finish();
+}
+
+// Written with the name "medium" or without one; any other name is a slip, as interior and exterior are
+// shapes'.
+void Reader::read_sensor_medium(Params& p, Sensor& s) {
+  const Element* use = p.take("medium");
+  if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);
+  for (const auto& nameless : p.take_nested("medium", Params::Names::none)) {
+    if (use) return report_.error(nameless.use->at, "this sensor has a second medium");
+    use = nameless.use;
+    s.medium = medium(*nameless.object, *use);
+  }
 }
 
 // Without `fov` the angle is that of a focal length on 35 mm film, over the diagonal of 36 mm x 24 mm.

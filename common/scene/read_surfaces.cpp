@@ -75,8 +75,7 @@ std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
   bind(p, b);
   if constexpr (std::is_same_v<T, RoughConductorBsdf>) {
     if (const Element* alpha = p.take("alpha")) {
-      p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha,
-                b.alpha_u);
+      p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
       b.alpha_v = b.alpha_u;
     }
   }

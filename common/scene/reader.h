@@ -73,6 +73,7 @@ class Reader {
   void read_spot(const Element& e);
 
   void read_sensor(const Element& e);
+  void read_sensor_medium(Params& p, Sensor& sensor);
   void read_fov(Params& p, Sensor& sensor);
   void read_film(const Element& e);
   void check_crop(Params& p);

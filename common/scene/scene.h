@@ -1,6 +1,7 @@
-// The scene as plain data: what a scene file becomes, whatever its dialect. No pointers, no library types; cross references
-// are typed indices; every file is named by digest. Semantics are Mitsuba 3's. Lengths are scene units, angles degrees
-// (as in the files), colours linear RGB. Two equal Scenes have the same canonical serialisation and so the same digest.
+// The scene as plain data: what a scene file becomes, whatever its dialect. No pointers, no library types;
+// cross references are typed indices; every file is named by digest. Semantics are Mitsuba 3's. Lengths are
+// scene units, angles degrees (as in the files), colours linear RGB. Two equal Scenes have the same canonical
+// serialisation and so the same digest.
 #pragma once
 
 #include <array>
@@ -41,7 +42,8 @@ using VolumeIndex = Index<struct VolumeTag>;
 using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 
-// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by digest.
+// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by
+// digest.
 struct Asset {
   std::string name;
   Digest digest;
@@ -49,7 +51,8 @@ struct Asset {
   bool operator==(const Asset&) const = default;
 };
 
-// ---- textures -------------------------------------------------------------------------------------------------------
+// ---- textures
+// -------------------------------------------------------------------------------------------------------
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
 
@@ -66,7 +69,8 @@ struct BitmapTexture {
   UvTransform to_uv;
   bool operator==(const BitmapTexture&) const = default;
 };
-// color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's `checkerboard`).
+// color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's
+// `checkerboard`).
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
@@ -74,7 +78,8 @@ struct CheckerboardTexture {
 };
 using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture>;
 
-// ---- surfaces -------------------------------------------------------------------------------------------------------
+// ---- surfaces
+// -------------------------------------------------------------------------------------------------------
 enum class Microfacet { beckmann, ggx };
 
 struct DiffuseBsdf {
@@ -113,17 +118,19 @@ struct TwoSidedBsdf {
   BsdfIndex front, back;
   bool operator==(const TwoSidedBsdf&) const = default;
 };
-using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughPlasticBsdf, NullBsdf,
-                          TwoSidedBsdf>;
+using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughPlasticBsdf,
+                          NullBsdf, TwoSidedBsdf>;
 
-// ---- volumes and media ----------------------------------------------------------------------------------------------
+// ---- volumes and media
+// ----------------------------------------------------------------------------------------------
 struct ConstVolume {
   Rgb value{1, 1, 1};
   bool operator==(const ConstVolume&) const = default;
 };
 enum class VolumeFilter { nearest, trilinear };
-// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With use_grid_bbox the file's
-// own bounding box is placed first. VDB grids are placed by their own transform (see docs/scene-format.md).
+// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With
+// use_grid_bbox the file's own bounding box is placed first. VDB grids are placed by their own transform (see
+// docs/scene-format.md).
 struct GridVolume {
   AssetIndex file;
   std::string grid_name;  // for files with named grids; empty: the only one, or "density"
@@ -162,7 +169,8 @@ struct HeterogeneousMedium {
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
-// ---- shapes ---------------------------------------------------------------------------------------------------------
+// ---- shapes
+// ---------------------------------------------------------------------------------------------------------
 struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
   bool operator==(const RectangleShape&) const = default;
 };
@@ -203,12 +211,14 @@ struct Shape {
   bool operator==(const Shape&) const = default;
 };
 
-// ---- emitters without a shape ---------------------------------------------------------------------------------------
+// ---- emitters without a shape
+// ---------------------------------------------------------------------------------------
 struct ConstantEmitter {  // radiance from everywhere
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
 };
-struct DirectionalEmitter {  // `direction`: the way light travels, in the world; irradiance on a plane facing it
+struct DirectionalEmitter {  // `direction`: the way light travels, in the world; irradiance on a plane facing
+                             // it
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
   bool operator==(const DirectionalEmitter&) const = default;
@@ -228,7 +238,8 @@ struct SpotEmitter {  // at the origin of to_world, shining along its +z
 };
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter>;
 
-// ---- camera, film, integrator ---------------------------------------------------------------------------------------
+// ---- camera, film, integrator
+// ---------------------------------------------------------------------------------------
 enum class FovAxis { x, y, diagonal, smaller, larger };
 struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   Transform to_world;

@@ -1,5 +1,5 @@
-// Canonical form of a Scene: JSON with sorted keys, every field written, doubles in the shortest form that reads back to
-// the same bits. Its SHA-256 is the scene's digest; it is what travels to workers.
+// Canonical form of a Scene: JSON with sorted keys, every field written, doubles in the shortest form that
+// reads back to the same bits. Its SHA-256 is the scene's digest; it is what travels to workers.
 #pragma once
 
 #include <string>
@@ -12,7 +12,8 @@
 namespace ls {
 
 std::string serialize(const Scene& scene);
-Result<Scene> deserialize_scene(std::string_view json);  // hostile input: bounds, indices and ranges are checked
+Result<Scene> deserialize_scene(
+    std::string_view json);  // hostile input: bounds, indices and ranges are checked
 Digest digest_of(const Scene& scene);
 
 }  // namespace ls

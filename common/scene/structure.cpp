@@ -57,9 +57,11 @@ class Checker {
   void check(const Element& e, const Element* parent) {
     if (report_.full()) return;
     const TagRow* row = row_of(e);
+    if (!parent && e.tag != "scene")
+      return report_.error(e.at, fmt::format("the root must be <scene>, not <{}>", e.tag));
     if (!row) return unknown_tag(e);
     check_attributes(e, *row);
-    check_parent(e, *row, parent);
+    if (parent) check_parent(e, *row, *parent);
     if (const Attribute* id = row->kind == TagKind::object ? e.find("id") : nullptr)
       declare(id->value, &e, id->value_at);
     if (row->kind == TagKind::alias) alias(e);
@@ -100,12 +102,8 @@ class Checker {
       report_.error(e.at, "<spectrum> needs a value");
   }
 
-  void check_parent(const Element& e, const TagRow& row, const Element* parent) {
-    if (!parent) {
-      if (e.tag != "scene") report_.error(e.at, fmt::format("the root must be <scene>, not <{}>", e.tag));
-      return;
-    }
-    const TagRow* above = row_of(*parent);
+  void check_parent(const Element& e, const TagRow& row, const Element& parent) {
+    const TagRow* above = row_of(parent);
     const TagKind kind = above ? above->kind : TagKind::unknown;
     if (kind == TagKind::unknown) return;
     const bool step = row.kind == TagKind::step;
@@ -113,11 +111,11 @@ class Checker {
       report_.error(
           e.at, step ? fmt::format("<{}> is a step of a <transform> and can only stand in one", e.tag)
                 : kind == TagKind::transform ? fmt::format("<{}> is no step of a <transform>", e.tag)
-                                             : fmt::format("<{}> can't stand in <{}>", e.tag, parent->tag));
+                                             : fmt::format("<{}> can't stand in <{}>", e.tag, parent.tag));
       if (step || kind == TagKind::transform) return;
     }
     if (e.tag == "scene" || (kind != TagKind::object && kind != TagKind::transform))
-      report_.error(e.at, fmt::format("<{}> can't stand in <{}>", e.tag, parent->tag));
+      report_.error(e.at, fmt::format("<{}> can't stand in <{}>", e.tag, parent.tag));
   }
 
   void declare(const std::string& id, const Element* object, const Span& at) {

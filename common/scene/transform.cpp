@@ -11,6 +11,8 @@
 namespace ls::scene {
 namespace {
 
+constexpr double kUnitSlack = 1e-3;  // of an axis written with three digits
+
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -105,6 +107,12 @@ std::optional<Transform> read_rotate(const Element& e, Report& report) {
     report.error(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
     return std::nullopt;
   }
+  // Mitsuba 3 puts the numbers into the formula as they are, so that the step shears; nobody means that.
+  const double length = std::sqrt(dot(*axis, *axis));
+  if (std::abs(length - 1) > kUnitSlack)
+    report.warning(e.at, fmt::format("this axis has the length {:.4g}: only its direction is used. Mitsuba 3 "
+                                     "shears unless the length is 1",
+                                     length));
   return rotation(*axis, *angle);
 }
 

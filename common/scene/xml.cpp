@@ -98,6 +98,49 @@ class TreeBuilder {
   std::string_view text_;
 };
 
+// Where the attribute value begins that runs into the next element, if one does: a forgotten quote, which a
+// parser only notices at some later one. XML allows no '<' in values. Quotes in comments, CDATA and
+// instructions mean nothing.
+std::size_t find_open_quote(std::string_view text) {
+  static constexpr std::string_view kOpaque[][2] = {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}};
+  bool in_tag = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (!in_tag) {
+      const auto opaque = std::find_if(std::begin(kOpaque), std::end(kOpaque), [&](const auto& marks) {
+        return text.substr(i).starts_with(marks[0]);
+      });
+      if (opaque != std::end(kOpaque)) {
+        const std::size_t end = text.find((*opaque)[1], i);
+        if (end == std::string_view::npos) break;
+        i = end;
+      }
+      in_tag = text[i] == '<';
+    } else if (text[i] == '"' || text[i] == '\'') {
+      const std::size_t end = text.find(text[i], i + 1);
+      if (text.substr(i, end == std::string_view::npos ? end : end - i).find('<') != std::string_view::npos ||
+          end == std::string_view::npos)
+        return i;
+      i = end;
+    } else if (text[i] == '>') {
+      in_tag = false;
+    }
+  }
+  return std::string_view::npos;
+}
+
+// pugixml's own place is where it gave up.
+void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report& report) {
+  const std::string& text = report.file(file).text();
+  if (const std::size_t quote = find_open_quote(text); quote != std::string_view::npos)
+    return report.error(
+        {file, quote, 1},
+        fmt::format("malformed XML: the quote {} that opens here is not closed before the next "
+                    "element (a '<' in a value is written &lt;)",
+                    text[quote]));
+  const auto offset = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, result.offset));
+  report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
+}
+
 // What pugixml would allocate is bounded before it is asked to.
 bool small_enough(std::uint32_t file, std::string_view text, Report& report, std::size_t& elements_left) {
   std::size_t tags = 0, attributes = 0;
@@ -143,8 +186,7 @@ std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t
   const pugi::xml_parse_result result =
       xml.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result) {
-    const auto offset = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, result.offset));
-    report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
+    malformed(file, result, report);
     return std::nullopt;
   }
   const pugi::xml_node root = xml.document_element();

@@ -48,80 +48,168 @@ std::string deep(int n) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, Wrong,
     ::testing::Values(
-        Case{"UnknownElement", "<shpe type=\"cube\"/>", 2, "there is no element <shpe>; did you mean <shape>?"},
-        Case{"UnknownPlugin", "<shape type=\"sphre\"/>", 14, "there is no shape \"sphre\"; did you mean 'sphere'?"},
-        Case{"UnsupportedPlugin", "<shape type=\"hair\"/>", 14, "the shape \"hair\" is not supported; supported: cube"},
-        Case{"UnknownParameter", shape("<float name=\"raduis\" value=\"1\"/>"), 35, "shape \"sphere\" has no parameter 'raduis'; did you mean 'radius'?"},
-        Case{"UnknownAttribute", "<shape typ=\"cube\"/>", 8, "<shape> has no attribute 'typ'; did you mean 'type'?"},
+        Case{"UnknownElement", "<shpe type=\"cube\"/>", 2,
+             "there is no element <shpe>; did you mean <shape>?"},
+        Case{"UnknownPlugin", "<shape type=\"sphre\"/>", 14,
+             "there is no shape \"sphre\"; did you mean 'sphere'?"},
+        Case{"UnsupportedPlugin", "<shape type=\"hair\"/>", 14,
+             "the shape \"hair\" is not supported; supported: cube"},
+        Case{"UnknownParameter", shape("<float name=\"raduis\" value=\"1\"/>"), 35,
+             "shape \"sphere\" has no parameter 'raduis'; did you mean 'radius'?"},
+        Case{"UnknownAttribute", "<shape typ=\"cube\"/>", 8,
+             "<shape> has no attribute 'typ'; did you mean 'type'?"},
         Case{"MissingAttribute", "<shape/>", 2, "<shape> needs the attribute 'type'"},
         Case{"RepeatedAttribute", "<shape type=\"cube\" type=\"cube\"/>", 20, "twice"},
-        Case{"WrongType", shape("<string name=\"radius\" value=\"big\"/>"), 51, "'radius' of shape \"sphere\" wants a <float>, not <string> \"big\""},
+        Case{"WrongType", shape("<string name=\"radius\" value=\"big\"/>"), 51,
+             "'radius' of shape \"sphere\" wants a <float>, not <string> \"big\""},
         Case{"NotANumber", shape("<float name=\"radius\" value=\"1m\"/>"), 50, "wants a <float>"},
         Case{"NotFinite", shape("<float name=\"radius\" value=\"nan\"/>"), 50, "wants a <float>"},
-        Case{"FloatForInteger", "<integrator type=\"path\"><float name=\"max_depth\" value=\"3\"/></integrator>", 56, "wants an <integer>"},
+        Case{"FloatForInteger",
+             "<integrator type=\"path\"><float name=\"max_depth\" value=\"3\"/></integrator>", 56,
+             "wants an <integer>"},
         Case{"NotABoolean", shape("<boolean name=\"flip_normals\" value=\"yes\"/>"), 58, "true or false"},
         Case{"OutOfRange", shape("<float name=\"radius\" value=\"-1\"/>"), 50, "out of its range 0 < radius"},
-        Case{"AlbedoAboveOne", "<medium type=\"homogeneous\"><rgb name=\"albedo\" value=\".5 1.5 .5\"/></medium>", 54, "out of its range 0 <= albedo <= 1"},
-        Case{"NotOneOfTheNames", "<bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"gxx\"/></bsdf>", 62, "did you mean 'ggx'?"},
-        Case{"UnknownMaterial", "<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"watr\"/></bsdf>", 55, "did you mean 'water'?"},
-        Case{"UnknownMetal", "<bsdf type=\"conductor\"><string name=\"material\" value=\"Agg\"/></bsdf>", 55, "there is no metal \"Agg\""},
-        Case{"MaterialAndEta", "<bsdf type=\"conductor\"><string name=\"material\" value=\"Ag\"/><rgb name=\"eta\" value=\"1\"/></bsdf>", 25, "both"},
-        Case{"ParameterTwice", shape("<float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"2\"/>"), 67, "twice; first in line 2"},
-        Case{"ColourWithTwoParts", "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1 2\"/></emitter>", 54, "wants"},
+        Case{"AlbedoAboveOne",
+             "<medium type=\"homogeneous\"><rgb name=\"albedo\" value=\".5 1.5 .5\"/></medium>", 54,
+             "out of its range 0 <= albedo <= 1"},
+        Case{"NotOneOfTheNames",
+             "<bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"gxx\"/></bsdf>", 62,
+             "did you mean 'ggx'?"},
+        Case{"UnknownMaterial", "<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"watr\"/></bsdf>",
+             55, "did you mean 'water'?"},
+        Case{"UnknownMetal", "<bsdf type=\"conductor\"><string name=\"material\" value=\"Agg\"/></bsdf>", 55,
+             "there is no metal \"Agg\""},
+        Case{"MaterialAndEta",
+             "<bsdf type=\"conductor\"><string name=\"material\" value=\"Ag\"/><rgb name=\"eta\" "
+             "value=\"1\"/></bsdf>",
+             25, "both"},
+        Case{"ParameterTwice",
+             shape("<float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"2\"/>"), 67,
+             "twice; first in line 2"},
+        Case{"ColourWithTwoParts",
+             "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1 2\"/></emitter>", 54, "wants"},
         Case{"SpectralCurve", "<emitter type=\"area\" id=\"a\"/>", 2, "stands in the shape"},
-        Case{"Curve", "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:.1 700:.9\"/></bsdf>", 58, "curve over wavelengths"},
-        Case{"UnknownReference", shape("<ref id=\"steem\"/>") + "<bsdf type=\"null\" id=\"steam\"/>", 31, "no object has the id \"steem\"; did you mean \"steam\" (line 2)?"},
-        Case{"ReferenceOfTheWrongKind", "<medium type=\"homogeneous\" id=\"m\"/>" + shape("<ref id=\"m\" name=\"foo\"/>"), 70, "has no parameter 'foo'"},
-        Case{"DuplicateId", "<bsdf type=\"null\" id=\"a\"/><bsdf type=\"null\" id=\"a\"/>", 49, "the id \"a\" is given twice; first in line 2"},
+        Case{"Curve",
+             "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:.1 700:.9\"/></bsdf>", 58,
+             "curve over wavelengths"},
+        Case{"UnknownReference", shape("<ref id=\"steem\"/>") + "<bsdf type=\"null\" id=\"steam\"/>", 31,
+             "no object has the id \"steem\"; did you mean \"steam\" (line 2)?"},
+        Case{"ReferenceOfTheWrongKind",
+             "<medium type=\"homogeneous\" id=\"m\"/>" + shape("<ref id=\"m\" name=\"foo\"/>"), 75,
+             "has no parameter 'foo'"},
+        Case{"DuplicateId", "<bsdf type=\"null\" id=\"a\"/><bsdf type=\"null\" id=\"a\"/>", 49,
+             "the id \"a\" is given twice; first in line 2"},
         Case{"AliasOfNothing", "<alias id=\"a\" as=\"b\"/>", 12, "nothing before this line has the id \"a\""},
-        Case{"CircularReference", "<texture type=\"checkerboard\" id=\"t\"><ref name=\"color0\" id=\"t\"/></texture>", 38, "contains itself"},
-        Case{"CircleOfTwo",
-             "<texture type=\"checkerboard\" id=\"t\"><ref name=\"color0\" id=\"u\"/></texture><texture type=\"checkerboard\" id=\"u\"><ref name=\"color1\" id=\"t\"/></texture>", 111,
+        Case{"CircularReference",
+             "<texture type=\"checkerboard\" id=\"t\"><ref name=\"color0\" id=\"t\"/></texture>", 38,
              "contains itself"},
-        Case{"CircularBsdf", "<bsdf type=\"twosided\" id=\"t\"><ref id=\"t\"/></bsdf>", 31, "contains itself"},
-        Case{"MissingFile", "<shape type=\"obj\"><string name=\"filename\" value=\"gone.obj\"/></shape>", 50, "there is no file \"gone.obj\""},
+        Case{"CircleOfTwo",
+             "<texture type=\"checkerboard\" id=\"t\"><ref name=\"color0\" id=\"u\"/></texture><texture "
+             "type=\"checkerboard\" id=\"u\"><ref name=\"color1\" id=\"t\"/></texture>",
+             111, "contains itself"},
+        Case{"CircularBsdf", "<bsdf type=\"twosided\" id=\"t\"><ref id=\"t\"/></bsdf>", 31,
+             "contains itself"},
+        Case{"MissingFile", "<shape type=\"obj\"><string name=\"filename\" value=\"gone.obj\"/></shape>", 50,
+             "there is no file \"gone.obj\""},
         Case{"MissingParameter", "<shape type=\"obj\"/>", 2, "shape \"obj\" needs 'filename'"},
         Case{"MissingChild", "<bsdf type=\"twosided\"/>", 2, "needs one or two nested bsdfs, not 0"},
-        Case{"GlassInTwosided", "<bsdf type=\"twosided\"><bsdf type=\"dielectric\"/></bsdf>", 24, "can't stand in \"twosided\""},
+        Case{"GlassInTwosided", "<bsdf type=\"twosided\"><bsdf type=\"dielectric\"/></bsdf>", 24,
+             "can't stand in \"twosided\""},
         Case{"SecondBsdf", shape("<bsdf type=\"null\"/><bsdf type=\"null\"/>"), 42, "second bsdf"},
         Case{"ObjectWithoutUse", shape("<film type=\"hdrfilm\"/>"), 23, "has no use for a <film>"},
         Case{"PropertyOfTheScene", "<float name=\"x\" value=\"1\"/>", 2, "no parameters"},
-        Case{"UndefinedParameter", shape("<float name=\"radius\" value=\"$r\"/>"), 50, "the parameter $r is not defined"},
+        Case{"UndefinedParameter", shape("<float name=\"radius\" value=\"$r\"/>"), 50,
+             "the parameter $r is not defined"},
         Case{"StepOutsideTransform", shape("<scale value=\"2\"/>"), 23, "a step of a <transform>"},
-        Case{"UnknownStep", shape("<transform name=\"to_world\"><scael value=\"2\"/></transform>"), 50, "did you mean <scale>?"},
-        Case{"ShortMatrix", shape("<transform name=\"to_world\"><matrix value=\"1 2 3\"/></transform>"), 64, "9 or 16 numbers"},
-        Case{"PerspectiveMatrix", shape("<transform name=\"to_world\"><matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\"/></transform>"), 64, "last row"},
-        Case{"RotationWithoutAxis", shape("<transform name=\"to_world\"><rotate angle=\"3\"/></transform>"), 50, "needs an axis"},
-        Case{"LookatNowhere", shape("<transform name=\"to_world\"><lookat origin=\"1 1 1\" target=\"1 1 1\"/></transform>"), 50, "no direction"},
-        Case{"Flattened", "<shape type=\"cube\"><transform name=\"to_world\"><scale z=\"0\"/></transform></shape>", 2, "flattens"},
-        Case{"StretchedSphere", shape("<transform name=\"to_world\"><scale x=\"2\"/></transform>"), 2, "stretches"},
-        Case{"Overflow", shape("<transform name=\"to_world\"><scale x=\"1e200\"/><scale x=\"1e200\"/></transform>"), 68, "range of numbers"},
-        Case{"BeamWiderThanCutoff", "<emitter type=\"spot\"><float name=\"beam_width\" value=\"30\"/></emitter>", 2, "wider"},
-        Case{"DirectionTwice", "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\" z=\"1\"/><transform name=\"to_world\"/></emitter>", 2, "both"},
-        Case{"DirectionZero", "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\" z=\"0\"/></emitter>", 2, "zero"},
-        Case{"VectorWithoutZ", "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\"/></emitter>", 30, "needs x, y and z"},
-        Case{"TwoEnvironments", "<emitter type=\"constant\"/><emitter type=\"constant\"/>", 28, "second environment"},
-        Case{"TwoIntegrators", "<integrator type=\"path\"/><integrator type=\"path\"/>", 27, "second integrator"},
-        Case{"FilterWithNegativeLobes", "<sensor type=\"perspective\"><film type=\"hdrfilm\"><rfilter type=\"mitchell\"/></film></sensor>", 64, "negative lobes"},
-        Case{"ZeroSizeFilm", "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" value=\"0\"/></film></sensor>", 79, "1 <= width"},
-        Case{"HugeFilm", "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" value=\"60000\"/><integer name=\"height\" value=\"60000\"/></film></sensor>", 29, "larger than"},
-        Case{"TooManySamples", "<sensor type=\"perspective\"><sampler type=\"independent\"><integer name=\"sample_count\" value=\"9999999999\"/></sampler></sensor>", 93, "sample_count"},
-        Case{"Cropped", "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"crop_width\" value=\"5\"/></film></sensor>", 84, "part of the frame"},
+        Case{"UnknownStep", shape("<transform name=\"to_world\"><scael value=\"2\"/></transform>"), 50,
+             "did you mean <scale>?"},
+        Case{"ShortMatrix", shape("<transform name=\"to_world\"><matrix value=\"1 2 3\"/></transform>"), 64,
+             "9 or 16 numbers"},
+        Case{"PerspectiveMatrix",
+             shape("<transform name=\"to_world\"><matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 "
+                   "1\"/></transform>"),
+             64, "last row"},
+        Case{"RotationWithoutAxis", shape("<transform name=\"to_world\"><rotate angle=\"3\"/></transform>"),
+             50, "needs an axis"},
+        Case{"LookatNowhere",
+             shape("<transform name=\"to_world\"><lookat origin=\"1 1 1\" target=\"1 1 1\"/></transform>"),
+             50, "no direction"},
+        Case{"Flattened",
+             "<shape type=\"cube\"><transform name=\"to_world\"><scale z=\"0\"/></transform></shape>", 2,
+             "flattens"},
+        Case{"StretchedSphere", shape("<transform name=\"to_world\"><scale x=\"2\"/></transform>"), 2,
+             "stretches"},
+        Case{"Overflow",
+             shape("<transform name=\"to_world\"><scale x=\"1e200\"/><scale x=\"1e200\"/></transform>"), 68,
+             "range of numbers"},
+        Case{"BeamWiderThanCutoff",
+             "<emitter type=\"spot\"><float name=\"beam_width\" value=\"30\"/></emitter>", 2, "wider"},
+        Case{"DirectionTwice",
+             "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\" z=\"1\"/><transform "
+             "name=\"to_world\"/></emitter>",
+             2, "both"},
+        Case{"DirectionZero",
+             "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\" z=\"0\"/></emitter>",
+             2, "zero"},
+        Case{"VectorWithoutZ",
+             "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\"/></emitter>", 30,
+             "needs x, y and z"},
+        Case{"TwoEnvironments", "<emitter type=\"constant\"/><emitter type=\"constant\"/>", 28,
+             "second environment"},
+        Case{"TwoIntegrators", "<integrator type=\"path\"/><integrator type=\"path\"/>", 27,
+             "second integrator"},
+        Case{"FilterWithNegativeLobes",
+             "<sensor type=\"perspective\"><film type=\"hdrfilm\"><rfilter "
+             "type=\"mitchell\"/></film></sensor>",
+             64, "negative lobes"},
+        Case{"ZeroSizeFilm",
+             "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" "
+             "value=\"0\"/></film></sensor>",
+             78, "1 <= width"},
+        Case{"HugeFilm",
+             "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" "
+             "value=\"60000\"/><integer name=\"height\" value=\"60000\"/></film></sensor>",
+             29, "larger than"},
+        Case{"TooManySamples",
+             "<sensor type=\"perspective\"><sampler type=\"independent\"><integer name=\"sample_count\" "
+             "value=\"9999999999\"/></sampler></sensor>",
+             92, "sample_count"},
+        Case{"Cropped",
+             "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"crop_width\" "
+             "value=\"5\"/></film></sensor>",
+             83, "part of the frame"},
         Case{"ThinLensWithoutAperture", "<sensor type=\"thinlens\"/>", 2, "needs 'aperture_radius'"},
         Case{"SecondSceneElement", "<scene version=\"3.0.0\"/>", 2, "can't stand in"},
         Case{"TextInside", shape("hello"), 2, "text inside <shape>"},
         Case{"DeepNesting", deep(80), 63 * 19 + 2, "nested more than 64 deep"},
         Case{"MissingInclude", "<include filename=\"gone.xml\"/>", 20, "there is no file \"gone.xml\""},
         Case{"MismatchedTag", "<shape type=\"cube\"></shap>", 22, "malformed XML"},
-        Case{"UnclosedQuote", "<shape type=\"cube/>", 20, "malformed XML"}),
+        Case{"UnclosedQuote", "<shape type=\"cube/>", 13,
+             "malformed XML: the quote \" that opens here is not closed"},
+        Case{"UnclosedQuoteAfterComment", "<!-- don't --><shape type='cube/>", 27,
+             "the quote ' that opens here"},
+        Case{"SensorMediumMisnamed",
+             "<medium type=\"homogeneous\" id=\"m\"/><sensor type=\"perspective\"><ref name=\"medum\" "
+             "id=\"m\"/></sensor>",
+             74, "did you mean 'medium'?"},
+        Case{"SensorWithTwoMedia",
+             "<medium type=\"homogeneous\" id=\"m\"/><sensor type=\"perspective\"><ref name=\"medium\" "
+             "id=\"m\"/><ref id=\"m\"/></sensor>",
+             91, "second medium"},
+        Case{"OldCoefficients", "<medium type=\"homogeneous\"><rgb name=\"sigma_s\" value=\"1\"/></medium>",
+             39, "'sigma_s': Mitsuba 3 describes media by sigma_t"}),
     [](const auto& info) { return std::string(info.param.name); });
 
 TEST(Diagnostics, AreShownWithTheLineAndACaret) {
-  const auto r = read("<scene version=\"3.0.0\">\n  <medium type=\"homogeneous\">\n    <float name=\"sigmat\" value=\"2\"/>\n  </medium>\n" + kSensor + "</scene>");
-  EXPECT_EQ(messages(r),
-            "test.xml:3:18: error: medium \"homogeneous\" has no parameter 'sigmat'; did you mean 'sigma_t'?\n"
-            "  3 |     <float name=\"sigmat\" value=\"2\"/>\n"
-            "    |                  ^~~~~~\n");
+  const auto r = read(
+      "<scene version=\"3.0.0\">\n  <medium type=\"homogeneous\">\n    <float name=\"sigmat\" "
+      "value=\"2\"/>\n  </medium>\n" +
+      kSensor + "</scene>");
+  EXPECT_EQ(
+      messages(r),
+      "test.xml:3:18: error: medium \"homogeneous\" has no parameter 'sigmat'; did you mean 'sigma_t'?\n"
+      "  3 |     <float name=\"sigmat\" value=\"2\"/>\n"
+      "    |                  ^~~~~~\n");
 }
 
 TEST(Diagnostics, ColumnsCountCharactersNotBytes) {
@@ -138,7 +226,8 @@ TEST(Diagnostics, LongLinesAreCutAroundThePlace) {
 
 TEST(Diagnostics, AreUpToTwentyAtOnce) {
   std::string many;
-  for (int i = 0; i < 50; ++i) many += fmt::format("<shape type=\"sphere\"><float name=\"x{}\" value=\"1\"/></shape>\n", i);
+  for (int i = 0; i < 50; ++i)
+    many += fmt::format("<shape type=\"sphere\"><float name=\"x{}\" value=\"1\"/></shape>\n", i);
   const auto r = read(with_sensor(many));
   EXPECT_EQ(r.diagnostics.size(), 20u);
   for (int i = 0; i < 20; ++i) EXPECT_EQ(r.diagnostics[static_cast<std::size_t>(i)].place.line, i + 2);
@@ -146,27 +235,54 @@ TEST(Diagnostics, AreUpToTwentyAtOnce) {
 
 TEST(Diagnostics, ManyWarningsDoNotHideAnError) {
   std::string many;
-  for (int i = 0; i < 50; ++i) many += "<medium type=\"homogeneous\"><boolean name=\"sample_emitters\" value=\"true\"/></medium>\n";
+  for (int i = 0; i < 50; ++i)
+    many += "<medium type=\"homogeneous\"><boolean name=\"sample_emitters\" value=\"true\"/></medium>\n";
   const auto r = read(with_sensor(many + "<shape type=\"blob\"/>"));
-  EXPECT_TRUE(std::any_of(r.diagnostics.begin(), r.diagnostics.end(), [](const Diagnostic& d) { return d.place.line == 52; }));
+  EXPECT_TRUE(std::any_of(r.diagnostics.begin(), r.diagnostics.end(),
+                          [](const Diagnostic& d) { return d.place.line == 52; }));
   EXPECT_LE(r.diagnostics.size(), 20u);
 }
 
 TEST(Diagnostics, MeaninglessParametersAreWarningsAndErrorsWhenStrict) {
-  const std::string text = with_sensor("<bsdf type=\"roughplastic\"><boolean name=\"sample_visible\" value=\"true\"/></bsdf>");
+  const std::string text =
+      with_sensor("<bsdf type=\"roughplastic\"><boolean name=\"sample_visible\" value=\"true\"/></bsdf>");
   const auto r = read(text);
   ASSERT_TRUE(r.scene);
   ASSERT_EQ(r.diagnostics.size(), 1u);
   EXPECT_EQ(r.diagnostics[0].severity, Diagnostic::Severity::warning);
-  EXPECT_THAT(r.diagnostics[0].text, HasSubstr("'sample_visible' of bsdf \"roughplastic\" has no effect here"));
+  EXPECT_THAT(r.diagnostics[0].text,
+              HasSubstr("'sample_visible' of bsdf \"roughplastic\" has no effect here"));
 
   const auto strict = read(text, {.strict = true});
   EXPECT_FALSE(strict.scene);
   EXPECT_EQ(strict.diagnostics.at(0).severity, Diagnostic::Severity::error);
 }
 
+TEST(Diagnostics, DefinesThatNothingAsksForAreWarnedAbout) {
+  const std::string used =
+      "<default name=\"radius\" value=\"1\"/>" + shape("<float name=\"radius\" value=\"$radius\"/>");
+  EXPECT_TRUE(read(with_sensor(used), {.defines = {{"radius", "2"}}}).diagnostics.empty());
+
+  const auto r = read(with_sensor(used), {.defines = {{"radus", "2"}}});
+  ASSERT_TRUE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), 1u);
+  EXPECT_EQ(r.diagnostics[0].severity, Diagnostic::Severity::warning);
+  EXPECT_EQ(r.diagnostics[0].place, (SourcePlace{"test.xml", 1, 2}));
+  EXPECT_EQ(r.diagnostics[0].text,
+            "nothing in the scene asks for $radus, which was defined for it; did you mean 'radius'?");
+
+  EXPECT_FALSE(read(with_sensor(used), {.defines = {{"radus", "2"}}, .strict = true}).scene);
+  EXPECT_THAT(messages(read(with_sensor(used), {.defines = {{"z", "2"}}})), HasSubstr("known here: radius"));
+  EXPECT_THAT(messages(read(with_sensor(""), {.defines = {{"z", "2"}}})), HasSubstr("it has no parameters"));
+  // Declared, but in no value: it would change nothing.
+  EXPECT_THAT(messages(read(with_sensor("<default name=\"n\" value=\"1\"/>"), {.defines = {{"n", "2"}}})),
+              HasSubstr("asks for $n"));
+}
+
 TEST(Diagnostics, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
-  const auto r = read(with_sensor("<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" id=\"m\"/></shape>"));
+  const auto r =
+      read(with_sensor("<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" "
+                       "id=\"m\"/></shape>"));
   ASSERT_TRUE(r.scene);
   EXPECT_THAT(r.diagnostics.at(0).text, HasSubstr("<bsdf type=\"null\"/>"));
 }
@@ -174,7 +290,9 @@ TEST(Diagnostics, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
 TEST(Diagnostics, TheSceneAsAWholeIsChecked) {
   const auto first = [](const std::string& text) {
     const auto r = read(text);
-    return r.diagnostics.empty() ? "" : fmt::format("{}:{} {}", r.diagnostics[0].place.line, r.diagnostics[0].place.column, r.diagnostics[0].text);
+    return r.diagnostics.empty() ? ""
+                                 : fmt::format("{}:{} {}", r.diagnostics[0].place.line,
+                                               r.diagnostics[0].place.column, r.diagnostics[0].text);
   };
   EXPECT_THAT(first(""), HasSubstr("1:1 "));
   EXPECT_THAT(first("hello"), HasSubstr("1:"));
@@ -210,14 +328,18 @@ TEST(Diagnostics, AMisspeltNameAnywhereIsAnErrorInItsLine) {
       std::size_t end = name;
       while (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_') ++end;
       text.insert(end, "q");
-      const int line = static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(name), '\n')) + 1;
+      const int line =
+          static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(name), '\n')) +
+          1;
       const auto r = read(text);
       ++tried;
       EXPECT_FALSE(r.scene) << text.substr(at, 30);
       // A misspelt start tag is malformed XML: it is found at its end tag.
       if (key != "<") {
-        EXPECT_TRUE(std::any_of(r.diagnostics.begin(), r.diagnostics.end(), [&](const Diagnostic& d) { return d.place.line == line; }))
-            << text.substr(at, 30) << "\n" << messages(r);
+        EXPECT_TRUE(std::any_of(r.diagnostics.begin(), r.diagnostics.end(),
+                                [&](const Diagnostic& d) { return d.place.line == line; }))
+            << text.substr(at, 30) << "\n"
+            << messages(r);
       }
       for (const Diagnostic& d : r.diagnostics) EXPECT_GT(d.place.line, 0);
     }
@@ -228,15 +350,19 @@ TEST(Diagnostics, AMisspeltNameAnywhereIsAnErrorInItsLine) {
 // An unknown parameter put into any object of the example.
 TEST(Diagnostics, AnUnknownParameterInAnyObjectIsAnErrorInItsLine) {
   int tried = 0;
-  for (std::size_t at = kExample.find("type=\""); at != std::string::npos; at = kExample.find("type=\"", at + 1)) {
+  for (std::size_t at = kExample.find("type=\""); at != std::string::npos;
+       at = kExample.find("type=\"", at + 1)) {
     const std::size_t close = kExample.find('>', at);
     const bool empty = kExample[close - 1] == '/';
     const std::size_t tag = kExample.rfind('<', at) + 1;
     const std::string name = kExample.substr(tag, kExample.find(' ', tag) - tag);
     const std::string wrong = "\n<float name=\"zzyzx\" value=\"1\"/>";
     std::string text = kExample;
-    text.replace(empty ? close - 1 : close, empty ? 2 : 1, empty ? ">" + wrong + "</" + name + ">" : ">" + wrong);
-    const int line = static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(close), '\n')) + 2;
+    text.replace(empty ? close - 1 : close, empty ? 2 : 1,
+                 empty ? ">" + wrong + "</" + name + ">" : ">" + wrong);
+    const int line =
+        static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(close), '\n')) +
+        2;
     const auto r = read(text);
     ++tried;
     ASSERT_FALSE(r.diagnostics.empty()) << text.substr(at, 30);

@@ -43,7 +43,8 @@ TEST_F(Folder, ReadsAFileOnce) {
 }
 
 TEST_F(Folder, AMissingFileIsToldWithNamesLikeIt) {
-  EXPECT_EQ(assets_.find("clod.vol").error(), (Error{Errc::not_found, "there is no file \"clod.vol\"; did you mean 'cloud.vol'?"}));
+  EXPECT_EQ(assets_.find("clod.vol").error(),
+            (Error{Errc::not_found, "there is no file \"clod.vol\"; did you mean 'cloud.vol'?"}));
   EXPECT_THAT(assets_.find("nowhere/cloud.vol").error().message, HasSubstr("its folder does not exist"));
 }
 

@@ -15,7 +15,8 @@ TEST(SceneFormatPage, IsWhatTheTableSays) {
   std::ifstream in(path);
   const std::string committed{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 
-  EXPECT_EQ(committed, scene_format_markdown()) << "run LIGHTSHAFT_UPDATE_DOCS=1 scene_test --gtest_filter='SceneFormatPage.*' and commit the page";
+  EXPECT_EQ(committed, scene_format_markdown())
+      << "run LIGHTSHAFT_UPDATE_DOCS=1 scene_test --gtest_filter='SceneFormatPage.*' and commit the page";
 }
 
 }  // namespace

@@ -38,20 +38,27 @@ TEST(HostileScenes, IncludesThatMultiplyAreRefusedEarly) {
 
 TEST(HostileScenes, IncludesAreNotFollowedForever) {
   MemoryAssets assets;
-  for (int i = 0; i < 40; ++i) assets.files[fmt::format("{}.xml", i)] = fmt::format("<scene version=\"3.0.0\"><include filename=\"{}.xml\"/></scene>", i + 1);
-  EXPECT_THAT(first(read_scene("main.xml", with_sensor("<include filename=\"0.xml\"/>"), assets)), HasSubstr("includes are limited"));
+  for (int i = 0; i < 40; ++i)
+    assets.files[fmt::format("{}.xml", i)] =
+        fmt::format("<scene version=\"3.0.0\"><include filename=\"{}.xml\"/></scene>", i + 1);
+  EXPECT_THAT(first(read_scene("main.xml", with_sensor("<include filename=\"0.xml\"/>"), assets)),
+              HasSubstr("includes are limited"));
 }
 
 TEST(HostileScenes, IncludedBytesAreCountedTogether) {
   MemoryAssets assets;
-  assets.files["big.xml"] = "<scene version=\"3.0.0\">" + std::string(scene::kMaxTextBytes - 100, ' ') + "</scene>";
+  assets.files["big.xml"] =
+      "<scene version=\"3.0.0\">" + std::string(scene::kMaxTextBytes - 100, ' ') + "</scene>";
   std::string many;
   for (int i = 0; i < 4; ++i) many += "<include filename=\"big.xml\"/>";
   EXPECT_THAT(first(read_scene("main.xml", with_sensor(many), assets)), HasSubstr("limited to"));
 }
 
 TEST(HostileScenes, EntitiesAreNotExpanded) {
-  const auto r = read("<!DOCTYPE s [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><scene version=\"3.0.0\"><shape type=\"&b;\"/>" + kSensor + "</scene>");
+  const auto r = read(
+      "<!DOCTYPE s [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><scene version=\"3.0.0\"><shape "
+      "type=\"&b;\"/>" +
+      kSensor + "</scene>");
   EXPECT_THAT(first(r), HasSubstr("there is no shape \"&b;\""));
 }
 
@@ -78,8 +85,11 @@ TEST(HostileScenes, TooManyElementsAreRefused) {
 
 TEST(HostileScenes, LongChainsOfReferencesAreRefused) {
   std::string chain;
-  for (int i = 0; i < 5000; ++i) chain += fmt::format("<texture type=\"checkerboard\" id=\"t{}\"><ref name=\"color0\" id=\"t{}\"/></texture>", i, i + 1);
-  EXPECT_THAT(first(read(with_sensor(chain + "<texture type=\"checkerboard\" id=\"t5000\"/>"))), HasSubstr("nested more than 64 deep"));
+  for (int i = 0; i < 5000; ++i)
+    chain += fmt::format(
+        "<texture type=\"checkerboard\" id=\"t{}\"><ref name=\"color0\" id=\"t{}\"/></texture>", i, i + 1);
+  EXPECT_THAT(first(read(with_sensor(chain + "<texture type=\"checkerboard\" id=\"t5000\"/>"))),
+              HasSubstr("nested more than 64 deep"));
 }
 
 TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
@@ -88,21 +98,45 @@ TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
   EXPECT_EQ(read(with_sensor(text + "</bsdf>")).diagnostics.size(), scene::kMaxDiagnostics);
 }
 
-// Random damage to a good scene: it still reads, or says where it does not. What reads survives its own serialisation.
+// Random damage to a good scene: it still reads, or says where it does not. What reads survives its own
+// serialisation.
 TEST(HostileScenes, RandomDamageIsAnsweredNeverACrash) {
   std::mt19937 random(7);
-  const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
-  const std::string pieces[] = {"<", ">", "\"", "/>", "&#0;", "$", "$spp", "<ref id=\"fog\"/>", "-1e308", "nan", "\xc3", " ", "<!--", "]]>", "<include filename=\"cloud.vol\"/>"};
+  const auto below = [&](std::size_t n) {
+    return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+  };
+  const std::string pieces[] = {"<",
+                                ">",
+                                "\"",
+                                "/>",
+                                "&#0;",
+                                "$",
+                                "$spp",
+                                "<ref id=\"fog\"/>",
+                                "-1e308",
+                                "nan",
+                                "\xc3",
+                                " ",
+                                "<!--",
+                                "]]>",
+                                "<include filename=\"cloud.vol\"/>"};
   int good = 0;
   for (int n = 0; n < 3000; ++n) {
     std::string text = kExample;
     for (std::size_t edits = 1 + below(3); edits > 0; --edits) {
       const std::size_t at = below(text.size());
       switch (below(4)) {
-        case 0: text[at] = static_cast<char>(below(256)); break;
-        case 1: text.erase(at, 1 + below(20)); break;
-        case 2: text.insert(at, pieces[below(std::size(pieces))]); break;
-        default: text.insert(below(text.size()), text.substr(at, 1 + below(200)));
+        case 0:
+          text[at] = static_cast<char>(below(256));
+          break;
+        case 1:
+          text.erase(at, 1 + below(20));
+          break;
+        case 2:
+          text.insert(at, pieces[below(std::size(pieces))]);
+          break;
+        default:
+          text.insert(below(text.size()), text.substr(at, 1 + below(200)));
       }
     }
     const auto r = read(text);

@@ -20,7 +20,9 @@ const T& only(const List& list) {
 
 Rgb colour(const Scene& s, TextureIndex i) { return std::get<ConstantTexture>(s.textures.at(i.value)).value; }
 const Bsdf& bsdf_of(const Scene& s, std::size_t shape) { return s.bsdfs.at(s.shapes.at(shape).bsdf.value); }
-Scene with_bsdf(const std::string& bsdf) { return must_read(with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>")); }
+Scene with_bsdf(const std::string& bsdf) {
+  return must_read(with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>"));
+}
 
 TEST(Reading, TheExampleHasEverythingInItsPlace) {
   const Scene s = must_read(kExample);
@@ -46,7 +48,8 @@ TEST(Reading, TheExampleHasEverythingInItsPlace) {
   EXPECT_EQ(only<RoughPlasticBsdf>(s.bsdfs).int_ior, 1.333);
   EXPECT_EQ(only<ConductorBsdf>(s.bsdfs).eta, (Rgb{.14304, .37531, 1.442}));
   EXPECT_EQ(only<BitmapTexture>(s.textures).wrap, Wrap::mirror);
-  EXPECT_EQ(only<CheckerboardTexture>(s.textures).to_uv.m, (std::array<double, 9>{12, 0, .5, 0, 6, 0, 0, 0, 1}));
+  EXPECT_EQ(only<CheckerboardTexture>(s.textures).to_uv.m,
+            (std::array<double, 9>{12, 0, .5, 0, 6, 0, 0, 0, 1}));
 }
 
 // Mitsuba 3.9.1's defaults, as its plugins print them.
@@ -67,7 +70,8 @@ TEST(Reading, WhatIsNotGivenIsMitsubasDefault) {
   EXPECT_EQ(std::get<ConstVolume>(s.volumes.at(b.albedo.value)).value, (Rgb{.75, .75, .75}));
   EXPECT_TRUE(std::holds_alternative<IsotropicPhase>(s.phases.at(b.phase.value)));
   EXPECT_EQ(colour(s, std::get<DiffuseBsdf>(bsdf_of(s, 0)).reflectance), (Rgb{.5, .5, .5}));
-  EXPECT_EQ(colour(s, std::get<DiffuseBsdf>(bsdf_of(s, 1)).reflectance), (Rgb{0, 0, 0})) << "black under an emitter";
+  EXPECT_EQ(colour(s, std::get<DiffuseBsdf>(bsdf_of(s, 1)).reflectance), (Rgb{0, 0, 0}))
+      << "black under an emitter";
   EXPECT_EQ(only<SpotEmitter>(s.emitters).cutoff_angle, 20);
   EXPECT_EQ(only<SpotEmitter>(s.emitters).beam_width, 15);
   EXPECT_EQ(only<DirectionalEmitter>(s.emitters).direction, (Vec3{0, 0, 1}));
@@ -93,7 +97,8 @@ TEST(Reading, BsdfDefaultsAreMitsubas) {
   const Scene plastic = with_bsdf("<bsdf type=\"roughplastic\"/>");
   EXPECT_EQ(std::get<RoughPlasticBsdf>(bsdf_of(plastic, 0)).int_ior, 1.49);
 
-  const Scene checks = with_bsdf("<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf>");
+  const Scene checks =
+      with_bsdf("<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"checkerboard\"/></bsdf>");
   const auto& c = only<CheckerboardTexture>(checks.textures);
   EXPECT_EQ(colour(checks, c.color0), (Rgb{.4, .4, .4}));
   EXPECT_EQ(colour(checks, c.color1), (Rgb{.2, .2, .2}));
@@ -113,7 +118,8 @@ TEST(Reading, OneBsdfInTwosidedServesBothSides) {
 }
 
 TEST(Reading, BeamWidthFollowsTheCutoff) {
-  const Scene s = must_read(with_sensor("<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"40\"/></emitter>"));
+  const Scene s =
+      must_read(with_sensor("<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"40\"/></emitter>"));
   EXPECT_EQ(only<SpotEmitter>(s.emitters).beam_width, 30);
 }
 
@@ -124,9 +130,11 @@ TEST(Reading, MeshesFlipTexturesAsTheirFormatsDo) {
 }
 
 TEST(Reading, EmittersGoWhereTheirTransformSays) {
-  const Scene s = must_read(with_sensor(
-      "<emitter type=\"directional\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"90\"/><translate x=\"5\"/></transform></emitter>"
-      "<emitter type=\"point\"><transform name=\"to_world\"><scale value=\"3\"/><translate x=\"5\"/></transform></emitter>"));
+  const Scene s =
+      must_read(with_sensor("<emitter type=\"directional\"><transform name=\"to_world\"><rotate x=\"1\" "
+                            "angle=\"90\"/><translate x=\"5\"/></transform></emitter>"
+                            "<emitter type=\"point\"><transform name=\"to_world\"><scale "
+                            "value=\"3\"/><translate x=\"5\"/></transform></emitter>"));
   const Vec3 d = only<DirectionalEmitter>(s.emitters).direction;
   EXPECT_EQ(d[1], -1);
   EXPECT_NEAR(d[2], 0, 1e-16) << "cos 90 degrees in double: half an ulp of pi/2";
@@ -134,18 +142,22 @@ TEST(Reading, EmittersGoWhereTheirTransformSays) {
 }
 
 TEST(Reading, FocalLengthIsAnAngleOverTheDiagonalOf35mmFilm) {
-  const Scene s = must_read("<scene version=\"3.0.0\"><sensor type=\"perspective\"><string name=\"focal_length\" value=\"35mm\"/></sensor></scene>");
+  const Scene s = must_read(
+      "<scene version=\"3.0.0\"><sensor type=\"perspective\"><string name=\"focal_length\" "
+      "value=\"35mm\"/></sensor></scene>");
   EXPECT_DOUBLE_EQ(s.sensor.fov, 2 * std::atan(std::hypot(36, 24) / 70) * 180 / M_PI);
 }
 
 TEST(Reading, FocusIsAtTheFarClipUnlessGiven) {
-  const Scene s = must_read(R"(<scene version="3.0.0"><sensor type="thinlens"><float name="aperture_radius" value="1"/><float name="far_clip" value="70"/></sensor></scene>)");
+  const Scene s = must_read(
+      R"(<scene version="3.0.0"><sensor type="thinlens"><float name="aperture_radius" value="1"/><float name="far_clip" value="70"/></sensor></scene>)");
   EXPECT_EQ(s.sensor.focus_distance, 70);
 }
 
 TEST(Reading, ReferencesReachForwardsBackwardsAndInto) {
   const Scene s = must_read(with_sensor(
-      "<shape type=\"cube\"><ref id=\"later\"/></shape><bsdf type=\"twosided\" id=\"later\"><bsdf type=\"diffuse\" id=\"inner\"><rgb name=\"reflectance\" value=\".1\"/></bsdf></bsdf>"
+      "<shape type=\"cube\"><ref id=\"later\"/></shape><bsdf type=\"twosided\" id=\"later\"><bsdf "
+      "type=\"diffuse\" id=\"inner\"><rgb name=\"reflectance\" value=\".1\"/></bsdf></bsdf>"
       "<alias id=\"inner\" as=\"again\"/><shape type=\"cube\"><ref id=\"again\"/></shape>"));
   const auto& two = std::get<TwoSidedBsdf>(bsdf_of(s, 0));
   EXPECT_EQ(two.front, s.shapes[1].bsdf);
@@ -153,11 +165,16 @@ TEST(Reading, ReferencesReachForwardsBackwardsAndInto) {
 }
 
 TEST(Reading, WhatNothingUsesIsLeftOutAndOrderOfDefinitionIsFree) {
-  const std::string a = "<bsdf type=\"diffuse\" id=\"a\"><rgb name=\"reflectance\" value=\".1\"/></bsdf>", b = "<bsdf type=\"null\" id=\"b\"/>";
-  const std::string unused = "<bsdf type=\"diffuse\" id=\"c\"><texture name=\"reflectance\" type=\"bitmap\"><string name=\"filename\" value=\"wood.png\"/></texture></bsdf>";
-  const std::string shapes = "<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"b\"/></shape>";
+  const std::string a = "<bsdf type=\"diffuse\" id=\"a\"><rgb name=\"reflectance\" value=\".1\"/></bsdf>",
+                    b = "<bsdf type=\"null\" id=\"b\"/>";
+  const std::string unused =
+      "<bsdf type=\"diffuse\" id=\"c\"><texture name=\"reflectance\" type=\"bitmap\"><string "
+      "name=\"filename\" value=\"wood.png\"/></texture></bsdf>";
+  const std::string shapes =
+      "<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"b\"/></shape>";
 
-  const Scene one = must_read(with_sensor(a + b + shapes)), other = must_read(with_sensor(unused + b + shapes + a));
+  const Scene one = must_read(with_sensor(a + b + shapes)),
+              other = must_read(with_sensor(unused + b + shapes + a));
 
   EXPECT_EQ(one, other);
   EXPECT_TRUE(other.assets.empty());
@@ -166,9 +183,12 @@ TEST(Reading, WhatNothingUsesIsLeftOutAndOrderOfDefinitionIsFree) {
 
 TEST(Reading, DefinesWinOverDefaultsAndDefaultsOverLaterOnes) {
   const std::string text =
-      "<scene version=\"3.0.0\"><default name=\"n\" value=\"3\"/><default name=\"n\" value=\"4\"/><default name=\"nn\" value=\"77\"/>"
-      "<sensor type=\"perspective\"><sampler type=\"independent\"><integer name=\"sample_count\" value=\"$n\"/></sampler>"
-      "<film type=\"hdrfilm\"><integer name=\"width\" value=\"$nn\"/><integer name=\"height\" value=\"1$n\"/></film></sensor></scene>";
+      "<scene version=\"3.0.0\"><default name=\"n\" value=\"3\"/><default name=\"n\" value=\"4\"/><default "
+      "name=\"nn\" value=\"77\"/>"
+      "<sensor type=\"perspective\"><sampler type=\"independent\"><integer name=\"sample_count\" "
+      "value=\"$n\"/></sampler>"
+      "<film type=\"hdrfilm\"><integer name=\"width\" value=\"$nn\"/><integer name=\"height\" "
+      "value=\"1$n\"/></film></sensor></scene>";
   EXPECT_EQ(must_read(text).sample_count, 3u);
   EXPECT_EQ(must_read(text).film.size, (FrameSize{77, 13}));
   EXPECT_EQ(must_read(text, {.defines = {{"n", "9"}}}).sample_count, 9u);
@@ -176,11 +196,14 @@ TEST(Reading, DefinesWinOverDefaultsAndDefaultsOverLaterOnes) {
 
 TEST(Reading, IncludesBringObjectsAndDefaults) {
   MemoryAssets assets;
-  assets.files["parts/base.xml"] = "<scene version=\"3.0.0\"><include filename=\"more.xml\"/><default name=\"spp\" value=\"7\"/></scene>";
+  assets.files["parts/base.xml"] =
+      "<scene version=\"3.0.0\"><include filename=\"more.xml\"/><default name=\"spp\" value=\"7\"/></scene>";
   assets.files["parts/more.xml"] = "<bsdf version=\"3.0.0\" type=\"null\" id=\"b\"/>";
   const auto r = read_scene("main.xml",
-                            "<scene version=\"3.0.0\"><include filename=\"parts/base.xml\"/><shape type=\"cube\"><ref id=\"b\"/></shape>"
-                            "<sensor type=\"perspective\"><sampler type=\"any\"><integer name=\"sample_count\" value=\"$spp\"/></sampler></sensor></scene>",
+                            "<scene version=\"3.0.0\"><include filename=\"parts/base.xml\"/><shape "
+                            "type=\"cube\"><ref id=\"b\"/></shape>"
+                            "<sensor type=\"perspective\"><sampler type=\"any\"><integer "
+                            "name=\"sample_count\" value=\"$spp\"/></sampler></sensor></scene>",
                             assets);
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_EQ(r.scene->sample_count, 7u);
@@ -190,8 +213,12 @@ TEST(Reading, IncludesBringObjectsAndDefaults) {
 TEST(Reading, PathsAreSearchedBeforeTheFolderOfTheScene) {
   MemoryAssets assets;
   assets.files["more/mesh.obj"] = "another";
-  const auto r = read_scene("main.xml", with_sensor("<path value=\"more\"/><shape type=\"obj\"><string name=\"filename\" value=\"mesh.obj\"/></shape>"
-                                                    "<shape type=\"ply\"><string name=\"filename\" value=\"./mesh.ply\"/></shape>"), assets);
+  const auto r = read_scene(
+      "main.xml",
+      with_sensor(
+          "<path value=\"more\"/><shape type=\"obj\"><string name=\"filename\" value=\"mesh.obj\"/></shape>"
+          "<shape type=\"ply\"><string name=\"filename\" value=\"./mesh.ply\"/></shape>"),
+      assets);
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_EQ(r.scene->assets[0].name, "more/mesh.obj");
   EXPECT_EQ(r.scene->assets[0].digest, sha256("another"));
@@ -199,7 +226,8 @@ TEST(Reading, PathsAreSearchedBeforeTheFolderOfTheScene) {
 }
 
 TEST(Reading, OldCamelCaseNamesAreUnderstood) {
-  const Scene s = must_read(R"(<scene version="0.6.0"><integrator type="path"><integer name="maxDepth" value="9"/></integrator>
+  const Scene s = must_read(
+      R"(<scene version="0.6.0"><integrator type="path"><integer name="maxDepth" value="9"/></integrator>
     <sensor type="perspective"><transform name="toWorld"><lookAt origin="0,0,1" target="0,0,0" up="0,1,0"/></transform>
     <sampler type="sobol"><integer name="sampleCount" value="5"/></sampler></sensor></scene>)");
   EXPECT_EQ(s.integrator.max_depth, 9);
@@ -216,18 +244,26 @@ TEST(Reading, ColoursComeInManyForms) {
   EXPECT_EQ(value("<rgb name=\"reflectance\" value=\" .1,.2\t.3 \"/>"), (Rgb{.1, .2, .3}));
   EXPECT_EQ(value("<float name=\"reflectance\" value=\"1e-1\"/>"), (Rgb{.1, .1, .1}));
   EXPECT_EQ(value("<spectrum name=\"reflectance\" value=\"400:.5, 700:.5\"/>"), (Rgb{.5, .5, .5}));
-  EXPECT_EQ(value("<spectrum name=\"reflectance\" type=\"uniform\"><float name=\"value\" value=\".3\"/></spectrum>"), (Rgb{.3, .3, .3}));
+  EXPECT_EQ(
+      value(
+          "<spectrum name=\"reflectance\" type=\"uniform\"><float name=\"value\" value=\".3\"/></spectrum>"),
+      (Rgb{.3, .3, .3}));
   EXPECT_EQ(value("<rgb name=\"reflectance\" value=\"#ff0000\"/>"), (Rgb{1, 0, 0}));
   // sRGB 0x80: ((128 / 255 + 0.055) / 1.055)^2.4
-  EXPECT_DOUBLE_EQ(value("<rgb name=\"reflectance\" value=\"#800000\"/>")[0], std::pow((128 / 255. + .055) / 1.055, 2.4));
+  EXPECT_DOUBLE_EQ(value("<rgb name=\"reflectance\" value=\"#800000\"/>")[0],
+                   std::pow((128 / 255. + .055) / 1.055, 2.4));
 }
 
 TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
-  const auto name = [](const std::string& type) { return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator; };
+  const auto name = [](const std::string& type) {
+    return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator;
+  };
   for (const char* type : {"volpath", "volpathmis", "volpath_simple"}) EXPECT_EQ(name(type).name, "volpath");
   EXPECT_EQ(name("path").name, "path");
   EXPECT_EQ(name("direct").max_depth, 2);
-  const auto wrapped = read(with_sensor("<integrator type=\"moment\"><integrator type=\"path\"><integer name=\"max_depth\" value=\"3\"/></integrator></integrator>"));
+  const auto wrapped =
+      read(with_sensor("<integrator type=\"moment\"><integrator type=\"path\"><integer name=\"max_depth\" "
+                       "value=\"3\"/></integrator></integrator>"));
   ASSERT_TRUE(wrapped.scene);
   EXPECT_EQ(wrapped.scene->integrator.max_depth, 3);
   EXPECT_EQ(wrapped.diagnostics.size(), 1u) << "a warning about the moments";

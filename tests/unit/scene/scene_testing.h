@@ -15,7 +15,11 @@ namespace ls {
 
 class MemoryAssets final : public AssetSource {
  public:
-  std::map<std::string, std::string, std::less<>> files{{"cloud.vol", "VOL..."}, {"steam.vdb", "VDB..."}, {"wood.png", "PNG..."}, {"mesh.obj", "o"}, {"mesh.ply", "p"}};
+  std::map<std::string, std::string, std::less<>> files{{"cloud.vol", "VOL..."},
+                                                        {"steam.vdb", "VDB..."},
+                                                        {"wood.png", "PNG..."},
+                                                        {"mesh.obj", "o"},
+                                                        {"mesh.ply", "p"}};
   int reads = 0;
 
   Result<Asset> find(std::string_view name) override {
@@ -31,7 +35,8 @@ class MemoryAssets final : public AssetSource {
   }
 };
 
-inline const std::string kSensor = R"(<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>)";
+inline const std::string kSensor =
+    R"(<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>)";
 
 // A scene of these objects and a camera; the objects begin in line 2, column 1.
 inline std::string with_sensor(std::string_view objects) {

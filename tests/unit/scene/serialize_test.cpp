@@ -48,7 +48,9 @@ TEST(SceneJson, IsEqualForEqualScenes) {
 
 TEST(SceneJson, HasSortedKeysAndNoBlanks) {
   const std::string json = serialize(must_read(with_sensor("")));
-  EXPECT_THAT(json, HasSubstr("\"film\":{\"filter\":{\"stddev\":0.5,\"type\":\"gaussian\"},\"height\":8,\"width\":8}"));
+  EXPECT_THAT(
+      json,
+      HasSubstr("\"film\":{\"filter\":{\"stddev\":0.5,\"type\":\"gaussian\"},\"height\":8,\"width\":8}"));
   EXPECT_EQ(json.find(' '), std::string::npos);
 }
 
@@ -72,16 +74,22 @@ TEST(SceneJson, WrongInputIsRefusedByName) {
     const auto r = deserialize_scene(json);
     return r ? "accepted" : r.error().message;
   };
+  const std::string shape_bsdf = fmt::format("\"bsdf\":{}", must_read(kExample).shapes.at(0).bsdf.value);
   EXPECT_THAT(error("{"), HasSubstr("malformed"));
   EXPECT_THAT(error("[]"), HasSubstr("not an object"));
   EXPECT_THAT(error("{}"), HasSubstr("scene.assets is missing"));
   EXPECT_THAT(error(std::string(100000, '[')), HasSubstr("nested too deep"));
-  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":0")), HasSubstr("scene.sample_count is out of range"));
-  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":-1")), HasSubstr("scene.sample_count"));
-  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":16,\"extra\":1")), HasSubstr("scene.extra is unknown"));
-  EXPECT_THAT(error(replaced(good, "\"width\":32", "\"width\":1e999")), ::testing::AnyOf(HasSubstr("width"), HasSubstr("malformed")));
-  EXPECT_THAT(error(replaced(good, "\"type\":\"tent\"", "\"type\":\"tant\"")), HasSubstr("scene.film.filter.type is unknown"));
-  EXPECT_THAT(error(replaced(good, "\"bsdf\":0", "\"bsdf\":999")), HasSubstr("refers to object 999"));
+  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":0")),
+              HasSubstr("scene.sample_count is out of range"));
+  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":-1")),
+              HasSubstr("scene.sample_count"));
+  EXPECT_THAT(error(replaced(good, "\"sample_count\":16", "\"sample_count\":16,\"extra\":1")),
+              HasSubstr("scene.extra is unknown"));
+  EXPECT_THAT(error(replaced(good, "\"width\":32", "\"width\":1e999")),
+              ::testing::AnyOf(HasSubstr("width"), HasSubstr("malformed")));
+  EXPECT_THAT(error(replaced(good, "\"type\":\"tent\"", "\"type\":\"tant\"")),
+              HasSubstr("scene.film.filter.type is unknown"));
+  EXPECT_THAT(error(replaced(good, shape_bsdf, "\"bsdf\":999")), HasSubstr("refers to object 999"));
   EXPECT_THAT(error(replaced(good, "\"g\":0.5", "\"g\":1")), HasSubstr(".g is out of range"));
   EXPECT_THAT(error(replaced(good, "\"sha256\":\"", "\"sha256\":\"x")), HasSubstr("not a digest"));
 }
