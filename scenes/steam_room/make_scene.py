@@ -48,18 +48,18 @@ def room():
     # the floor is one rectangle, for its tiles' uv
     out += ('  <shape type="rectangle"><transform name="to_world"><scale x="2.1" y="3.1"/><rotate x="1" angle="-90"/></transform>'
             + ref("floor") + '</shape>\n')
-    # the window wall at x = 2: below, above, beside the opening 0.95..2.65 x -2..0.6
-    out += box((2, 0, -3 - T), (2 + T, .95, 3 + T), p) + box((2, 2.65, -3 - T), (2 + T, 3, 3 + T), p)
-    out += box((2, .95, -3 - T), (2 + T, 2.65, -2), p) + box((2, .95, .6), (2 + T, 2.65, 3 + T), p)
+    # the window wall at x = 2: below, above, beside the opening 0.7..2.75 x -2.3..1
+    out += box((2, 0, -3 - T), (2 + T, .7, 3 + T), p) + box((2, 2.75, -3 - T), (2 + T, 3, 3 + T), p)
+    out += box((2, .7, -3 - T), (2 + T, 2.75, -2.3), p) + box((2, .7, 1), (2 + T, 2.75, 3 + T), p)
     for k in range(5):
-        y = .95 + .36 * k
-        out += box((2.0, y, -2), (2.1, y + .13, .6), ref("wood"))
-    for z in (-1.2, -.28):
-        out += box((2.0, .95, z), (2.1, 2.65, z + .1), ref("wood"))
+        y = .7 + .49 * k
+        out += box((2.0, y, -2.3), (2.1, y + .1, 1), ref("wood"))
+    for z in (-1.25, -.1):
+        out += box((2.0, .7, z), (2.1, 2.75, z + .1), ref("wood"))
     # The sky, as far as the window shows it: a panel that light passes, so that the sun comes through and the sky is sampled.
-    out += ('  <shape type="rectangle"><transform name="to_world"><scale x="1.3" y="0.85"/><rotate y="1" angle="-90"/>'
-            '<translate x="2.15" y="1.8" z="-0.7"/></transform><bsdf type="null"/>'
-            '<emitter type="area"><rgb name="radiance" value="1.5, 2.0, 2.9"/></emitter></shape>\n')
+    out += ('  <shape type="rectangle"><transform name="to_world"><scale x="1.65" y="1.025"/><rotate y="1" angle="-90"/>'
+            '<translate x="2.15" y="1.725" z="-0.65"/></transform><bsdf type="null"/>'
+            '<emitter type="area"><rgb name="radiance" value="1.2, 1.6, 2.3"/></emitter></shape>\n')
     return out
 
 
@@ -83,11 +83,11 @@ def scene():
     out = '<scene version="3.0.0">\n  <default name="spp" value="64"/>\n  <default name="width" value="480"/>\n  <default name="height" value="320"/>\n'
     out += '  <integrator type="volpath"><integer name="max_depth" value="16"/><integer name="rr_depth" value="5"/></integrator>\n'
     out += ('  <medium type="heterogeneous" id="steam"><volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vol"/>'
-            '<boolean name="use_grid_bbox" value="true"/></volume><float name="scale" value="2.6"/><float name="albedo" value="0.98"/>'
+            '<boolean name="use_grid_bbox" value="true"/></volume><float name="scale" value="2.4"/><float name="albedo" value="0.98"/>'
             '<phase type="hg"><float name="g" value="0.45"/></phase></medium>\n')
     out += materials() + room() + furniture()
     out += box((-1.94, .01, -2.99), (1.99, 2.99, 2.99), '<bsdf type="null"/><ref name="interior" id="steam"/>')
-    out += '  <emitter type="directional"><vector name="direction" x="-0.8" y="-0.55" z="-0.16"/><rgb name="irradiance" value="90, 71, 47"/></emitter>\n'
+    out += '  <emitter type="directional"><vector name="direction" x="-0.8" y="-0.52" z="-0.2"/><rgb name="irradiance" value="58, 46, 30"/></emitter>\n'
     out += ('  <sensor type="perspective"><float name="fov" value="64"/><string name="fov_axis" value="x"/><transform name="to_world">'
             '<lookat origin="-1.2, 1.45, 2.8" target="0.45, 1.2, -0.9" up="0, 1, 0"/></transform><ref name="medium" id="steam"/>'
             '<sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>'
