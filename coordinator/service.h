@@ -1,5 +1,5 @@
-// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/ put it on the
-// network; `lightshaft render` uses it in process.
+// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/
+// put it on the network; `lightshaft render` uses it in process.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <string>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -39,15 +39,15 @@ struct JobView {
   JobId id;
   std::string name;  // scene file name, for people
   JobState state = JobState::queued;
-  std::string stopped;  // "spp", "error", "time", "user" once done
-  double progress = 0;  // 0..1
-  std::uint64_t spp = 0;  // asked
+  std::string stopped;                 // "spp", "error", "time", "user" once done
+  double progress = 0;                 // 0..1
+  std::uint64_t spp = 0;               // asked
   std::optional<double> target_error;  // relMSE, asked
-  double spp_done = 0;    // mean over pixels
+  double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
   std::optional<double> eta_seconds;
-  std::string error;                        // why it failed
-  std::vector<std::string> warnings;        // of the scene
+  std::string error;                  // why it failed
+  std::vector<std::string> warnings;  // of the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
@@ -86,13 +86,14 @@ struct StreamEvent {
   std::uint64_t id = 0;
   std::string type;  // "job", "tile", "worker"
   std::string data;
-  std::string job;   // id of the job that a `job` or `tile` event is about; empty: of no one job, told to every reader
+  std::string
+      job;  // id of the job that a `job` or `tile` event is about; empty: of no one job, told to every reader
 };
 
 struct SubmitRequest {
-  std::string scene_name;                   // of the main file, for diagnostics
-  std::string scene_text;                   // Mitsuba XML
-  std::map<std::string, Digest> assets;     // the files it may name; their blobs must be in the store
+  std::string scene_name;                // of the main file, for diagnostics
+  std::string scene_text;                // Mitsuba XML
+  std::map<std::string, Digest> assets;  // the files it may name; their blobs must be in the store
   JobSpec spec;
 };
 struct Rejected {
@@ -122,7 +123,8 @@ class BlobStore {
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
-  virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset, std::uint64_t length) const = 0;
+  virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                              std::uint64_t length) const = 0;
   virtual Result<void> put(const Digest& digest, std::span<const std::byte> bytes) = 0;
   // Streaming upload: append in order, finish() verifies the digest; abandoned ones leave nothing behind.
   class Upload {
@@ -137,11 +139,12 @@ class BlobStore {
 class Coordinator {
  public:
   struct Options {
-    std::filesystem::path data;  // empty: everything in memory, nothing survives (`lightshaft render`)
+    std::filesystem::path data;        // empty: everything in memory, nothing survives (`lightshaft render`)
     std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made under `data`
-    std::string join_token;      // empty: any worker may join
+    std::string join_token;            // empty: any worker may join
     std::shared_ptr<const Clock> clock;
-    std::optional<Duration> tick;  // how often Tick events are raised by an own thread; nothing: the caller calls tick()
+    std::optional<Duration>
+        tick;  // how often Tick events are raised by an own thread; nothing: the caller calls tick()
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
   virtual ~Coordinator() = default;
@@ -154,7 +157,7 @@ class Coordinator {
   virtual Result<void> pause(const JobId& id) = 0;
   virtual Result<void> resume(const JobId& id) = 0;
   virtual Result<void> set_priority(const JobId& id, int priority) = 0;
-  virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;  // to this new total
+  virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;          // to this new total
   virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;  // as it is now, or final
   virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const = 0;
   virtual Result<std::string> report_json(const JobId& id) const = 0;
@@ -165,12 +168,14 @@ class Coordinator {
 
   // ---- workers ----
   virtual std::vector<WorkerView> workers() const = 0;
-  virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink) = 0;
+  virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello,
+                                                         std::shared_ptr<WorkerSink> sink) = 0;
 
   // ---- events ----
-  // Calls back (any thread, in order) for every event after `after_id` that is still kept, then live. The subscription
-  // ends when the returned handle is destroyed. A reader that can't keep up must drop by itself.
-  virtual std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event) = 0;
+  // Calls back (any thread, in order) for every event after `after_id` that is still kept, then live. The
+  // subscription ends when the returned handle is destroyed. A reader that can't keep up must drop by itself.
+  virtual std::shared_ptr<void> subscribe(std::uint64_t after_id,
+                                          std::function<void(const StreamEvent&)> on_event) = 0;
   virtual std::uint64_t last_event_id() const = 0;
 
   virtual BlobStore& blobs() = 0;

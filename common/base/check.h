@@ -1,5 +1,5 @@
-// CHECK(cond, fmt, args...): a programming error ends the process with a message that names the values. Active in
-// release builds. Never for bad input: that gets an Error.
+// CHECK(cond, fmt, args...): a programming error ends the process with a message that names the values.
+// Active in release builds. Never for bad input: that gets an Error.
 #pragma once
 
 #include <fmt/format.h>
@@ -10,8 +10,8 @@ namespace ls {
 [[noreturn]] void check_failed(const char* condition, const char* file, int line, const std::string& message);
 }  // namespace ls
 
-#define CHECK(cond, ...)                                                                            \
-  do {                                                                                              \
-    if (!(cond)) [[unlikely]]                                                                       \
-      ::ls::check_failed(#cond, __FILE__, __LINE__, ::fmt::format("" __VA_ARGS__));                 \
+#define CHECK(cond, ...)                                                            \
+  do {                                                                              \
+    if (!(cond)) [[unlikely]]                                                       \
+      ::ls::check_failed(#cond, __FILE__, __LINE__, ::fmt::format("" __VA_ARGS__)); \
   } while (false)

@@ -47,7 +47,9 @@ Sha256::~Sha256() = default;
 Sha256::Sha256(Sha256&&) noexcept = default;
 Sha256& Sha256::operator=(Sha256&&) noexcept = default;
 
-void Sha256::update(std::span<const std::byte> data) { EVP_DigestUpdate(state_->ctx, data.data(), data.size()); }
+void Sha256::update(std::span<const std::byte> data) {
+  EVP_DigestUpdate(state_->ctx, data.data(), data.size());
+}
 void Sha256::update(std::string_view text) { EVP_DigestUpdate(state_->ctx, text.data(), text.size()); }
 
 Digest Sha256::finish() {

@@ -20,7 +20,7 @@ namespace ls {
 struct Digest {
   std::array<std::uint8_t, 32> bytes{};
 
-  std::string hex() const;  // 64 lower-case hexadecimal digits
+  std::string hex() const;                                   // 64 lower-case hexadecimal digits
   static std::optional<Digest> parse(std::string_view hex);  // exactly 64 digits, else nothing
   auto operator<=>(const Digest&) const = default;
 };

@@ -11,8 +11,8 @@ namespace ls {
 
 // The gRPC codes that we use; one table each maps them to gRPC and to HTTP.
 enum class Errc {
-  invalid_argument,     // the input is wrong; sending it again will not help
-  not_found,            // no such job, blob, worker, file
+  invalid_argument,  // the input is wrong; sending it again will not help
+  not_found,         // no such job, blob, worker, file
   already_exists,
   failed_precondition,  // right input, wrong state (cancelled job, other numeric class)
   resource_exhausted,   // a limit or a full disk

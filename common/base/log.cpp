@@ -27,8 +27,8 @@ void write(spdlog::level::level_enum level, std::string_view keys, std::string_v
 }  // namespace
 
 void log_level(LogLevel level) {
-  static constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
-                                                          spdlog::level::err, spdlog::level::off};
+  static constexpr spdlog::level::level_enum kLevels[] = {
+      spdlog::level::debug, spdlog::level::info, spdlog::level::warn, spdlog::level::err, spdlog::level::off};
   logger().set_level(kLevels[static_cast<int>(level)]);
 }
 void log_debug(std::string_view keys, std::string_view text) { write(spdlog::level::debug, keys, text); }

@@ -1,5 +1,6 @@
 // One line per event, with keys: log_info("job=j-12 tile=4 worker=w-3", "unit accepted").
-// info = a state changed, warn = something was retried, error = a person is needed. Never log and return the same error.
+// info = a state changed, warn = something was retried, error = a person is needed. Never log and return the
+// same error.
 #pragma once
 
 #include <string_view>

@@ -1,5 +1,6 @@
-// What a job asks for, in two parts: what a unit's pixels depend on (RenderSettings), and what only the job as a whole
-// depends on (JobSpec). Raising a job's samples must not rename its units, so spp stands in the second.
+// What a job asks for, in two parts: what a unit's pixels depend on (RenderSettings), and what only the job
+// as a whole depends on (JobSpec). Raising a job's samples must not rename its units, so spp stands in the
+// second.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,8 @@ struct RenderSettings {
   bool operator==(const RenderSettings&) const = default;
 };
 
-// The request, as in the HTTP contract's `spec` and the command line's options. Absent means: as the scene says.
+// The request, as in the HTTP contract's `spec` and the command line's options. Absent means: as the scene
+// says.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
   std::optional<double> target_error;  // relMSE

@@ -23,9 +23,9 @@ namespace ls::render {
 // sample.
 inline constexpr int kMaxSegments = 1 << 16;
 // Beyond this depth roulette may end even paths that lost nothing: a closed white room has no other end. Its
-// variance is finite only while fewer paths live on by nature than by q: after n scatterings in a white slab of
-// optical depth tau a share exp(-n pi^2 / (3 (tau + 1.42)^2)) is still inside, so that .9998 is good to tau = 127
-// (and .97 would only be to 9).
+// variance is finite only while fewer paths live on by nature than by q: after n scatterings in a white slab
+// of optical depth tau a share exp(-n pi^2 / (3 (tau + 1.42)^2)) is still inside, so that .9998 is good to
+// tau = 127 (and .97 would only be to 9).
 inline constexpr int kForcedRouletteDepth = 1024;
 inline constexpr float kForcedSurvival = .9998f;
 

@@ -127,6 +127,53 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
   }
 }
 
+TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
+  Rig before;
+  before.rel_error = error_at;
+  before.join("w", 3);
+  before.submit(target_plan(3));
+  before.render_all();
+  ASSERT_EQ(before.job().stopped, StopReason::error);
+  // The crash came before `done` was stored: it runs, as far as anyone knows.
+  JobRestored restored{target_plan(3), JobState::running, std::nullopt, before.job().numeric_class};
+  for (TileIndex t = 0; t < 3; ++t) {
+    restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+    restored.rel_error.resize(restored.folded[0], std::vector<double>(3));
+    for (RoundIndex k = 0; k < restored.folded[t]; ++k) restored.rel_error[k][t] = error_at({{"j"}, t, k});
+  }
+
+  Rig after;
+  after.rel_error = error_at;
+  after.send(restored);
+  after.join("w", 1);
+
+  EXPECT_EQ(after.job().state, JobState::done);
+  EXPECT_EQ(after.job().stopped, StopReason::error);
+  EXPECT_EQ(after.farm.tile({"j"}, 0)->spp, before.farm.tile({"j"}, 0)->spp);
+}
+
+TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
+  Rig rig;
+  rig.join("w", 1);
+  rig.cpu_seconds = 0.05;
+  JobPlan plan = plan_of("j", 200, std::nullopt);
+  plan.time = 0.5;
+  rig.submit(plan);
+  for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
+    rig.now += 50ms;
+    rig.render("w");
+    // All that is out fits into what is left, but for the unit that reaches the end.
+    const double left = 0.5 - seconds(rig.now.time_since_epoch());
+    if (rig.job().units_done > 200) break;
+    EXPECT_LE(static_cast<double>(rig.held[{"w"}].size()) * 0.05, std::max(left, 0.0) + 2 * 0.05 + 1e-9) << i;
+  }
+
+  rig.pass(0s);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().stopped, StopReason::time);
+}
+
 TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
   Rig rig;
   rig.join("w", 1);

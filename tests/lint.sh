@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Checks the form of the code: clang-format on every source file, clang-tidy on those that changed since BASE.
+#   tests/lint.sh            format only
+#   tests/lint.sh BASE       clang-tidy too, on files that differ from the commit BASE (needs the dev preset configured)
+#   tests/lint.sh --fix      formats in place
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+mapfile -t files < <(git ls-files '*.cpp' '*.h')
+case "${1:-}" in
+  --fix) exec clang-format-14 -i "${files[@]}" ;;
+  "") ;;
+  *)
+    cmake --preset dev >/dev/null
+    mapfile -t changed < <(git diff --name-only --diff-filter=AM "$1" -- '*.cpp')
+    [ "${#changed[@]}" -eq 0 ] || clang-tidy-14 -p build/dev --quiet "${changed[@]}"
+    ;;
+esac
+clang-format-14 --dry-run --Werror "${files[@]}" && echo "${#files[@]} files are formatted"
