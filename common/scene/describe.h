@@ -39,6 +39,9 @@ struct Field {
   bool derived = false;    // follows from something else in the file; not a parameter of its own
   bool named_ior = false;  // names of materials ("water") are welcome too
   bool required = false;
+  // For the documentation, where the C++ type doesn't tell: "point", "medium" (a nested one with the field's
+  // name), "<phase>" (a nested one without a name). Derived fields without it are not written in files.
+  std::string_view given_as = "";
 };
 
 struct TypeInfo {
@@ -60,20 +63,21 @@ inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
   };
 
 LS_TYPE(ConstantTexture, "texture", "constant", "uniform, srgb",
-        "one colour; also written as a plain <rgb>, <float> or <spectrum>")
-LS_TYPE(BitmapTexture, "texture", "bitmap", "", "an image: PNG, JPEG, EXR or HDR")
+        "one colour; also written as a plain `<rgb>`, `<float>` or `<spectrum>`")
+LS_TYPE(BitmapTexture, "texture", "bitmap", "",
+        "an image: PNG, JPEG, EXR or HDR; (u, v) = (0, 0) is its upper left corner")
 LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")
 LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
 LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
         "rough metal; `alpha` sets both alpha_u and alpha_v")
-LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water, ...")
+LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water or the like")
 LS_TYPE(RoughPlasticBsdf, "bsdf", "roughplastic", "", "diffuse base under a rough dielectric coat")
 LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light passes unchanged")
 LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
         "gives each side of a surface a bsdf; one nested bsdf serves both")
 LS_TYPE(ConstVolume, "volume", "constvolume", "",
-        "the same value everywhere; also written as a plain <rgb> or <float>")
+        "the same value everywhere; also written as a plain `<rgb>` or `<float>`")
 LS_TYPE(GridVolume, "volume", "gridvolume", "", "values on a grid, from a file")
 LS_TYPE(IsotropicPhase, "phase", "isotropic", "",
         "scatters equally into all directions; what a medium has if none is given")
@@ -83,7 +87,7 @@ LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by 
 LS_TYPE(RectangleShape, "shape", "rectangle", "", "[-1, 1]^2 in the plane z = 0, normal +z")
 LS_TYPE(CubeShape, "shape", "cube", "", "[-1, 1]^3, normals outwards")
 LS_TYPE(SphereShape, "shape", "sphere", "",
-        "centre and radius act before to_world; to_world may not stretch it")
+        "a ball's surface; `center` and `radius` act before `to_world`, which may not stretch it")
 LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
 LS_TYPE(MeshShape, "shape", "mesh", "obj, ply", "triangles from a file")
 LS_TYPE(AreaEmitter, "emitter", "area", "", "light from the front of the shape that it stands in")
@@ -93,12 +97,12 @@ LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
 LS_TYPE(PointEmitter, "emitter", "point", "",
         "light from a point; a `to_world` instead of `position` moves the origin")
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
-        "light from a point into a cone around the +z of to_world, falling off linearly in the angle")
+        "light from a point into a cone around the +z of `to_world`, falling off linearly in the angle")
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
-LS_TYPE(TentFilter, "rfilter", "tent", "", "triangle")
+LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
-        "looks along +z of to_world, +y up, +x to the left")
+        "looks along the +z of `to_world`, +y up, +x to the left")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 LS_TYPE(IntegratorSettings, "integrator", "volpath",
         "volpath, volpath_simple, volpathmis; path, direct, ptracer", "how light is followed")

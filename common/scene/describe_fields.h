@@ -93,8 +93,12 @@ template <class V, Of<NullBsdf> T>
 void describe(V&, T&) {}
 template <class V, Of<TwoSidedBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "front", .doc = "the first nested bsdf", .derived = true}, b.front);
-  v.field({.name = "back", .doc = "the second nested bsdf, or the first again", .derived = true}, b.back);
+  v.field({.name = "front", .doc = "of the front", .derived = true, .given_as = "<bsdf>"}, b.front);
+  v.field({.name = "back",
+           .doc = "of the back; the first again if there is no second",
+           .derived = true,
+           .given_as = "<bsdf>"},
+          b.back);
 }
 
 // ---- volumes and media
@@ -128,7 +132,11 @@ void describe(V& v, T& m) {
   v.field({.name = "sigma_t", .doc = "extinction", .unit = "1/length", .range = kNonNegative}, m.sigma_t);
   v.field({.name = "albedo", .doc = "share of extinction that is scattering", .range = kUnit}, m.albedo);
   v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
-  v.field({.name = "phase", .doc = "the nested phase function", .derived = true}, m.phase);
+  v.field({.name = "phase",
+           .doc = "how light is scattered; `isotropic` if there is none",
+           .derived = true,
+           .given_as = "<phase>"},
+          m.phase);
 }
 template <class V, Of<HeterogeneousMedium> T>
 void describe(V& v, T& m) {
@@ -139,7 +147,11 @@ void describe(V& v, T& m) {
            .fallback = {.75, .75, .75}},
           m.albedo);
   v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
-  v.field({.name = "phase", .doc = "the nested phase function", .derived = true}, m.phase);
+  v.field({.name = "phase",
+           .doc = "how light is scattered; `isotropic` if there is none",
+           .derived = true,
+           .given_as = "<phase>"},
+          m.phase);
 }
 
 // ---- shapes
@@ -152,7 +164,7 @@ template <class V, Of<DiskShape> T>
 void describe(V&, T&) {}
 template <class V, Of<SphereShape> T>
 void describe(V& v, T& s) {
-  v.field({.name = "center", .doc = "centre", .unit = "length"}, s.center);
+  v.field({.name = "center", .doc = "centre", .unit = "length", .given_as = "point"}, s.center);
   v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
 }
 template <class V, Of<MeshShape> T>
@@ -171,13 +183,24 @@ void describe(V& v, T& s) {
   v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
   v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
   v.field({.name = "bsdf",
-           .doc = "nested; `diffuse` if there is none, black if the shape emits light",
-           .derived = true},
+           .doc = "`diffuse` if there is none, black if the shape emits light",
+           .derived = true,
+           .given_as = "<bsdf>"},
           s.bsdf);
-  v.field({.name = "emitter", .doc = "nested `area`", .derived = true}, s.emitter);
-  v.field({.name = "interior", .doc = "nested medium of this name: behind the normal", .derived = true},
+  v.field({.name = "emitter",
+           .doc = "an `area`: the shape emits light",
+           .derived = true,
+           .given_as = "<emitter>"},
+          s.emitter);
+  v.field({.name = "interior",
+           .doc = "what is on the side that the normal points away from",
+           .derived = true,
+           .given_as = "medium"},
           s.interior);
-  v.field({.name = "exterior", .doc = "nested medium of this name: before the normal", .derived = true},
+  v.field({.name = "exterior",
+           .doc = "what is on the side that the normal points to",
+           .derived = true,
+           .given_as = "medium"},
           s.exterior);
   v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
           s.is_medium_transition);
@@ -195,13 +218,15 @@ void describe(V& v, T& e) {
 }
 template <class V, Of<DirectionalEmitter> T>
 void describe(V& v, T& e) {
-  v.field({.name = "direction", .doc = "the way the light travels, in the world"}, e.direction);
+  v.field({.name = "direction", .doc = "the way the light travels, in the world", .given_as = "vector"},
+          e.direction);
   v.field({.name = "irradiance", .doc = "on a plane that faces the light", .range = kNonNegative},
           e.irradiance);
 }
 template <class V, Of<PointEmitter> T>
 void describe(V& v, T& e) {
-  v.field({.name = "position", .doc = "where, in the world", .unit = "length"}, e.position);
+  v.field({.name = "position", .doc = "where, in the world", .unit = "length", .given_as = "point"},
+          e.position);
   v.field({.name = "intensity", .doc = "radiant intensity", .unit = "W/sr", .range = kNonNegative},
           e.intensity);
 }
@@ -275,7 +300,11 @@ template <class V, Of<Sensor> T>
 void describe(V& v, T& s) {
   describe_perspective(v, s);
   describe_lens(v, s);
-  v.field({.name = "medium", .doc = "nested medium that the camera is in", .derived = true}, s.medium);
+  v.field({.name = "medium",
+           .doc = "what the camera is in; the name may be left out",
+           .derived = true,
+           .given_as = "medium"},
+          s.medium);
 }
 template <class V, Of<FilmSettings> T>
 void describe(V& v, T& f) {
@@ -283,7 +312,11 @@ void describe(V& v, T& f) {
           f.size.width);
   v.field({.name = "height", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
           f.size.height);
-  v.field({.name = "filter", .doc = "nested rfilter; gaussian if there is none", .derived = true}, f.filter);
+  v.field({.name = "filter",
+           .doc = "reconstruction filter; `gaussian` if there is none",
+           .derived = true,
+           .given_as = "<rfilter>"},
+          f.filter);
 }
 template <class V, Of<IntegratorSettings> T>
 void describe(V& v, T& i) {

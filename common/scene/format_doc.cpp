@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cctype>
 #include <cmath>
 
 #include "common/scene/describe_fields.h"
@@ -29,7 +30,7 @@ Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; 
 Column column(const Field&, const std::string& x) {
   return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};
 }
-Column column(const Field&, const Vec3& x) { return {"rgb, vector", text_of(x)}; }
+Column column(const Field&, const Vec3& x) { return {"rgb", text_of(x)}; }
 Column column(const Field&, const Transform&) { return {"transform", "identity"}; }
 Column column(const Field&, const UvTransform&) { return {"transform", "identity"}; }
 Column column(const Field&, AssetIndex) { return {"string", ""}; }
@@ -46,7 +47,7 @@ requires std::is_enum_v<E> Column column(const Field&, E x) {
 }
 // Nested objects and what follows from the plugin's name.
 template <class T>
-requires(!std::is_enum_v<T>) Column column(const Field&, const T&) { return {"(nested)", ""}; }
+requires(!std::is_enum_v<T>) Column column(const Field&, const T&) { return {"", ""}; }
 
 std::string range_of(const Field& f) {
   const std::string low =
@@ -60,12 +61,15 @@ class Rows {
  public:
   template <class T>
   void field(const Field& f, const T& value) {
-    const auto [type, shown] = column(f, value);
-    const std::string names = f.named_ior ? fmt::format("{}, string", type) : std::string(type);
-    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", f.name, f.derived ? "(nested)" : names,
+    if (f.derived && f.given_as.empty()) return;
+    const bool nameless = f.given_as.starts_with('<');
+    const Column c = column(f, value);
+    std::string given(nameless ? "nested" : f.given_as.empty() ? c.type : f.given_as);
+    if (f.named_ior) given += ", string";
+    text_ += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", nameless ? f.given_as : f.name, given,
                          f.required  ? "needed"
                          : f.derived ? ""
-                                     : shown,
+                                     : c.value,
                          f.unit, range_of(f), f.doc);
   }
   std::string take() const {
@@ -80,11 +84,23 @@ class Rows {
   std::string text_;
 };
 
+std::string replaced(std::string text, std::string_view what, std::string_view by) {
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+    text.replace(at, what.size(), by);
+  return text;
+}
+std::string sentence(std::string_view text) {
+  std::string out = fmt::format("{}.", text);
+  out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
+  return out;
+}
+
 template <class T>
 void add_type(std::string& out) {
   const TypeInfo& info = kInfo<T>;
-  out += fmt::format("### {} `{}`\n\n{}.\n\n", info.kind, info.plugins.empty() ? info.name : info.plugins,
-                     info.doc);
+  const std::string plugins(info.plugins.empty() ? info.name : info.plugins);
+  out += fmt::format("### {} `{}`\n\n{}\n\n", info.kind,
+                     replaced(replaced(plugins, "; ", ", "), ", ", "`, `"), sentence(info.doc));
   Rows rows;
   const T value{};
   describe(rows, value);
@@ -117,17 +133,46 @@ bath.xml:14:16: error: medium "homogeneous" has no parameter 'sigmat'; did you m
      |                  ^~~~~~
 ```
 
+A whole scene, a ball of fog in a white surrounding:
+
+```xml
+<scene version="3.0.0">
+  <default name="density" value="2"/>
+  <integrator type="volpath"/>
+  <medium type="homogeneous" id="fog">
+    <float name="sigma_t" value="$density"/>
+    <rgb name="albedo" value="0.9 0.95 0.99"/>
+    <phase type="hg"><float name="g" value="0.6"/></phase>
+  </medium>
+  <shape type="sphere">
+    <bsdf type="null"/>
+    <ref name="interior" id="fog"/>
+  </shape>
+  <emitter type="constant"/>
+  <sensor type="perspective">
+    <float name="fov" value="35"/>
+    <transform name="to_world"><lookat origin="0 1 -4" target="0 0 0" up="0 1 0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="64"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="320"/><integer name="height" value="240"/></film>
+  </sensor>
+</scene>
+```
+
 ## Notation
 
 - Values: `<float>`, `<integer>`, `<boolean>`, `<string>`, `<rgb>`, `<spectrum>`, `<vector>`, `<point>`, each with `name` and
-  `value`; vectors and points also by `x`, `y`, `z`. Numbers are parted by commas or blanks. A colour is one number (grey), three,
-  or `#rrggbb` (8-bit sRGB). A `<spectrum>` must be the same at all wavelengths.
+  `value`; vectors and points also by `x`, `y`, `z`. Numbers are separated by commas or blanks. A colour is one number (grey), three,
+  or `#rrggbb` (8-bit sRGB). Where the tables say rgb, `<float>` and `<spectrum>` will do, too; a spectrum must be the same at all
+  wavelengths.
 - `<transform name="to_world">` holds `<translate>`, `<rotate>`, `<scale>`, `<lookat>`, `<matrix>` (9 or 16 numbers, row by row),
-  each applied after those before it.
+  each applied after those before it. `<rotate>` turns by `angle` degrees about the direction `x`, `y`, `z`; if that is not of
+  length 1 there is a warning, as Mitsuba 3 then shears.
+- `nested` in a table: an element of this kind stands inside, with no name needed. Where a kind such as texture or medium is
+  listed for a parameter, the element (or a `<ref>`) carries the parameter's name: `<ref name="interior" id="fog"/>`.
 - Objects have a `type`, and may have an `id`; `<ref id="..."/>` stands for the object, wherever it is defined. `<alias id="old"
   as="new"/>` gives it another id.
 - `$name` in any attribute is replaced by the value of `-D name=value` or, if that is not given, of `<default name="name"
-  value="..."/>` before it.
+  value="..."/>` before it. A `-D` that nothing in the scene asks for is a warning over HTTP and an error on the command line.
 - `<include filename="..."/>` puts in the objects of another file, `<path value="folder"/>` adds a folder in which files are
   looked for. Names are relative to the main scene file, those in an included file first to the folder of that file.
 - Files of version 0.x are read with their camelCase names as far as their plugins are those of Mitsuba 3.
@@ -147,6 +192,17 @@ std::string meaningless_section() {
     out += fmt::format("| {}{} | `{}` | {} |\n", row.tag,
                        row.plugin.empty() ? "" : fmt::format(" `{}`", row.plugin),
                        fmt::join(row.parameters, "`, `"), row.because);
+  return out + "\n";
+}
+
+std::string unsupported_section() {
+  std::string out =
+      "## Not supported\n\nThese plugins of Mitsuba 3 are refused by name:\n\n| object | plugins "
+      "|\n|---|---|\n";
+  for (const char* tag : {"integrator", "sensor", "film", "rfilter", "shape", "bsdf", "texture", "emitter",
+                          "medium", "phase", "volume"})
+    if (const auto& plugins = unsupported_plugins(tag); !plugins.empty())
+      out += fmt::format("| {} | `{}` |\n", tag, fmt::join(plugins, "`, `"));
   return out + "\n";
 }
 
@@ -186,7 +242,7 @@ std::string scene_format_markdown() {
       "`volpathmis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and `direct` means `path` "
       "with max_depth 2; `moment` and `aov` mean the\n"
       "integrator within them. A sampler of any name gives `sample_count` (default 4) samples a pixel.\n\n";
-  out += meaningless_section() + names_section();
+  out += meaningless_section() + unsupported_section() + names_section();
   return out += kCanonical;
 }
 

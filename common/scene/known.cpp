@@ -100,13 +100,15 @@ const std::vector<MeaninglessRow>& meaningless_table() {
        {"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"},
        sampling},
       {"integrator", "ptracer", {"samples_per_pass"}, sampling},
-      {"integrator", "aov", {"aovs", "img"}, "extra channels are asked for by --aov"},
-      {"sensor", "", {"shutter_open", "shutter_close", "srf"}, once},
+      {"integrator", "aov", {"aovs", "img"}, "extra channels are not written"},
+      {"sensor", "", {"shutter_open", "shutter_close"}, once},
+      {"sensor", "", {"srf"}, "colours are linear RGB"},
       {"shape", "", {"silhouette_sampling_weight", "sampling_weight"}, sampling},
       {"shape", "obj", {"collapse"}, "files are read as they are"},
       {"bsdf", "roughconductor", {"sample_visible"}, sampling},
       {"bsdf", "roughplastic", {"sample_visible", "specular_sampling_weight"}, sampling},
-      {"emitter", "", {"sampling_weight", "medium"}, sampling},
+      {"emitter", "", {"sampling_weight"}, sampling},
+      {"emitter", "", {"medium"}, "which medium light crosses follows from the shapes around it"},
       {"texture", "bitmap", {"format", "accel", "cache", "max_anisotropy"}, "it does not change the values"},
       {"volume", "gridvolume", {"accel", "max_value", "send_data"}, "it does not change the values"},
       {"medium",
@@ -155,10 +157,13 @@ const std::vector<std::string>& supported_plugins(std::string_view tag) {
   return it == plugins().end() ? kNone : it->second.supported;
 }
 
-bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {
+const std::vector<std::string>& unsupported_plugins(std::string_view tag) {
   const auto it = plugins().find(tag);
-  if (it == plugins().end()) return false;
-  const Names& names = it->second.unsupported;
+  return it == plugins().end() ? kNone : it->second.unsupported;
+}
+
+bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {
+  const Names& names = unsupported_plugins(tag);
   return std::find(names.begin(), names.end(), plugin) != names.end();
 }
 
