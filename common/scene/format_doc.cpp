@@ -197,7 +197,8 @@ std::string meaningless_section() {
 
 std::string unsupported_section() {
   std::string out =
-      "## Not supported\n\nThese plugins of Mitsuba 3 are refused by name:\n\n| object | plugins "
+      "## Not supported\n\nThese plugins of Mitsuba, older versions too, are refused by name:\n\n| object | "
+      "plugins "
       "|\n|---|---|\n";
   for (const char* tag : {"integrator", "sensor", "film", "rfilter", "shape", "bsdf", "texture", "emitter",
                           "medium", "phase", "volume"})
