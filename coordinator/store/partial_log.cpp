@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstring>
 #include <optional>
+#include <utility>
 
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
@@ -158,7 +159,10 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
     return fail(Errc::invalid_argument, fmt::format("a partial of {} bytes is larger than {}", exr.size(),
                                                     ls::limits::kPartialBytes));
   if (size_ > 0 && size_ + sizeof(RawHeader) + exr.size() > limits::kMaxSegmentBytes) {
-    if (auto done = sync(); !done) return tl::unexpected(done.error());
+    if (auto done = flush(); !done) {
+      lost_ = done.error();
+      return tl::unexpected(done.error());
+    }
     if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
   }
   const RawHeader raw = pack(record, exr);
@@ -178,10 +182,18 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
 }
 
 Result<void> PartialLog::sync() {
-  if (!unsynced_) return {};
-  if (auto done = sync_data(current_, segment_path(segment_)); !done) return done;
-  unsynced_ = false;
-  return {};
+  const auto done = flush();
+  if (const auto lost = std::exchange(lost_, std::nullopt)) return tl::unexpected(*lost);
+  return done;
+}
+
+// After a failed sync the system may have dropped what it could not write and say yes the next time: what
+// stands in this segment is not trusted again, and what comes next opens another one.
+Result<void> PartialLog::flush() {
+  if (!std::exchange(unsynced_, false)) return {};
+  auto done = sync_data(current_, segment_path(segment_));
+  if (!done) size_ = limits::kMaxSegmentBytes;
+  return done;
 }
 
 Result<std::vector<std::byte>> PartialLog::read(const Place& place) const {

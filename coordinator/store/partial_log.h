@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,6 +56,7 @@ class PartialLog {
 
   // After an error the file is as before.
   Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
+  // An error: nothing that was appended since the last sync is durable; it may be appended again.
   Result<void> sync();
   Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
 
@@ -63,12 +65,14 @@ class PartialLog {
   std::filesystem::path segment_path(std::uint32_t segment) const;
   Result<void> scan(std::uint32_t segment, bool last);
   Result<void> start_segment(std::uint32_t segment);
+  Result<void> flush();
 
   std::filesystem::path folder_;
   File current_;
   std::uint32_t segment_ = 0;
   std::uint64_t size_ = 0;  // of the current segment
   bool unsynced_ = false;
+  std::optional<Error> lost_;  // of a full segment that could not be synced: told by the next sync()
   std::vector<Entry> found_;
   std::uint64_t cut_bytes_ = 0;
 };

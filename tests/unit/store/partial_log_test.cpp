@@ -89,6 +89,22 @@ TEST(PartialLog, NoticesDamageWhenAPartialIsRead) {
   EXPECT_EQ(log->read(place).error().code, Errc::unavailable);
 }
 
+TEST(PartialLog, LeavesASegmentThatCannotBeSynced) {
+  TempFolder dir;
+  // A device takes all writes and refuses to sync.
+  std::filesystem::create_symlink("/dev/null", dir.path() / "partials-000.seg");
+  auto log = PartialLog::open(dir.path()).value();
+  ASSERT_TRUE(log->append(record(1), payload(1)));
+  EXPECT_FALSE(log->sync());
+
+  const auto place = log->append(record(1), payload(1));
+
+  ASSERT_TRUE(place);
+  EXPECT_EQ(place->segment, 1u);
+  ASSERT_TRUE(log->sync());
+  EXPECT_EQ(log->read(*place).value(), payload(1));
+}
+
 TEST(PartialLog, BeginsANewSegmentWhenOneIsFull) {
   TempFolder dir;
   const std::size_t big = std::size_t{900} << 10;
