@@ -90,13 +90,18 @@ std::optional<Response> Api::refuse_body(const Route& route, const Request& requ
   if (route.body == BodyKind::none) return std::nullopt;
   const std::string type = media_type(request.header("content-type"));
   if (route.body == BodyKind::buffered && !lists(route.accepts, type)) return unsupported_type(route, type);
-  std::uint64_t limit = route.body == BodyKind::blob ? limits_.blob_bytes : route.body_limit;
-  const bool is_job = route.body_limit == kMaxSceneXml;
-  if (is_job && type == "application/json") limit = kMaxJobJson;
+  const std::uint64_t limit = body_limit(route, request);
   if (request.content_length.value_or(0) > limit)
     return problem(413, fmt::format("the body has {} bytes; at most {} are accepted here",
                                     *request.content_length, limit));
   return std::nullopt;
+}
+
+std::uint64_t Api::body_limit(const Route& route, const Request& request) const {
+  if (route.body == BodyKind::blob) return limits_.blob_bytes;
+  const bool is_job = route.body_limit == kMaxSceneXml;
+  return is_job && media_type(request.header("content-type")) == "application/json" ? kMaxJobJson
+                                                                                    : route.body_limit;
 }
 
 Response Api::handle(const Match& match, const Request& request) {

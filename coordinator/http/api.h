@@ -34,6 +34,8 @@ class Api {
   // A match to go on with, or the answer already: an unknown address, no token, too long a body, a static
   // file.
   std::variant<Response, Match> admit(const Request& request) const;
+  // Bytes that this request's body may have, announced or not.
+  std::uint64_t body_limit(const Route& route, const Request& request) const;
   // Runs the route's handler; no exception leaves it.
   Response handle(const Match& match, const Request& request);
   // For a route with BodyKind::blob.

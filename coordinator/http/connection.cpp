@@ -140,7 +140,8 @@ net::awaitable<bool> Connection::serve_one() {
 net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match, Request& request) {
   const Route& route = *match.route;
   Body body;
-  if (route.body == BodyKind::buffered) body = co_await read_whole(parser, request, route.body_limit);
+  if (route.body == BodyKind::buffered)
+    body = co_await read_whole(parser, request, shared_.api.body_limit(route, request));
   if (route.body == BodyKind::blob) body = co_await read_blob(parser, match, request);
   disarm();
   if (body.read != Read::ok) {

@@ -5,16 +5,26 @@
 
 #include <algorithm>
 
+#include "coordinator/http/limits.h"
+
 namespace ls::http {
 
 Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known) {
   using nlohmann::json;
   json object;
+  bool too_deep = false;
+  const auto watch = [&](int depth, json::parse_event_t, const json&) {
+    too_deep |= depth > kMaxJsonDepth;
+    return !too_deep;
+  };
   try {
-    object = json::parse(body);
+    object = json::parse(body, watch);
   } catch (const json::exception& e) {
     return fail(Errc::invalid_argument, fmt::format("the body is not JSON: {}", e.what()));
   }
+  if (too_deep)
+    return fail(Errc::invalid_argument,
+                fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth));
   if (!object.is_object()) return fail(Errc::invalid_argument, "the body must be a JSON object");
   for (const auto& item : object.items())
     if (std::find(known.begin(), known.end(), item.key()) == known.end())

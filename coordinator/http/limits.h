@@ -14,6 +14,7 @@ inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
 inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
 
 // ---- what is inside ----
+inline constexpr int kMaxJsonDepth = 16;             // deeper values would be printed by recursion
 inline constexpr std::size_t kMaxDigests = 100'000;  // in one POST /blobs/missing
 inline constexpr std::size_t kMaxAssets = 100'000;   // of one job
 inline constexpr std::size_t kMaxAssetName = 1024;   // characters

@@ -75,6 +75,10 @@ TEST_F(Jobs, SayWhatIsWrongWithTheRequest) {
        "PUT /api/v1/blobs/" + absent},
       {"/api/v1/jobs", "application/json", "{\"scene\":\"" + absent + "\",\"assets\":[]}", 400, "'assets'"},
       {"/api/v1/jobs", "application/json", "{\"scene\":\"" + absent + "\",\"spec\":{\"sp\":4}}", 400, "sp"},
+      {"/api/v1/jobs", "application/json",
+       "{\"scene\":\"" + absent + "\",\"spec\":" + std::string(1'000'000, '[') + std::string(1'000'000, ']') +
+           "}",
+       400, "deeper"},
       {"/api/v1/jobs?sp=4", "application/xml", "<scene/>", 400, "'sp'"},
       {"/api/v1/jobs?spp=4&spp=5", "application/xml", "<scene/>", 400, "twice"},
       {"/api/v1/jobs?spp=-4", "application/xml", "<scene/>", 400, "'spp'"},
@@ -88,7 +92,7 @@ TEST_F(Jobs, SayWhatIsWrongWithTheRequest) {
   for (const auto& c : kCases) {
     const Response r = ask(Method::post, c.target, c.body, c.type);
 
-    EXPECT_EQ(r.status, c.status) << c.target << ' ' << c.body;
+    EXPECT_EQ(r.status, c.status) << c.target << ' ' << c.body.substr(0, 200);
     EXPECT_EQ(r.content_type, "application/problem+json");
     const json problem = json_of(r);
     EXPECT_EQ(problem["status"], c.status);
