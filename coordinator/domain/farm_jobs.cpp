@@ -92,7 +92,7 @@ void Farm::State::on(const JobRestored& event) {
     job.stopping.reset();
     set_state(job, JobState::running);
   }
-  decide_stop(job);
+  decide_stop_again(job);
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -168,9 +168,10 @@ void Farm::State::on(const JobExtended& event) {
   job->frozen = false;
   work_appeared = true;
   job->queue.set_end(unit_code(round_count(new_spp), 0));
-  if (job->state == JobState::done) set_state(*job, JobState::running);
+  const bool was_done = job->state == JobState::done;
+  if (was_done) set_state(*job, JobState::running);
   job->move_window(workers.threads());
-  decide_stop(*job);
+  was_done ? decide_stop_again(*job) : decide_stop(*job, job->units.rounds_complete());
   for (TileIndex t = 0; t < job->units.tiles(); ++t) issue_folds(*job, t);
   finish_if_complete(*job);
   refresh(*job);

@@ -70,7 +70,10 @@ struct Farm::State {
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void issue_folds(Job& job, TileIndex tile);
   void checkpoint(Job& job, RoundIndex round);
-  void decide_stop(Job& job);
+  void decide_stop(Job& job, RoundIndex complete);  // knowing the first `complete` rounds
+  // Of a job taken up again with nothing under way: its last round may be folded already, and that it is the
+  // last one was known one round before. Asking only now would add a round.
+  void decide_stop_again(Job& job);
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
   // ---- farm_leases.cpp ----

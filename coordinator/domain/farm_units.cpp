@@ -87,14 +87,13 @@ void Farm::State::on(const UnitFolded& event) {
 
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   effects.emplace_back(Checkpoint{job.plan.brief.job, round, cut_range(round, job.spp).s1});
-  decide_stop(job);
+  decide_stop(job, job.units.rounds_complete());
   job.move_window(workers.threads());
   if (!job.plan.target_error) return;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
 }
 
-void Farm::State::decide_stop(Job& job) {
-  const RoundIndex complete = job.units.rounds_complete();
+void Farm::State::decide_stop(Job& job, RoundIndex complete) {
   const UnitCode end = unit_code(complete + 1, 0);
   if (!job.plan.target_error || complete == 0 || end >= job.queue.end()) return;
   const double channels = 3.0 * static_cast<double>(job.plan.grid.frame.width) * job.plan.grid.frame.height;
@@ -104,6 +103,13 @@ void Farm::State::decide_stop(Job& job) {
   for (const LeaseSeq seq : leases_of(job)) {
     free_units(*leases.find(seq), "beyond the last round", true, [&](UnitCode code) { return code >= end; });
   }
+}
+
+void Farm::State::decide_stop_again(Job& job) {
+  const RoundIndex complete = job.units.rounds_complete();
+  const bool nothing_begun = job.units.folded_count() == std::uint64_t{complete} * job.units.tiles();
+  if (complete > 1 && nothing_begun) decide_stop(job, complete - 1);
+  decide_stop(job, complete);
 }
 
 void Farm::State::on(const UnitFailed& event) {
