@@ -1,6 +1,7 @@
 // Who gets what next. Previews first (the order of unit codes), higher priorities first, idle workers before
 // those that already have something to do, and small pieces at a job's tail.
 #include <algorithm>
+#include <limits>
 
 #include "coordinator/domain/farm_state.h"
 
@@ -12,15 +13,23 @@ struct LeaseSize {
   double seconds = 0;  // CPU; ends the lease once reached
 };
 
+// Seconds that the worker's threads have until the job's time is up, behind what they hold already.
+double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
+  const auto limit = job.time_limit();
+  if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
+  return std::max(0.0, seconds(*limit - now) - worker.seconds_out / worker.threads);
+}
+
 // Guided self-scheduling: a thread's share is half of an even split of what waits, so that all end at about
-// one time.
-LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads) {
+// one time. A time budget ends a lease with the first unit that reaches it.
+LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t share = std::max<std::uint64_t>(1, (job.queued() * threads + halves - 1) / halves);
   const std::uint64_t most =
       job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
-  return {std::min(share, most), kLeaseSeconds * worker.threads};
+  const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
+  return {std::min(share, most), lasts * worker.threads};
 }
 
 // A job with a time budget leases nothing beyond it, and nothing ahead that would only be begun beyond it.
@@ -74,7 +83,7 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
 }
 
 bool Farm::State::lease_from(Job& job, Worker& worker) {
-  const LeaseSize size = lease_size(job, worker, workers.threads());
+  const LeaseSize size = lease_size(job, worker, workers.threads(), now);
   std::vector<UnitCode> units;
   double cost = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
