@@ -18,6 +18,7 @@
 #include "worker/options.h"
 #ifdef LIGHTSHAFT_RENDERER
 #include "worker/inprocess.h"
+#include "worker/render/thread_limit.h"
 #endif
 
 namespace {
@@ -33,6 +34,9 @@ std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& optio
 
 int run_child(const worker::Options& options) {
   worker::child::confine(options.memory_limit);
+#ifdef LIGHTSHAFT_RENDERER
+  const auto limit = render::limit_threads(options.threads);
+#endif
   const auto backend = local_backend(options);
   return worker::child::serve(*backend, options.threads);
 }
