@@ -130,6 +130,9 @@ void Service::receive(const std::shared_ptr<Connection>& from, FromWorker messag
                         [](const WorkerHello&) {},  // said at connect(); the door refuses a second one
                         [&](const WorkerProgress& m) { on_message_locked(from, m); },
                         [&](const UnitFailure& m) {
+                          // First, so that the worker doesn't take it for the answer to a next attempt.
+                          from->sink->send(ResultAck{m.unit, std::nullopt});
+                          if (!find_locked(m.unit.job)) return;  // nor is a log kept of what does not exist
                           log_job(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
                                                           m.unit.round, from->worker.value, m.reason));
                           run_locked(UnitFailed{from->worker, m});
