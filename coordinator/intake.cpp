@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/protocol/limits.h"
 #include "common/scene/serialize.h"
 #include "coordinator/features.h"
 #include "coordinator/limits.h"
@@ -179,6 +180,10 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
     if (std::none_of(job.assets.begin(), job.assets.end(), known))
       job.assets.push_back({a.digest, a.bytes, a.name});
   }
+  if (job.assets.size() > ls::limits::kAssetsPerJob)
+    return refuse({Errc::resource_exhausted,
+                   fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
+                               job.assets.size(), ls::limits::kAssetsPerJob)});
   const SceneFeatures features = features_of(scene);
   job.features_used = features.used;
   job.features_left_out = features.left_out;

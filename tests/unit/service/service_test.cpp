@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/base/log.h"
+#include "common/protocol/limits.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -371,6 +372,55 @@ TEST(Service, ASceneMayOnlyNameWhatWasSentAlong) {
   const auto missing = coordinator->submit({"a.xml", text, {{"/etc/passwd", sha256("mesh")}}, {}});
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().diagnostics.at(0).text.find(sha256("mesh").hex()), std::string::npos);
+}
+
+TEST(Service, AcknowledgesFailuresToo) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator);
+  const auto mail = std::make_shared<Mailbox>();
+  WorkerHello hello;
+  hello.name = "clumsy";
+  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).value();
+  std::optional<AssignLease> lease;
+  while (!lease) {
+    const auto letter = mail->take();
+    ASSERT_TRUE(letter);
+    if (const auto* assign = std::get_if<AssignLease>(&letter->second)) lease = *assign;
+  }
+  const UnitKey unit{job, lease->lease.units[0].tile, lease->lease.units[0].round};
+  while (!mail->empty()) mail->take();
+  UnitFailure failure;
+  failure.unit = unit;
+  failure.lease = lease->lease.id;
+  failure.reason = "crashed";
+
+  session->receive(failure);
+
+  const auto answer = mail->take();
+  ASSERT_TRUE(answer);
+  const auto* ack = std::get_if<ResultAck>(&answer->second);
+  ASSERT_NE(ack, nullptr) << "before the unit is leased again";
+  EXPECT_EQ(ack->unit, unit);
+  EXPECT_FALSE(ack->refused);
+}
+
+TEST(Service, RefusesASceneOfMoreFilesThanAWorkerCanBeToldOf) {
+  auto coordinator = open_at({});
+  std::string shapes;
+  std::map<std::string, Digest> assets;
+  for (std::size_t i = 0; i <= ls::limits::kAssetsPerJob; ++i) {
+    const std::string name = std::to_string(i) + ".ply";
+    assets[name] = sha256(name);
+    ASSERT_TRUE(coordinator->blobs().put(assets[name], std::as_bytes(std::span(name))));
+    shapes += "<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>";
+  }
+  std::string text = kSceneText;
+  text.replace(text.find("<shape type=\"sphere\"/>"), 22, shapes);
+
+  const auto refused = coordinator->submit({"many.xml", text, assets, {}});
+
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().error.message.find("4096"), std::string::npos) << refused.error().error.message;
 }
 
 TEST(Service, RefusesSpecsBeyondItsLimits) {
