@@ -7,6 +7,8 @@
 #include <optional>
 #include <tuple>
 
+#include "common/job/limits.h"
+
 namespace ls {
 namespace {
 
@@ -83,6 +85,10 @@ class Merger {
   // The tile side is that of the largest tile; every partial's rectangle must then be one of the tiling's.
   Result<TileGrid> tiling() const {
     const TileGrid grid{frame_, tile_side_};
+    const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
+    if (tiles > kMaxTiles)
+      return refuse(fmt::format("a frame of {} x {} in tiles of {} has {} tiles; at most {} are allowed",
+                                frame_.width, frame_.height, grid.tile, tiles, kMaxTiles));
     for (const auto& [rect, entries] : tiles_) {
       const TileIndex t =
           static_cast<TileIndex>(rect.y0 / grid.tile) * static_cast<TileIndex>(grid.columns()) +

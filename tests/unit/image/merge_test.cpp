@@ -53,6 +53,12 @@ TEST(Merge, GivesTheFilmOfTheCoordinatorWhateverTheOrderOfFiles) {
   }
 }
 
+TEST(Merge, RefusesAFrameOfMoreTilesThanThereMayBe) {
+  // 65536 x 65536 tiles of one pixel: their number wraps around to 0 in 32 bits.
+  const TileGrid vast{{65536, 65536}, 1};
+  EXPECT_THAT(refusal({source_of(make_round(vast, 0, 0, 2), "", vast.frame)}), HasSubstr("4294967296 tiles"));
+}
+
 TEST(Merge, DropsEqualDuplicatesAndCountsThem) {
   auto sources = all_of(6);
   sources.push_back(sources[0]);
