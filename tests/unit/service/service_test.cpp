@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "common/base/log.h"
-#include "common/protocol/limits.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -323,127 +322,6 @@ TEST(Service, TwoCoordinatorsCannotShareAFolder) {
   const auto second = Coordinator::open(options);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("another coordinator"), std::string::npos);
-}
-
-TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
-  Coordinator::Options options;
-  options.join_token = "open sesame";
-  auto coordinator = Coordinator::open(options).value();
-  WorkerHello hello;
-  hello.name = "w";
-  auto mail = std::make_shared<Mailbox>();
-  EXPECT_EQ(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).error().code,
-            Errc::unauthenticated);
-  hello.join_token = "open sesame";
-  EXPECT_TRUE(coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)));
-  ASSERT_TRUE(std::holds_alternative<Welcome>(mail->take()->second));
-}
-
-TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
-  auto coordinator = open_at({});
-  auto mail = std::make_shared<Mailbox>();
-  WorkerHello hello;
-  hello.name = "w";
-  auto first = coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).value();
-  const auto welcome = std::get<Welcome>(mail->take()->second);
-  hello.previous_id = welcome.worker;
-
-  auto second = coordinator->connect(hello, std::make_shared<MailSink>(mail, 1)).value();
-
-  const auto again = std::get<Welcome>(mail->take()->second);
-  EXPECT_EQ(again.worker, welcome.worker);
-  EXPECT_GT(again.epoch, welcome.epoch);
-  first->disconnected();
-  EXPECT_EQ(coordinator->workers().at(0).state, "connected");
-  second->disconnected();
-  EXPECT_EQ(coordinator->workers().at(0).state, "lost");
-}
-
-TEST(Service, ASceneMayOnlyNameWhatWasSentAlong) {
-  auto coordinator = open_at({});
-  std::string text = kSceneText;
-  text.replace(text.find("<shape type=\"sphere\"/>"), 22,
-               "<shape type=\"ply\"><string name=\"filename\" value=\"/etc/passwd\"/></shape>");
-  const auto refused = coordinator->submit({"evil.xml", text, {}, {}});
-  ASSERT_FALSE(refused);
-  ASSERT_FALSE(refused.error().diagnostics.empty());
-  EXPECT_EQ(refused.error().diagnostics[0].place.line, 7);
-
-  const auto missing = coordinator->submit({"a.xml", text, {{"/etc/passwd", sha256("mesh")}}, {}});
-  ASSERT_FALSE(missing);
-  EXPECT_NE(missing.error().diagnostics.at(0).text.find(sha256("mesh").hex()), std::string::npos);
-}
-
-TEST(Service, AcknowledgesFailuresToo) {
-  auto coordinator = open_at({});
-  const JobId job = submit(*coordinator);
-  const auto mail = std::make_shared<Mailbox>();
-  WorkerHello hello;
-  hello.name = "clumsy";
-  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).value();
-  std::optional<AssignLease> lease;
-  while (!lease) {
-    const auto letter = mail->take();
-    ASSERT_TRUE(letter);
-    if (const auto* assign = std::get_if<AssignLease>(&letter->second)) lease = *assign;
-  }
-  const UnitKey unit{job, lease->lease.units[0].tile, lease->lease.units[0].round};
-  while (!mail->empty()) mail->take();
-  UnitFailure failure;
-  failure.unit = unit;
-  failure.lease = lease->lease.id;
-  failure.reason = "crashed";
-
-  session->receive(failure);
-
-  const auto answer = mail->take();
-  ASSERT_TRUE(answer);
-  const auto* ack = std::get_if<ResultAck>(&answer->second);
-  ASSERT_NE(ack, nullptr) << "before the unit is leased again";
-  EXPECT_EQ(ack->unit, unit);
-  EXPECT_FALSE(ack->refused);
-}
-
-TEST(Service, RefusesASceneOfMoreFilesThanAWorkerCanBeToldOf) {
-  auto coordinator = open_at({});
-  std::string shapes;
-  std::map<std::string, Digest> assets;
-  for (std::size_t i = 0; i <= ls::limits::kAssetsPerJob; ++i) {
-    const std::string name = std::to_string(i) + ".ply";
-    assets[name] = sha256(name);
-    ASSERT_TRUE(coordinator->blobs().put(assets[name], std::as_bytes(std::span(name))));
-    shapes += "<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>";
-  }
-  std::string text = kSceneText;
-  text.replace(text.find("<shape type=\"sphere\"/>"), 22, shapes);
-
-  const auto refused = coordinator->submit({"many.xml", text, assets, {}});
-
-  ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().error.message.find("4096"), std::string::npos) << refused.error().error.message;
-}
-
-TEST(Service, RefusesSpecsBeyondItsLimits) {
-  auto coordinator = open_at({});
-  const auto refusal = [&](JobSpec spec) {
-    const auto id = coordinator->submit({"t.xml", kSceneText, {}, std::move(spec)});
-    return id ? "" : id.error().error.message;
-  };
-  JobSpec spec;
-  spec.spp = 1'000'000'000;
-  EXPECT_NE(refusal(spec), "");
-  spec = {};
-  spec.size = FrameSize{0, 10};
-  EXPECT_NE(refusal(spec).find("0 x 10"), std::string::npos);
-  spec.size = FrameSize{1 << 20, 1 << 20};
-  EXPECT_NE(refusal(spec), "");
-  spec = {};
-  spec.integrator = "bdpt";
-  EXPECT_NE(refusal(spec).find("volpath"), std::string::npos);
-  spec = {};
-  spec.target_error = std::nan("");
-  EXPECT_NE(refusal(spec), "");
-  EXPECT_TRUE(coordinator->jobs().empty());
 }
 
 }  // namespace
