@@ -8,8 +8,8 @@
 #include "proto/convert_check.h"
 
 // Unwraps a Result inside a function that returns one: on an error, returns it.
-#define LS_TRY(name, expression)                              \
-  auto name##_or = (expression);                              \
+#define LS_TRY(name, expression)                                   \
+  auto name##_or = (expression);                                   \
   if (!name##_or) return tl::unexpected<Error>(name##_or.error()); \
   auto& name = *name##_or
 
@@ -22,7 +22,7 @@ Result<void> bounded(int count, std::size_t limit, const char* field) {
   return {};
 }
 
-// ---- parts ----------------------------------------------------------------------------------------------------------
+// ---- parts
 
 void put(const UnitKey& key, pb::UnitKey* out) {
   out->set_job(key.job.value);
@@ -42,8 +42,9 @@ void put(const Error& error, pb::Problem* out) {
 
 Result<Error> problem_from(const pb::Problem& in) {
   LS_TRY(text, text_from(in.message(), limits::kTextBytes, "problem.message"));
-  for (const Errc code : {Errc::invalid_argument, Errc::not_found, Errc::already_exists, Errc::failed_precondition,
-                          Errc::resource_exhausted, Errc::permission_denied, Errc::unauthenticated, Errc::unavailable})
+  for (const Errc code :
+       {Errc::invalid_argument, Errc::not_found, Errc::already_exists, Errc::failed_precondition,
+        Errc::resource_exhausted, Errc::permission_denied, Errc::unauthenticated, Errc::unavailable})
     if (in.code() == to_string(code)) return Error{code, text};
   return Error{Errc::internal, text};
 }
@@ -86,7 +87,7 @@ Result<JobBrief> brief_from(const pb::JobBrief& in) {
   return brief;
 }
 
-// ---- worker -> coordinator ------------------------------------------------------------------------------------------
+// ---- worker -> coordinator
 
 void put(const WorkerHello& hello, pb::FromWorker& out) {
   pb::Hello* h = out.mutable_hello();
@@ -111,7 +112,8 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   if (in.threads() < 1 || in.threads() > limits::kThreads)
     return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
   if (in.join_token().size() > limits::kTokenBytes) return wrong("hello.join_token", "is too long");
-  if (auto ok = bounded(in.tags_size(), limits::kTags, "hello.tags"); !ok) return tl::unexpected<Error>(ok.error());
+  if (auto ok = bounded(in.tags_size(), limits::kTags, "hello.tags"); !ok)
+    return tl::unexpected<Error>(ok.error());
   if (auto ok = bounded(in.blobs_held_size(), limits::kBlobsHeld, "hello.blobs_held"); !ok)
     return tl::unexpected<Error>(ok.error());
   for (const std::string& t : in.tags()) {
@@ -185,9 +187,14 @@ Result<FromWorker> result_from(const pb::UnitResult& in) {
   LS_TRY(digest, digest_from(in.digest(), "result.digest"));
   LS_TRY(cpu, seconds_from(in.cpu_seconds(), "result.cpu_seconds"));
   if (in.exr().empty() || in.exr().size() > limits::kPartialBytes)
-    return wrong("result.exr", fmt::format("has {} bytes; 1 to {} are allowed", in.exr().size(), limits::kPartialBytes));
+    return wrong("result.exr",
+                 fmt::format("has {} bytes; 1 to {} are allowed", in.exr().size(), limits::kPartialBytes));
   const auto* bytes = reinterpret_cast<const std::byte*>(in.exr().data());
-  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu,
+  return UnitResult{unit,
+                    LeaseId{lease},
+                    {bytes, bytes + in.exr().size()},
+                    digest,
+                    cpu,
                     {in.nonfinite(), in.negative(), in.majorant_violations()}};
 }
 
@@ -240,7 +247,7 @@ Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
 
 void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
 
-// ---- coordinator -> worker ------------------------------------------------------------------------------------------
+// ---- coordinator -> worker
 
 void put(const Welcome& welcome, pb::ToWorker& out) {
   out.mutable_welcome()->set_worker(welcome.worker.value);
@@ -306,7 +313,9 @@ Result<ToWorker> ack_from(const pb::ResultAck& in) {
 }
 
 void put(const CancelJob& cancel, pb::ToWorker& out) { out.mutable_cancel_job()->set_job(cancel.job.value); }
-void put(const CancelLease& cancel, pb::ToWorker& out) { out.mutable_cancel_lease()->set_lease(cancel.lease.value); }
+void put(const CancelLease& cancel, pb::ToWorker& out) {
+  out.mutable_cancel_lease()->set_lease(cancel.lease.value);
+}
 void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
 
 }  // namespace
@@ -325,13 +334,20 @@ pb::ToWorker to_wire(const ToWorker& message) {
 
 Result<FromWorker> from_wire(const pb::FromWorker& in) {
   switch (in.message_case()) {
-    case pb::FromWorker::kHello: return hello_from(in.hello());
-    case pb::FromWorker::kProgress: return progress_from(in.progress());
-    case pb::FromWorker::kResult: return result_from(in.result());
-    case pb::FromWorker::kFailure: return failure_from(in.failure());
-    case pb::FromWorker::kReturned: return returned_from(in.returned());
-    case pb::FromWorker::kDraining: return WorkerDraining{};
-    case pb::FromWorker::MESSAGE_NOT_SET: break;
+    case pb::FromWorker::kHello:
+      return hello_from(in.hello());
+    case pb::FromWorker::kProgress:
+      return progress_from(in.progress());
+    case pb::FromWorker::kResult:
+      return result_from(in.result());
+    case pb::FromWorker::kFailure:
+      return failure_from(in.failure());
+    case pb::FromWorker::kReturned:
+      return returned_from(in.returned());
+    case pb::FromWorker::kDraining:
+      return WorkerDraining{};
+    case pb::FromWorker::MESSAGE_NOT_SET:
+      break;
   }
   return wrong("message", "is empty or of a kind that this version does not know");
 }
@@ -346,8 +362,10 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       LS_TRY(problem, problem_from(in.refused().problem()));
       return Refused{problem, in.refused().retry()};
     }
-    case pb::ToWorker::kAssign: return assign_from(in.assign());
-    case pb::ToWorker::kAck: return ack_from(in.ack());
+    case pb::ToWorker::kAssign:
+      return assign_from(in.assign());
+    case pb::ToWorker::kAck:
+      return ack_from(in.ack());
     case pb::ToWorker::kCancelJob: {
       LS_TRY(job, id_from(in.cancel_job().job(), "cancel_job.job"));
       return CancelJob{JobId{job}};
@@ -356,8 +374,10 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       LS_TRY(lease, id_from(in.cancel_lease().lease(), "cancel_lease.lease"));
       return CancelLease{LeaseId{lease}};
     }
-    case pb::ToWorker::kDrain: return DrainNow{};
-    case pb::ToWorker::MESSAGE_NOT_SET: break;
+    case pb::ToWorker::kDrain:
+      return DrainNow{};
+    case pb::ToWorker::MESSAGE_NOT_SET:
+      break;
   }
   return wrong("message", "is empty or of a kind that this version does not know");
 }

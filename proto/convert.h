@@ -1,6 +1,7 @@
-// farm.proto to and from the plain values of common/protocol. Total in both directions: a value within the limits always
-// becomes a message that reads back equal (texts too long are cut, see below); a received message becomes a value or an
-// invalid_argument that names the field. Nothing behind this door needs to distrust a length, a rectangle or a list again.
+// farm.proto to and from the plain values of common/protocol. Total in both directions: a value within the
+// limits always becomes a message that reads back equal (texts too long are cut, see below); a received
+// message becomes a value or an invalid_argument that names the field. Nothing behind this door needs to
+// distrust a length, a rectangle or a list again.
 //
 // Names, tags and reasons longer than their limit are cut when sent; ids, tokens and lists are never cut.
 #pragma once

@@ -5,16 +5,19 @@
 #include <algorithm>
 #include <cmath>
 
-
 namespace ls::wire {
 namespace {
 
-// Bytes of the UTF-8 character at `i` (RFC 3629: shortest forms, no surrogates, up to U+10FFFF); 0 if there is none.
+// Bytes of the UTF-8 character at `i` (RFC 3629: shortest forms, no surrogates, up to U+10FFFF); 0 if there
+// is none.
 std::size_t character_length(const std::string& text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
   const unsigned first = byte(i);
   if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xC2 && first < 0xE0 ? 2 : first >= 0xE0 && first < 0xF0 ? 3 : first >= 0xF0 && first < 0xF5 ? 4 : 0;
+  const std::size_t length = first >= 0xC2 && first < 0xE0   ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
   for (std::size_t k = 1; k < length; ++k)
     if ((byte(i + k) & 0xC0) != 0x80) return 0;
   const unsigned second = byte(i + 1);
@@ -48,7 +51,8 @@ Result<std::string> text_from(const std::string& text, std::size_t limit, const 
 }
 
 Result<double> seconds_from(double value, const char* field) {
-  if (!std::isfinite(value) || value < 0) return wrong(field, fmt::format("is {}; it must be a time in seconds", value));
+  if (!std::isfinite(value) || value < 0)
+    return wrong(field, fmt::format("is {}; it must be a time in seconds", value));
   return value;
 }
 
@@ -56,7 +60,8 @@ Result<PixelRect> rect_from(const pb::Rect& rect, const char* field) {
   const PixelRect r{rect.x0(), rect.y0(), rect.x1(), rect.y1()};
   const bool inside = r.x0 >= 0 && r.y0 >= 0 && r.x1 <= limits::kFrameSide && r.y1 <= limits::kFrameSide;
   if (!inside || r.x0 >= r.x1 || r.y0 >= r.y1)
-    return wrong(field, fmt::format("[{}, {}) x [{}, {}) is empty or outside any frame", r.x0, r.x1, r.y0, r.y1));
+    return wrong(field,
+                 fmt::format("[{}, {}) x [{}, {}) is empty or outside any frame", r.x0, r.x1, r.y0, r.y1));
   return r;
 }
 

@@ -15,7 +15,8 @@ tl::unexpected<Error> wrong(const std::string& field, const std::string& what);
 
 // 1 to kIdBytes printable ASCII characters without spaces.
 Result<std::string> id_from(const std::string& text, const char* field);
-// At most `limit` bytes; control characters become spaces, so that no log line or terminal is at a worker's mercy.
+// At most `limit` bytes; control characters become spaces, so that no log line or terminal is at a worker's
+// mercy.
 Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field);
 // Finite and not negative.
 Result<double> seconds_from(double value, const char* field);
@@ -24,7 +25,8 @@ Result<PixelRect> rect_from(const pb::Rect& rect, const char* field);
 // Even ends, not empty, within the largest index.
 Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field);
 
-// A text as it may be sent: valid UTF-8 (a peer throws away a whole message with a string that is not; stray bytes become
+// A text as it may be sent: valid UTF-8 (a peer throws away a whole message with a string that is not; stray
+// bytes become
 // '?'), cut to at most `limit` bytes at the end of a character.
 std::string sendable(const std::string& text, std::size_t limit);
 

@@ -1,4 +1,5 @@
-// What renders units for an agent: the renderer in this process, the renderer in a child process, or the fake.
+// What renders units for an agent: the renderer in this process, the renderer in a child process, or the
+// fake.
 #pragma once
 
 #include <atomic>
@@ -18,8 +19,8 @@ namespace ls::worker {
 // A job as a backend sees it: every blob is a file on this machine.
 struct LocalJob {
   JobBrief brief;
-  std::filesystem::path scene;                       // canonical scene
-  std::map<Digest, std::filesystem::path> assets;    // by digest
+  std::filesystem::path scene;                     // canonical scene
+  std::map<Digest, std::filesystem::path> assets;  // by digest
 };
 
 struct RenderedUnit {
@@ -28,8 +29,8 @@ struct RenderedUnit {
   UnitHealth health;
 };
 
-// Blocking calls, made from several threads of the agent at once (one a render thread). `stop` asks for an early return with
-// Errc::failed_precondition. A UnitFailure says whose fault it was.
+// Blocking calls, made from several threads of the agent at once (one a render thread). `stop` asks for an
+// early return with Errc::failed_precondition. A UnitFailure says whose fault it was.
 class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
@@ -40,7 +41,8 @@ class RenderBackend {
                                                          const std::atomic<bool>& stop) = 0;
   virtual void forget(const JobId& job) = 0;
   virtual std::uint64_t rss_bytes() const = 0;
-  // Nothing more will be asked: calls that are still blocked should come back soon. May be called more than once.
+  // Nothing more will be asked: calls that are still blocked should come back soon. May be called more than
+  // once.
   virtual void shutdown() {}
 };
 

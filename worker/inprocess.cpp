@@ -20,7 +20,8 @@ double thread_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// invalid_argument is the scene's fault; anything else (memory, a file that cannot be read here) may go well elsewhere.
+// invalid_argument is the scene's fault; anything else (memory, a file that cannot be read here) may go well
+// elsewhere.
 tl::unexpected<UnitFailure> failed(const Error& error) {
   return tl::unexpected<UnitFailure>(
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
@@ -59,7 +60,8 @@ class InProcessBackend final : public LocalBackend {
     if (!ready) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "the job was not prepared"});
     const double start = thread_cpu_seconds();
     render::Breadcrumb own;
-    render::TileResult tile = render::render_tile(*ready, unit.rect, unit.samples, &stop, where ? where : &own);
+    render::TileResult tile =
+        render::render_tile(*ready, unit.rect, unit.samples, &stop, where ? where : &own);
     if (tile.stopped) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
     const JobBrief& brief = job.brief;
@@ -102,6 +104,8 @@ class InProcessBackend final : public LocalBackend {
 
 }  // namespace
 
-std::unique_ptr<LocalBackend> make_inprocess_backend(int threads) { return std::make_unique<InProcessBackend>(threads); }
+std::unique_ptr<LocalBackend> make_inprocess_backend(int threads) {
+  return std::make_unique<InProcessBackend>(threads);
+}
 
 }  // namespace ls::worker

@@ -1,4 +1,5 @@
-// A backend over the renderer in this very process: what the render child serves, and what `lightshaft render` uses directly.
+// A backend over the renderer in this very process: what the render child serves, and what `lightshaft
+// render` uses directly.
 #pragma once
 
 #include <memory>

@@ -22,16 +22,19 @@ int usable_cpus() {
 }
 
 std::uint64_t usable_memory_bytes() {
-  std::uint64_t bytes =
-      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  std::uint64_t bytes = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                        static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   std::uint64_t limit = 0;
-  if (std::ifstream group("/sys/fs/cgroup/memory.max"); group >> limit && limit > 0) bytes = std::min(bytes, limit);
+  if (std::ifstream group("/sys/fs/cgroup/memory.max"); group >> limit && limit > 0)
+    bytes = std::min(bytes, limit);
   return bytes;
 }
 
 std::filesystem::path default_cache() {
-  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg && *xdg) return std::filesystem::path(xdg) / "lightshaft";
-  if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache/lightshaft";
+  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg && *xdg)
+    return std::filesystem::path(xdg) / "lightshaft";
+  if (const char* home = std::getenv("HOME"); home && *home)
+    return std::filesystem::path(home) / ".cache/lightshaft";
   std::error_code error;
   return std::filesystem::temp_directory_path(error) / "lightshaft-cache";
 }

@@ -14,18 +14,22 @@ namespace ls::worker {
 namespace {
 
 constexpr const char* kBuild = "lightshaft-worker " LIGHTSHAFT_VERSION;
-// Of the machine's memory, for the render child unless told otherwise: the system and the agent need the rest.
+// Of the machine's memory, for the render child unless told otherwise: the system and the agent need the
+// rest.
 constexpr double kMemoryShare = 0.9;
 
 void describe(CLI::App& app, Options& o, std::string& token_file) {
   app.add_option("--coordinator", o.coordinator, "HOST:PORT where the coordinator listens for workers");
-  app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")->check(CLI::Range(1, 256));
+  app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")
+      ->check(CLI::Range(1, 256));
   app.add_option("--cache", o.cache, "Folder for scenes and assets, may be shared by workers");
   app.add_option("--cache-limit", o.cache_limit, "Bytes to keep there, e.g. 20G; default: no limit")
       ->transform(CLI::AsSizeValue(false));
-  app.add_option("--memory-limit", o.memory_limit, "Bytes that the renderer may use, e.g. 8G; default: 9/10 of the machine's")
+  app.add_option("--memory-limit", o.memory_limit,
+                 "Bytes that the renderer may use, e.g. 8G; default: 9/10 of the machine's")
       ->transform(CLI::AsSizeValue(false));
-  app.add_option("--hang-after", o.hang_seconds, "Seconds without a finished sample after which the renderer is restarted")
+  app.add_option("--hang-after", o.hang_seconds,
+                 "Seconds without a finished sample after which the renderer is restarted")
       ->check(CLI::PositiveNumber);
   app.add_option("--name", o.name, "Name shown to people; default: the host's");
   app.add_option("--tags", o.tags, "What jobs may ask for, separated by commas")->delimiter(',');
@@ -34,6 +38,7 @@ void describe(CLI::App& app, Options& o, std::string& token_file) {
   app.add_flag("--render-child", o.render_child)->group("");
   app.add_option("--fake-delay", "Milliseconds that a fake unit takes")->group("");
   app.add_option("--fake-fault", o.fake_fault_text)->group("");
+  app.add_option("--fake-class", o.fake_class)->group("");
   app.set_version_flag("--version", kBuild);
 }
 
@@ -77,24 +82,28 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   const auto fault = parse_fake_fault(o.fake_fault_text);
   if (!fault) return usage("--fake-fault: " + fault.error().message);
   o.fake_options.fault = *fault;
+  if (!o.fake_class.empty()) o.fake_options.numeric_class = sha256(o.fake_class);
   if (o.render_child) return o;
   if (o.coordinator.empty() || o.coordinator.find(':') == std::string::npos)
     return usage("--coordinator HOST:PORT is needed, e.g. --coordinator localhost:50051");
   const auto token = read_token(token_file);
-  if (!token || token->size() > limits::kTokenBytes) return usage("no join token can be read from " + token_file);
+  if (!token || token->size() > limits::kTokenBytes)
+    return usage("no join token can be read from " + token_file);
   o.join_token = *token;
 #ifndef LIGHTSHAFT_RENDERER
-  if (!o.fake) return usage("this program was built without the renderer (LIGHTSHAFT_RENDERER=OFF); only --fake works");
+  if (!o.fake)
+    return usage("this program was built without the renderer (LIGHTSHAFT_RENDERER=OFF); only --fake works");
 #endif
   return o;
 }
 
 std::vector<std::string> child_arguments(const Options& o) {
-  std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads), "--memory-limit",
-                                        std::to_string(o.memory_limit)};
+  std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads),
+                                        "--memory-limit", std::to_string(o.memory_limit)};
   if (o.fake) arguments.push_back("--fake");
   arguments.insert(arguments.end(), {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3)});
   if (!o.fake_fault_text.empty()) arguments.insert(arguments.end(), {"--fake-fault", o.fake_fault_text});
+  if (!o.fake_class.empty()) arguments.insert(arguments.end(), {"--fake-class", o.fake_class});
   return arguments;
 }
 

@@ -1,5 +1,5 @@
-// Every size that the worker protocol bounds, in one place. Both sides check what they receive against these before they
-// allocate or store anything; what they send stays within them.
+// Every size that the worker protocol bounds, in one place. Both sides check what they receive against these
+// before they allocate or store anything; what they send stays within them.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,14 @@
 namespace ls::limits {
 
 inline constexpr std::size_t kMessageBytes = 1 << 20;  // one gRPC message
-// An encoded partial; leaves room for the rest of a UnitResult. 6 floats a pixel: tiles up to about 200 x 200.
+// An encoded partial; leaves room for the rest of a UnitResult. 6 floats a pixel: tiles up to about 200 x
+// 200.
 inline constexpr std::size_t kPartialBytes = kMessageBytes - (32 << 10);
 inline constexpr std::size_t kBlobChunkBytes = 256 << 10;
 
-inline constexpr std::size_t kIdBytes = 64;       // job, lease, worker
-inline constexpr std::size_t kNameBytes = 128;    // worker, asset, tag, build, activity
-inline constexpr std::size_t kTextBytes = 4096;   // reasons and problems
+inline constexpr std::size_t kIdBytes = 64;      // job, lease, worker
+inline constexpr std::size_t kNameBytes = 128;   // worker, asset, tag, build, activity
+inline constexpr std::size_t kTextBytes = 4096;  // reasons and problems
 inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
 
@@ -25,7 +26,7 @@ inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
 
-inline constexpr int kFrameSide = 1 << 17;            // pixels
+inline constexpr int kFrameSide = 1 << 17;  // pixels
 inline constexpr std::uint64_t kSampleIndex = std::uint64_t{1} << 40;
 
 }  // namespace ls::limits

@@ -1,5 +1,6 @@
-// What coordinator and worker say to each other, as plain values. proto/farm.proto is the same on the wire and documents
-// the exchange; `lightshaft render` passes these values inside one process. Conversions: proto/convert.h.
+// What coordinator and worker say to each other, as plain values. proto/farm.proto is the same on the wire
+// and documents the exchange; `lightshaft render` passes these values inside one process. Conversions:
+// proto/convert.h.
 #pragma once
 
 #include <cstddef>
@@ -79,20 +80,21 @@ struct UnitResult {
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say); trying again
-// elsewhere cannot help and the job fails at once. Otherwise it is the task's fault (crash, hang, memory).
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say);
+// trying again elsewhere cannot help and the job fails at once. Otherwise it is the task's fault (crash,
+// hang, memory).
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
   bool scene_at_fault = false;
-  std::string reason;              // for a person
-  std::optional<int> signal;       // that ended the render child
+  std::string reason;                        // for a person
+  std::optional<int> signal;                 // that ended the render child
   std::optional<std::pair<int, int>> pixel;  // the breadcrumb: where it was
   std::optional<std::uint64_t> sample;
   bool operator==(const UnitFailure&) const = default;
 };
 
-// ---- worker -> coordinator ------------------------------------------------------------------------------------------
+// ---- worker -> coordinator
 struct WorkerHello {
   int protocol = kProtocolVersion;
   std::string name;
@@ -103,7 +105,8 @@ struct WorkerHello {
   std::vector<std::string> tags;
   std::vector<Digest> blobs_held;
   std::string join_token;
-  // Given by the coordinator at an earlier Welcome; empty for a new worker. The same worker keeps its id over reconnects.
+  // Given by the coordinator at an earlier Welcome; empty for a new worker. The same worker keeps its id over
+  // reconnects.
   WorkerId previous_id;
   bool operator==(const WorkerHello&) const = default;
 };
@@ -131,9 +134,10 @@ struct LeaseReturned {
   std::vector<UnitKey> unrendered;
   bool operator==(const LeaseReturned&) const = default;
 };
-using FromWorker = std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
+using FromWorker =
+    std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
 
-// ---- coordinator -> worker ------------------------------------------------------------------------------------------
+// ---- coordinator -> worker
 struct Welcome {
   WorkerId worker;
   std::uint64_t epoch = 0;  // grows with every registration of this worker; an older stream is closed

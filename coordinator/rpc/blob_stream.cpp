@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/secret.h"
 #include "common/protocol/limits.h"
 #include "coordinator/rpc/convert.h"
 #include "proto/convert.h"
@@ -15,8 +16,9 @@ BlobStream::BlobStream(BlobStore& blobs, const lightshaft::farm::v1::FetchBlobRe
     : blobs_(blobs), request_(request), join_token_(join_token), on_gone_(std::move(on_gone)) {}
 
 void BlobStream::begin() {
-  if (!join_token_.empty() && !same_secret(request_.join_token(), join_token_))
-    return Finish({grpc::StatusCode::UNAUTHENTICATED, "wrong join token; the coordinator's is in DATA/join-token"});
+  if (!join_token_.empty() && !equal_secret(request_.join_token(), join_token_))
+    return Finish(
+        {grpc::StatusCode::UNAUTHENTICATED, "wrong join token; the coordinator's is in DATA/join-token"});
   const auto digest = wire::digest_from(request_.digest(), "digest");
   if (!digest) return Finish(to_status(digest.error()));
   digest_ = *digest;
@@ -25,13 +27,15 @@ void BlobStream::begin() {
   size_ = *size;
   offset_ = request_.offset();
   if (offset_ > size_)
-    return Finish({grpc::StatusCode::OUT_OF_RANGE, fmt::format("offset {} is beyond the blob's end, {}", offset_, size_)});
+    return Finish({grpc::StatusCode::OUT_OF_RANGE,
+                   fmt::format("offset {} is beyond the blob's end, {}", offset_, size_)});
   next();
 }
 
 void BlobStream::next() {
   if (offset_ == size_) return Finish(grpc::Status::OK);
-  const auto bytes = blobs_.read(digest_, offset_, std::min<std::uint64_t>(limits::kBlobChunkBytes, size_ - offset_));
+  const auto bytes =
+      blobs_.read(digest_, offset_, std::min<std::uint64_t>(limits::kBlobChunkBytes, size_ - offset_));
   if (!bytes) return Finish(to_status(bytes.error()));
   if (bytes->empty()) return Finish({grpc::StatusCode::INTERNAL, "the blob is shorter than its stated size"});
   offset_ += bytes->size();
@@ -47,13 +51,6 @@ void BlobStream::OnWriteDone(bool ok) {
 void BlobStream::OnDone() {
   on_gone_();
   delete this;
-}
-
-bool same_secret(const std::string& a, const std::string& b) {
-  unsigned char differs = a.size() != b.size();
-  for (std::size_t i = 0; i < a.size(); ++i)
-    differs |= static_cast<unsigned char>(a[i] ^ (b.empty() ? '\0' : b[i % b.size()]));
-  return differs == 0;
 }
 
 }  // namespace ls::coordinator::rpc

@@ -11,8 +11,8 @@ namespace ls::coordinator::rpc {
 
 class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::BlobChunk> {
  public:
-  BlobStream(BlobStore& blobs, const lightshaft::farm::v1::FetchBlobRequest& request, const std::string& join_token,
-             std::function<void()> on_gone);
+  BlobStream(BlobStore& blobs, const lightshaft::farm::v1::FetchBlobRequest& request,
+             const std::string& join_token, std::function<void()> on_gone);
   void begin();  // starts the first write, or ends with what is wrong
 
   void OnWriteDone(bool ok) override;
@@ -29,8 +29,5 @@ class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::B
   std::uint64_t offset_ = 0, size_ = 0;
   lightshaft::farm::v1::BlobChunk chunk_;
 };
-
-// Whether both are equal, in a time that tells nothing about where they differ.
-bool same_secret(const std::string& a, const std::string& b);
 
 }  // namespace ls::coordinator::rpc

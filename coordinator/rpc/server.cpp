@@ -106,10 +106,12 @@ Result<int> GrpcServer::start(const std::string& address) {
   impl_->server = builder.BuildAndStart();
   if (!impl_->server || port == 0) {
     impl_->server.reset();
-    return fail(Errc::unavailable,
-                fmt::format("cannot listen for workers on {}: the port is taken (another coordinator?) or the address is "
-                            "not this machine's; choose another with --grpc",
-                            address));
+    return fail(
+        Errc::unavailable,
+        fmt::format(
+            "cannot listen for workers on {}: the port is taken (another coordinator?) or the address is "
+            "not this machine's; choose another with --grpc",
+            address));
   }
   impl_->sweeper = std::jthread([this](std::stop_token token) { impl_->sweep(token); });
   return port;

@@ -15,10 +15,12 @@ class GrpcServer {
   explicit GrpcServer(Coordinator& coordinator, std::string join_token = {});
   ~GrpcServer();  // stops
 
-  // Listens on "host:port"; port 0 lets the system choose. Gives the port. unavailable: the address is taken or not ours,
-  // also by another coordinator: ports are never shared. Block SIGTERM before, since threads start here.
+  // Listens on "host:port"; port 0 lets the system choose. Gives the port. unavailable: the address is taken
+  // or not ours, also by another coordinator: ports are never shared. Block SIGTERM before, since threads
+  // start here.
   Result<int> start(const std::string& address);
-  // Ends all streams with UNAVAILABLE, so that workers come back to the next coordinator. Returns when none is left.
+  // Ends all streams with UNAVAILABLE, so that workers come back to the next coordinator. Returns when none
+  // is left.
   void stop();
 
  private:

@@ -30,8 +30,8 @@ void Outlet::close() {
   stream_->pump_locked();
 }
 
-WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, TimePoint hello_deadline,
-                       std::function<void(WorkStream*)> on_gone)
+WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context,
+                       TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
     : coordinator_(coordinator),
       context_(context),
       hello_deadline_(hello_deadline),
@@ -90,16 +90,22 @@ void WorkStream::OnReadDone(bool ok) {
 
 void WorkStream::greet(FromWorker message) {
   const auto* hello = std::get_if<WorkerHello>(&message);
-  if (!hello) return refuse({Errc::invalid_argument, "bad message: the first one on a stream must be the hello"}, false);
-  if (hello->protocol != kProtocolVersion)
-    return refuse({Errc::failed_precondition,
-                   fmt::format("this worker speaks protocol {}, the coordinator speaks {}: install the same version on both",
-                               hello->protocol, kProtocolVersion)},
+  if (!hello)
+    return refuse({Errc::invalid_argument, "bad message: the first one on a stream must be the hello"},
                   false);
+  if (hello->protocol != kProtocolVersion)
+    return refuse(
+        {Errc::failed_precondition,
+         fmt::format(
+             "this worker speaks protocol {}, the coordinator speaks {}: install the same version on both",
+             hello->protocol, kProtocolVersion)},
+        false);
   auto session = coordinator_.connect(*hello, outlet_);
   if (!session) {
-    log_warn(fmt::format("peer={} worker={}", context_->peer(), hello->name), "refused: " + session.error().message);
-    return refuse(session.error(), session.error().code == Errc::unavailable || session.error().code == Errc::resource_exhausted);
+    log_warn(fmt::format("peer={} worker={}", context_->peer(), hello->name),
+             "refused: " + session.error().message);
+    return refuse(session.error(), session.error().code == Errc::unavailable ||
+                                       session.error().code == Errc::resource_exhausted);
   }
   session_ = std::move(*session);
   greeted_ = true;

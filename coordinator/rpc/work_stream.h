@@ -1,8 +1,8 @@
 // One worker's stream: messages in to its WorkerSession, messages out from a bounded queue.
 //
-// Two objects: the Outlet is the WorkerSink that the coordinator holds, for as long as it likes; the WorkStream is gRPC's
-// reactor and deletes itself at OnDone. The outlet's mutex guards both and is never held while the coordinator is called,
-// so the coordinator may call the sink with its own locks held.
+// Two objects: the Outlet is the WorkerSink that the coordinator holds, for as long as it likes; the
+// WorkStream is gRPC's reactor and deletes itself at OnDone. The outlet's mutex guards both and is never held
+// while the coordinator is called, so the coordinator may call the sink with its own locks held.
 #pragma once
 
 #include <atomic>
@@ -40,7 +40,8 @@ class Outlet final : public WorkerSink {
 
 class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
  public:
-  // `open_streams` is decremented at the end. `on_gone` tells the server, last thing before the stream is deleted.
+  // `open_streams` is decremented at the end. `on_gone` tells the server, last thing before the stream is
+  // deleted.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, TimePoint hello_deadline,
              std::function<void(WorkStream*)> on_gone);
 

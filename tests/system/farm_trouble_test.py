@@ -5,7 +5,7 @@ import os
 import socket
 
 import pytest
-from local_farm import SCENE, wait_until
+from local_farm import SCENE, Process, wait_until
 
 BAD, GOOD = 13, 5  # seeds
 
@@ -33,9 +33,8 @@ def test_a_unit_that_brings_the_renderer_down_fails_its_job_clearly_and_no_other
 def test_garbage_on_the_grpc_port_harms_nobody(farm):
     farm.add_worker("--fake-delay", 10)
     job = farm.submit(SCENE, spp=24)
-    dice = os.urandom
     preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
-    for sent in (dice(4096), b"GET / HTTP/1.1\r\n\r\n", preface + dice(4096), preface + b"\x00\xff\xff\x01" + dice(64), b""):
+    for sent in (os.urandom(4096), b"GET / HTTP/1.1\r\n\r\n", preface + os.urandom(4096), preface + b"\x00\xff\xff\x01" + os.urandom(64), b""):
         with socket.create_connection(("127.0.0.1", farm.grpc), timeout=10) as stranger:
             try:
                 stranger.sendall(sent)
@@ -55,8 +54,6 @@ def test_a_worker_with_a_wrong_join_token_is_refused_with_a_reason(farm):
 
 
 def test_a_second_coordinator_on_the_port_says_so(farm, tmp_path):
-    from local_farm import Process
-
     second = Process("second", [farm.bin / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc",
                                 f"127.0.0.1:{farm.grpc}", "--data", tmp_path / "other"], tmp_path / "second.log")
 
@@ -64,9 +61,7 @@ def test_a_second_coordinator_on_the_port_says_so(farm, tmp_path):
     assert str(farm.grpc) in second.output()
 
 
-def test_a_lying_worker_or_bad_usage_is_named(farm, tmp_path):
-    from local_farm import Process
-
+def test_bad_usage_of_the_worker_is_named(farm, tmp_path):
     for args, word in ((["--coordinator", "nowhere"], "HOST:PORT"), (["--coordinator", "a:1", "--threads", "0"], "threads"),
                        (["--coordinator", "a:1", "--token-file", "/nonexistent"], "/nonexistent")):
         process = Process("bad", [farm.bin / "lightshaft-worker", *args], tmp_path / "bad.log")
@@ -81,3 +76,19 @@ def test_a_worker_whose_stream_is_cut_comes_back_as_itself(farm):
     farm.wait_for_workers(1)
 
     assert [w["name"] for w in farm.get("/api/v1/workers")["workers"] if w["state"] == "connected"] == [worker.name]
+
+
+def test_a_worker_of_another_numeric_class_gets_no_unit_of_the_job_and_is_named(farm):
+    first = farm.add_worker("--fake-delay", 10)
+    job = farm.submit(SCENE, spp=24, seed=GOOD)
+    farm.wait_for_progress(job, 3)
+    first.kill()
+    other = farm.add_worker("--fake-class", "another machine")
+    farm.wait_for_workers(1)
+
+    view = wait_until(lambda: (v := farm.job(job))["error"] and v, "the job says what it waits for")
+    assert f"{other.name} is of another numeric class" in view["error"]
+    farm.add_worker()
+    farm.wait_for_job(job)
+    workers = {w["name"]: w["units_done"] for w in farm.get("/api/v1/workers")["workers"]}
+    assert workers[other.name] == 0

@@ -69,40 +69,40 @@ void Agent::Impl::handle(Arrival& arrival) {
 }
 
 void Agent::Impl::handle_message(ToWorker& message) {
-  std::visit(
-      overloaded{
-          [this](Welcome& welcome) {
-            const std::lock_guard lock(mutex);
-            connection = Connection::up;
-            up_since = clock.now();
-            next_progress = up_since;
-            id = welcome.worker;
-            if (draining) outgoing.push_front(WorkerDraining{});
-            log_info(fmt::format("worker={}", id.value), "joined the coordinator");
-          },
-          [this](Refused& refused) {
-            link.close();
-            if (!refused.retry) ended = tl::unexpected<Error>(refused.error);
-            connection_ended(refused.error);
-          },
-          [this](AssignLease& assign) { accept_lease(assign); },
-          [this](ResultAck& ack) {
-            if (ack.refused)
-              log_warn(fmt::format("job={} tile={} round={}", ack.unit.job.value, ack.unit.tile, ack.unit.round),
-                       "result refused: " + ack.refused->message);
-            const std::lock_guard lock(mutex);
-            outbox.acknowledge(ack.unit);
-            book.acknowledged(ack.unit, ack.refused.has_value());
-          },
-          [this](CancelJob& c) { cancel(c.job); },
-          [this](CancelLease& c) {
-            const std::lock_guard lock(mutex);
-            book.drop_lease(c.lease);
-            stop_dropped_units();
-          },
-          [this](DrainNow&) { drain_requested = true; },
-      },
-      message);
+  std::visit(overloaded{
+                 [this](Welcome& welcome) {
+                   const std::lock_guard lock(mutex);
+                   connection = Connection::up;
+                   up_since = clock.now();
+                   next_progress = up_since;
+                   id = welcome.worker;
+                   if (draining) outgoing.push_front(WorkerDraining{});
+                   log_info(fmt::format("worker={}", id.value), "joined the coordinator");
+                 },
+                 [this](Refused& refused) {
+                   link.close();
+                   if (!refused.retry) ended = tl::unexpected<Error>(refused.error);
+                   connection_ended(refused.error);
+                 },
+                 [this](AssignLease& assign) { accept_lease(assign); },
+                 [this](ResultAck& ack) {
+                   if (ack.refused)
+                     log_warn(fmt::format("job={} tile={} round={}", ack.unit.job.value, ack.unit.tile,
+                                          ack.unit.round),
+                              "result refused: " + ack.refused->message);
+                   const std::lock_guard lock(mutex);
+                   outbox.acknowledge(ack.unit);
+                   book.acknowledged(ack.unit, ack.refused.has_value());
+                 },
+                 [this](CancelJob& c) { cancel(c.job); },
+                 [this](CancelLease& c) {
+                   const std::lock_guard lock(mutex);
+                   book.drop_lease(c.lease);
+                   stop_dropped_units();
+                 },
+                 [this](DrainNow&) { drain_requested = true; },
+             },
+             message);
   work.notify_all();
 }
 
@@ -116,7 +116,8 @@ void Agent::Impl::connection_ended(const Error& why) {
   connection_timer = now + pause;
   if (!ended && !(draining && outbox.empty()))
     log_warn(fmt::format("worker={}", id.value),
-             fmt::format("no connection to the coordinator ({}); trying again in {:.1f} s", why.message, seconds(pause)));
+             fmt::format("no connection to the coordinator ({}); trying again in {:.1f} s", why.message,
+                         seconds(pause)));
 }
 
 void Agent::Impl::open_connection() {
@@ -139,7 +140,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    if (it != jobs.end() && it->second.brief != *assign.brief) {  // another coordinator's data: same name, other job
+    if (it != jobs.end() &&
+        it->second.brief != *assign.brief) {  // another coordinator's data: same name, other job
       book.drop_job(id);
       outbox.drop_job(id);
       stop_dropped_units();
@@ -153,7 +155,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const auto job = jobs.find(id);
   if (draining || job == jobs.end() || book.lease_count() >= limits::kLeasesPerWorker) {
     LeaseReturned returned{assign.lease.id, {}};
-    for (const LeaseUnit& unit : assign.lease.units) returned.unrendered.push_back({id, unit.tile, unit.round});
+    for (const LeaseUnit& unit : assign.lease.units)
+      returned.unrendered.push_back({id, unit.tile, unit.round});
     outgoing.push_back(std::move(returned));
     return;
   }
@@ -213,7 +216,10 @@ std::vector<FromWorker> Agent::Impl::due_messages() {
 WorkerProgress Agent::Impl::progress() const {
   WorkerProgress p;
   p.leases = book.progress();
-  p.activity = draining ? "draining" : book.running() > 0 ? "rendering" : !loading.empty() ? "loading " + loading : "idle";
+  p.activity = draining             ? "draining"
+               : book.running() > 0 ? "rendering"
+               : !loading.empty()   ? "loading " + loading
+                                    : "idle";
   p.cpu_seconds_total = cpu_seconds;
   p.rss_bytes = backend.rss_bytes();
   p.load_seconds = load_seconds;
@@ -223,13 +229,16 @@ WorkerProgress Agent::Impl::progress() const {
 std::optional<Result<void>> Agent::Impl::verdict() {
   const std::lock_guard lock(mutex);
   if (!draining) return std::nullopt;
-  const bool rendering = std::any_of(slots.begin(), slots.end(), [](const auto& slot) { return slot->unit.has_value(); });
-  if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up)) return Result<void>{};
+  const bool rendering =
+      std::any_of(slots.begin(), slots.end(), [](const auto& slot) { return slot->unit.has_value(); });
+  if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up))
+    return Result<void>{};
   if (clock.now() < drain_deadline) return std::nullopt;
-  return fail(Errc::unavailable,
-              fmt::format("gave up draining after {:.0f} s: {} finished units could not be handed in; they will be "
-                          "rendered again elsewhere",
-                          seconds(options.drain_limit), outbox.size()));
+  return fail(
+      Errc::unavailable,
+      fmt::format("gave up draining after {:.0f} s: {} finished units could not be handed in; they will be "
+                  "rendered again elsewhere",
+                  seconds(options.drain_limit), outbox.size()));
 }
 
 Duration Agent::Impl::until_next_timer() const {
@@ -246,7 +255,8 @@ Duration Agent::Impl::until_next_timer() const {
   return std::max(next - now, Duration::zero());
 }
 
-Agent::Agent(AgentOptions options, CoordinatorLink& link, RenderBackend& backend, BlobFiles& files, const Clock& clock)
+Agent::Agent(AgentOptions options, CoordinatorLink& link, RenderBackend& backend, BlobFiles& files,
+             const Clock& clock)
     : impl_(std::make_unique<Impl>(std::move(options), link, backend, files, clock)) {}
 Agent::~Agent() = default;
 

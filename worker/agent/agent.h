@@ -1,10 +1,11 @@
-// The worker without sockets and without a renderer: takes leases from a CoordinatorLink, gets their blobs, has the units
-// rendered by a RenderBackend on its own threads, and keeps every result until it is acknowledged.
+// The worker without sockets and without a renderer: takes leases from a CoordinatorLink, gets their blobs,
+// has the units rendered by a RenderBackend on its own threads, and keeps every result until it is
+// acknowledged.
 //
-// Threads: run() is the control thread (connection, progress, timers); one loader fetches blobs and prepares worlds ahead of
-// need; `threads` render threads each take the next unit as soon as they have handed in the last. One mutex guards the state
-// (worker/agent/lease_book.h, outbox.h); while it is held nothing is
-// called that may block: of the backend only forget() and rss_bytes(), of the link and the files nothing.
+// Threads: run() is the control thread (connection, progress, timers); one loader fetches blobs and prepares
+// worlds ahead of need; `threads` render threads each take the next unit as soon as they have handed in the
+// last. One mutex guards the state (worker/agent/lease_book.h, outbox.h); while it is held nothing is called
+// that may block: of the backend only forget() and rss_bytes(), of the link and the files nothing.
 #pragma once
 
 #include <cstdint>
@@ -26,21 +27,23 @@ struct AgentOptions {
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_first = std::chrono::milliseconds(100);
   Duration backoff_most = std::chrono::seconds(10);
-  Duration drain_limit = std::chrono::seconds(60);  // to hand in what is finished; then run() ends with an error
-  std::uint64_t backoff_seed = 0;                   // of the jitter; workers of a farm should differ
+  Duration drain_limit =
+      std::chrono::seconds(60);    // to hand in what is finished; then run() ends with an error
+  std::uint64_t backoff_seed = 0;  // of the jitter; workers of a farm should differ
 };
 
 class Agent {
  public:
   // All references must outlive the agent.
-  Agent(AgentOptions options, CoordinatorLink& link, RenderBackend& backend, BlobFiles& files, const Clock& clock);
+  Agent(AgentOptions options, CoordinatorLink& link, RenderBackend& backend, BlobFiles& files,
+        const Clock& clock);
   ~Agent();
 
   // Until drained (success), refused for good (the coordinator's error) or stopped. Once.
   Result<void> run();
 
-  // From any thread. drain(): finish the units in hand, hand in every result, return the rest. stop(): as soon as possible,
-  // handing in nothing more.
+  // From any thread. drain(): finish the units in hand, hand in every result, return the rest. stop(): as
+  // soon as possible, handing in nothing more.
   void drain();
   void stop();
   // The injected clock has moved: look at the timers again. Only needed by tests.

@@ -1,4 +1,5 @@
-// The agent's state and its three kinds of threads. Control: agent.cpp; loader: agent_loader.cpp; rendering: agent_render.cpp.
+// The agent's state and its three kinds of threads. Control: agent.cpp; loader: agent_loader.cpp; rendering:
+// agent_render.cpp.
 #pragma once
 
 #include <atomic>

@@ -6,7 +6,8 @@
 
 namespace ls::worker {
 namespace {
-// The world being rendered and the next one: so that a thread never waits between two jobs, and memory stays bounded.
+// The world being rendered and the next one: so that a thread never waits between two jobs, and memory stays
+// bounded.
 constexpr std::size_t kWorldsKept = 2;
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
 }  // namespace
@@ -32,7 +33,8 @@ void Agent::Impl::load_loop(std::stop_token token) {
 std::optional<JobId> Agent::Impl::next_to_load() {
   for (const JobId& id : book.wanted()) {
     const auto it = jobs.find(id);
-    if (it != jobs.end() && it->second.state == Job::State::idle && clock.now() >= it->second.retry_at) return id;
+    if (it != jobs.end() && it->second.state == Job::State::idle && clock.now() >= it->second.retry_at)
+      return id;
   }
   return std::nullopt;
 }
@@ -43,7 +45,8 @@ bool Agent::Impl::make_room() {
   for (auto it = jobs.begin(); it != jobs.end(); ++it) {
     if (it->second.state != Job::State::ready) continue;
     ++kept;
-    if (!book.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use)) idlest = it;
+    if (!book.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use))
+      idlest = it;
   }
   if (kept < kWorldsKept) return true;
   if (idlest == jobs.end()) return false;
@@ -68,7 +71,8 @@ void Agent::Impl::load(const JobBrief& brief) {
     auto file = files.acquire(blob);
     if (!file && file.error().code == Errc::unavailable) return postpone(id, file.error());
     if (!file)
-      return loading_failed(id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
+      return loading_failed(
+          id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
     if (blob.digest == brief.scene) local->scene = (*file)->path();
     local->assets[blob.digest] = (*file)->path();
     pins.push_back(std::move(*file));
@@ -89,7 +93,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   work.notify_all();
 }
 
-// One unit is reported, the others go back: so that a job which this worker can't load costs one attempt, not hundreds.
+// One unit is reported, the others go back: so that a job which this worker can't load costs one attempt, not
+// hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();

@@ -14,19 +14,22 @@ constexpr std::int64_t kExrOverhead = 16 << 10;  // header and line offsets
 std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
   const std::int64_t bytes = unit.rect.pixels() * kBytesPerPixel + kExrOverhead;
   if (bytes <= static_cast<std::int64_t>(limits::kPartialBytes)) return std::nullopt;
-  return UnitFailure{.scene_at_fault = true,
-                     .reason = fmt::format("a tile of {} x {} pixels makes a result of {} bytes, more than the {} that "
-                                           "one message takes; choose a smaller tile",
-                                           unit.rect.width(), unit.rect.height(), bytes, limits::kPartialBytes)};
+  return UnitFailure{
+      .scene_at_fault = true,
+      .reason = fmt::format("a tile of {} x {} pixels makes a result of {} bytes, more than the {} that "
+                            "one message takes; choose a smaller tile",
+                            unit.rect.width(), unit.rect.height(), bytes, limits::kPartialBytes)};
 }
 
-tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job, const LeaseBook::Held& held,
-                                             const std::atomic<bool>& stop) {
+tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job,
+                                             const LeaseBook::Held& held, const std::atomic<bool>& stop) {
   if (auto failure = too_large(held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
   auto rendered = backend.render(job, held.unit, stop);
   if (!rendered) return tl::unexpected<UnitFailure>(std::move(rendered.error()));
   auto exr = encode_partial(rendered->partial, job.brief.settings.size);
-  if (!exr) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "cannot encode the result: " + exr.error().message});
+  if (!exr)
+    return tl::unexpected<UnitFailure>(
+        UnitFailure{.reason = "cannot encode the result: " + exr.error().message});
   UnitResult result;
   result.unit = held.key;
   result.exr = std::move(*exr);
@@ -68,7 +71,8 @@ std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::sto
   return held;
 }
 
-void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome) {
+void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
+                           tl::expected<UnitResult, UnitFailure> outcome) {
   {
     const std::lock_guard lock(mutex);
     slot.unit.reset();

@@ -14,7 +14,8 @@ struct PlainFile final : BlobFile {
 Result<std::shared_ptr<const BlobFile>> LocalFiles::acquire(const BlobRef& blob) {
   const auto it = files_.find(blob.digest);
   if (it == files_.end())
-    return fail(Errc::not_found, fmt::format("no file here has the content of '{}' ({})", blob.name, blob.digest.hex()));
+    return fail(Errc::not_found,
+                fmt::format("no file here has the content of '{}' ({})", blob.name, blob.digest.hex()));
   return std::make_shared<const PlainFile>(it->second);
 }
 

@@ -1,5 +1,5 @@
-// Where an agent gets the files of a job's blobs: a cache that fetches what it lacks (worker/cache), or files that are here
-// already (`lightshaft render`).
+// Where an agent gets the files of a job's blobs: a cache that fetches what it lacks (worker/cache), or files
+// that are here already (`lightshaft render`).
 #pragma once
 
 #include <filesystem>
@@ -22,8 +22,9 @@ class BlobFile {
 class BlobFiles {
  public:
   virtual ~BlobFiles() = default;
-  // Blocks while it fetches. unavailable: the transfer was cut, try again later (what came is kept). Other errors are final:
-  // not_found, resource_exhausted (disk or cache limit), invalid_argument (the bytes do not have this digest).
+  // Blocks while it fetches. unavailable: the transfer was cut, try again later (what came is kept). Other
+  // errors are final: not_found, resource_exhausted (disk or cache limit), invalid_argument (the bytes do not
+  // have this digest).
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
   // For the hello: at most `limit`, the most recently used first.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;

@@ -1,5 +1,5 @@
-// What wakes the agent's control thread: messages of the current connection, its loss, or a nudge from another thread. Shared
-// with the link's observer, so that a late callback never finds a dead agent.
+// What wakes the agent's control thread: messages of the current connection, its loss, or a nudge from
+// another thread. Shared with the link's observer, so that a late callback never finds a dead agent.
 #pragma once
 
 #include <condition_variable>

@@ -1,5 +1,5 @@
-// The units that this worker holds and under which lease, in the order in which they came. Plain data: no locks, no clock.
-// A unit is held once: a later lease that names it takes it over.
+// The units that this worker holds and under which lease, in the order in which they came. Plain data: no
+// locks, no clock. A unit is held once: a later lease that names it takes it over.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,8 @@ class LeaseBook {
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in);
   // The first waiting unit of a job in `ready`; it is running from then on.
   std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
-  // A running unit is finished: it is no longer held. Gives the lease it belongs to by now; nothing if it was dropped.
+  // A running unit is finished: it is no longer held. Gives the lease it belongs to by now; nothing if it was
+  // dropped.
   std::optional<LeaseId> finish(const UnitKey& key);
   // The unit's result was acknowledged, or refused (then it waits again).
   void acknowledged(const UnitKey& key, bool refused);

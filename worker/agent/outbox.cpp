@@ -25,8 +25,8 @@ void Outbox::add(UnitFailure failure) {
 }
 
 bool Outbox::acknowledge(const UnitKey& unit) {
-  const auto it =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.sent && e.unit == unit; });
+  const auto it = std::find_if(entries_.begin(), entries_.end(),
+                               [&](const Entry& e) { return e.sent && e.unit == unit; });
   if (it == entries_.end()) return false;
   bytes_ -= it->bytes;
   entries_.erase(it);

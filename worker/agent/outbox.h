@@ -1,5 +1,5 @@
-// Results and failures that the coordinator has not acknowledged yet, oldest first. After a reconnect all of them go again.
-// Plain data: no locks.
+// Results and failures that the coordinator has not acknowledged yet, oldest first. After a reconnect all of
+// them go again. Plain data: no locks.
 #pragma once
 
 #include <list>

@@ -72,8 +72,9 @@ Result<std::unique_ptr<BlobCache>> BlobCache::open(fs::path folder, std::uint64_
   std::error_code error;
   fs::create_directories(folder / "partial", error);
   if (error || ::access((folder / "partial").c_str(), W_OK) != 0)
-    return fail(Errc::failed_precondition,
-                fmt::format("cannot write into the cache folder {}; choose another with --cache", folder.string()));
+    return fail(
+        Errc::failed_precondition,
+        fmt::format("cannot write into the cache folder {}; choose another with --cache", folder.string()));
   return std::unique_ptr<BlobCache>(new BlobCache(std::move(folder), limit_bytes, std::move(fetch)));
 }
 
@@ -97,7 +98,8 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) 
     log_warn("blob=" + blob.digest.hex(), last.message);
   }
   if (auto file = open_verified(blob.digest)) return file;
-  return fail(Errc::invalid_argument, fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, last.message));
+  return fail(Errc::invalid_argument,
+              fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, last.message));
 }
 
 // Nothing if it is not here, or is not what its name says (then it is removed).
@@ -106,7 +108,8 @@ std::shared_ptr<const BlobFile> BlobCache::open_verified(const Digest& digest) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return nullptr;
   auto file = std::make_shared<const LockedFile>(path, fd);
-  if (::flock(fd, LOCK_SH | LOCK_NB) != 0 || ::access(path.c_str(), R_OK) != 0) return nullptr;  // being evicted
+  if (::flock(fd, LOCK_SH | LOCK_NB) != 0 || ::access(path.c_str(), R_OK) != 0)
+    return nullptr;  // being evicted
   if (!verified_.contains(digest)) {
     const auto found = sha256_file(path);
     if (!found || *found != digest) {
@@ -127,7 +130,8 @@ Result<void> BlobCache::download(const BlobRef& blob) {
   if (!partial) return tl::unexpected<Error>(partial.error());
   const auto sink = [&](std::span<const std::byte> bytes) -> Result<void> {
     if (blob.bytes != 0 && partial->size() + bytes.size() > blob.bytes)
-      return fail(Errc::invalid_argument, fmt::format("'{}' is longer than the {} bytes announced", blob.name, blob.bytes));
+      return fail(Errc::invalid_argument,
+                  fmt::format("'{}' is longer than the {} bytes announced", blob.name, blob.bytes));
     return partial->append(bytes);
   };
   const auto fetched = fetch_(blob.digest, partial->size(), sink);
@@ -153,16 +157,18 @@ Result<void> BlobCache::make_room(std::uint64_t bytes) {
     total -= blob.bytes;
   }
   if (total <= limit_) return {};
-  return fail(Errc::resource_exhausted,
-              fmt::format("the cache is limited to {} bytes and what is in use leaves no room for {} more; raise "
-                          "--cache-limit",
-                          limit_, bytes));
+  return fail(
+      Errc::resource_exhausted,
+      fmt::format("the cache is limited to {} bytes and what is in use leaves no room for {} more; raise "
+                  "--cache-limit",
+                  limit_, bytes));
 }
 
 std::vector<Digest> BlobCache::held(std::size_t limit) const {
   const std::vector<Stored> blobs = stored_blobs(folder_);
   std::vector<Digest> digests;
-  for (auto it = blobs.rbegin(); it != blobs.rend() && digests.size() < limit; ++it) digests.push_back(it->digest);
+  for (auto it = blobs.rbegin(); it != blobs.rend() && digests.size() < limit; ++it)
+    digests.push_back(it->digest);
   return digests;
 }
 

@@ -1,9 +1,10 @@
 // The worker's content-addressed store of blobs: DIR/ab/abcdef... by SHA-256.
 //
-// A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone on with. A file
-// that no longer has its digest (bad disk, meddling) is found when it is first used by this process, thrown away and fetched
-// again. Above the limit the least recently used blobs go first, never one in use: the file is held by a shared flock while a
-// BlobFile lives, also against other workers that use the same folder.
+// A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone
+// on with. A file that no longer has its digest (bad disk, meddling) is found when it is first used by this
+// process, thrown away and fetched again. Above the limit the least recently used blobs go first, never one
+// in use: the file is held by a shared flock while a BlobFile lives, also against other workers that use the
+// same folder.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,8 @@ class BlobCache final : public BlobFiles {
   using Fetch = std::function<Result<void>(const Digest&, std::uint64_t offset, const Sink& sink)>;
 
   // limit_bytes 0: none. Makes the folder.
-  static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
+  static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
+                                                 Fetch fetch);
 
   Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) override;
   std::vector<Digest> held(std::size_t limit) const override;
@@ -41,8 +43,8 @@ class BlobCache final : public BlobFiles {
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
   const Fetch fetch_;
-  std::mutex mutex_;            // one acquire at a time
-  std::set<Digest> verified_;   // by this process
+  std::mutex mutex_;           // one acquire at a time
+  std::set<Digest> verified_;  // by this process
 };
 
 }  // namespace ls::worker

@@ -18,8 +18,9 @@ constexpr std::size_t kReadBytes = 1 << 20;
 tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path) {
   const int error = errno;
   const Errc code = error == ENOSPC || error == EDQUOT ? Errc::resource_exhausted : Errc::internal;
-  return fail(code, fmt::format("{} {}: {}{}", what, path.string(), std::strerror(error),
-                                code == Errc::resource_exhausted ? "; make room, or choose another --cache" : ""));
+  return fail(code,
+              fmt::format("{} {}: {}{}", what, path.string(), std::strerror(error),
+                          code == Errc::resource_exhausted ? "; make room, or choose another --cache" : ""));
 }
 
 }  // namespace
@@ -40,7 +41,10 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
 }
 
 PartialFile::PartialFile(PartialFile&& other) noexcept
-    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_), hash_(std::move(other.hash_)) {}
+    : path_(std::move(other.path_)),
+      fd_(std::exchange(other.fd_, -1)),
+      size_(other.size_),
+      hash_(std::move(other.hash_)) {}
 
 PartialFile::~PartialFile() {
   if (fd_ >= 0) ::close(fd_);
@@ -75,11 +79,13 @@ Result<void> PartialFile::finish(const Digest& expected, const std::filesystem::
   const Digest got = hash_.finish();
   if (got != expected) {
     discard();
-    return fail(Errc::invalid_argument, fmt::format("received bytes with digest {} instead of {}", got.hex(), expected.hex()));
+    return fail(Errc::invalid_argument,
+                fmt::format("received bytes with digest {} instead of {}", got.hex(), expected.hex()));
   }
   std::error_code error;
   std::filesystem::create_directories(place.parent_path(), error);
-  if (::fdatasync(fd_) != 0 || ::rename(path_.c_str(), place.c_str()) != 0) return io_error("cannot store", place);
+  if (::fdatasync(fd_) != 0 || ::rename(path_.c_str(), place.c_str()) != 0)
+    return io_error("cannot store", place);
   return {};
 }
 

@@ -1,5 +1,6 @@
-// A blob on its way: bytes appended to a file of their own while their digest is computed; goes on from what an earlier
-// attempt left. The file is locked, so that two workers on one folder do not write into each other's.
+// A blob on its way: bytes appended to a file of their own while their digest is computed; goes on from what
+// an earlier attempt left. The file is locked, so that two workers on one folder do not write into each
+// other's.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,8 @@ namespace ls::worker {
 
 class PartialFile {
  public:
-  // Reads what is there already. If another process is writing the same blob, starts an own file from nothing.
+  // Reads what is there already. If another process is writing the same blob, starts an own file from
+  // nothing.
   static Result<PartialFile> open(const std::filesystem::path& path);
   PartialFile(PartialFile&&) noexcept;
   PartialFile& operator=(PartialFile&&) = delete;
@@ -22,7 +24,8 @@ class PartialFile {
 
   std::uint64_t size() const { return size_; }
   Result<void> append(std::span<const std::byte> bytes);  // resource_exhausted: the disk is full
-  // Verifies, syncs and moves the file to its final place. invalid_argument: other bytes than promised; the file is removed.
+  // Verifies, syncs and moves the file to its final place. invalid_argument: other bytes than promised; the
+  // file is removed.
   Result<void> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();
 

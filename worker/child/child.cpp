@@ -59,10 +59,11 @@ class ChildBackend final : public RenderBackend {
   Result<std::shared_ptr<Process>> living_process();
   Result<void> greet(Process& process);
   // A child that knows the job, and the job's number in it.
-  tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job, std::uint64_t& number);
+  tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
+                                                                    std::uint64_t& number);
   tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
-  Attempt attempt(Process& process, int index, std::uint64_t number, const LocalJob& job, const LeaseUnit& unit,
-                  const std::atomic<bool>& stop);
+  Attempt attempt(Process& process, int index, std::uint64_t number, const LocalJob& job,
+                  const LeaseUnit& unit, const std::atomic<bool>& stop);
   Attempt judge_death(Process& process, int index);
   std::uint64_t number_of(const JobId& job);
 
@@ -71,9 +72,9 @@ class ChildBackend final : public RenderBackend {
   Digest numeric_class_;
   std::mutex control_mutex_;  // one request at a time on the control channel; also who respawns
   mutable std::mutex mutex_;
-  std::shared_ptr<Process> process_;        // guarded by mutex_, like all below
+  std::shared_ptr<Process> process_;  // guarded by mutex_, like all below
   std::map<JobId, std::uint64_t> numbers_;
-  std::vector<std::uint64_t> forgotten_;    // told to the child before the next world is built
+  std::vector<std::uint64_t> forgotten_;  // told to the child before the next world is built
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
   bool shut_down_ = false;
@@ -102,12 +103,15 @@ Result<void> ChildBackend::greet(Process& process) {
     if (clock_.now() > deadline) process.kill();
   });
   if (!answer)
-    return fail(Errc::internal, fmt::format("the render child {} before it was ready; run the worker with --fake to see "
-                                            "whether the renderer is the cause",
-                                            process.end().text));
-  if (numeric_class_ == Digest{}) numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
+    return fail(Errc::internal,
+                fmt::format("the render child {} before it was ready; run the worker with --fake to see "
+                            "whether the renderer is the cause",
+                            process.end().text));
+  if (numeric_class_ == Digest{})
+    numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
   if (numeric_class_ != answer->reply.numeric_class)
-    return fail(Errc::internal, "the numeric class of this machine has changed: its arithmetic or memory is at fault");
+    return fail(Errc::internal,
+                "the numeric class of this machine has changed: its arithmetic or memory is at fault");
   return {};
 }
 
@@ -120,12 +124,13 @@ std::uint64_t ChildBackend::number_of(const JobId& job) {
 
 tl::expected<void, UnitFailure> ChildBackend::prepare(const LocalJob& job) {
   std::uint64_t number = 0;
-  if (auto process = ready_process(job, number); !process) return tl::unexpected<UnitFailure>(process.error());
+  if (auto process = ready_process(job, number); !process)
+    return tl::unexpected<UnitFailure>(process.error());
   return {};
 }
 
 tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(const LocalJob& job,
-                                                                               std::uint64_t& number) {
+                                                                                std::uint64_t& number) {
   number = number_of(job.brief.job);
   const auto knows = [&](Process& process) {
     const std::lock_guard lock(process.prepared_mutex);
@@ -147,7 +152,8 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   return *process;
 }
 
-tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job, std::uint64_t number) {
+tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job,
+                                                         std::uint64_t number) {
   std::vector<std::uint64_t> forgotten;
   {
     const std::lock_guard lock(mutex_);
@@ -159,19 +165,22 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
     process.prepared.erase(old);
   }
   const std::string text = child::to_text(job);
-  if (text.size() > child::kTextBytes) return failed("the job names more files than the render child can be told of");
+  if (text.size() > child::kTextBytes)
+    return failed("the job names more files than the render child can be told of");
   const TimePoint deadline = clock_.now() + options_.prepare_limit;
   bool too_long = false;
   process.preparing = true;
-  const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::prepare, .job = number}, text, [&] {
-    too_long = clock_.now() > deadline;
-    if (too_long) process.kill();
-  });
+  const auto answer =
+      process.ask(process.control_fd(), Request{.kind = Kind::prepare, .job = number}, text, [&] {
+        too_long = clock_.now() > deadline;
+        if (too_long) process.kill();
+      });
   if (!answer) {
     const Process::End end = process.end();
     UnitFailure failure;
     failure.signal = end.signal;
-    failure.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s", seconds(options_.prepare_limit))
+    failure.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s",
+                                            seconds(options_.prepare_limit))
                               : fmt::format("the renderer {} while it built the scene", end.text);
     return tl::unexpected<UnitFailure>(std::move(failure));
   }
@@ -189,7 +198,8 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
 
 tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job, const LeaseUnit& unit,
                                                              const std::atomic<bool>& stop) {
-  if (unit.rect.pixels() > static_cast<std::int64_t>(child::kSlotPixels)) return failed("the tile is too large");
+  if (unit.rect.pixels() > static_cast<std::int64_t>(child::kSlotPixels))
+    return failed("the tile is too large");
   int slot = -1;
   {
     const std::lock_guard lock(mutex_);
@@ -209,8 +219,9 @@ tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job
   return std::move(last.outcome);
 }
 
-ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::uint64_t number, const LocalJob& job,
-                                            const LeaseUnit& unit, const std::atomic<bool>& stop) {
+ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::uint64_t number,
+                                            const LocalJob& job, const LeaseUnit& unit,
+                                            const std::atomic<bool>& stop) {
   Slot& slot = process.slot(index);
   slot.stop = false;
   slot.where.x = slot.where.y = -1;
@@ -223,9 +234,10 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
       slot.stop = true;
       stop_since = now;
     }
-    const std::uint64_t place = slot.where.sample * 0x9e3779b97f4a7c15ULL ^
-                                (static_cast<std::uint64_t>(static_cast<std::uint32_t>(slot.where.x.load())) << 32 |
-                                 static_cast<std::uint32_t>(slot.where.y.load()));
+    const std::uint64_t place =
+        slot.where.sample * 0x9e3779b97f4a7c15ULL ^
+        (static_cast<std::uint64_t>(static_cast<std::uint32_t>(slot.where.x.load())) << 32 |
+         static_cast<std::uint32_t>(slot.where.y.load()));
     if (place != seen) {
       seen = place;
       since = now;

@@ -1,9 +1,10 @@
-// A RenderBackend whose renderer lives in a process of its own, so that a scene which crashes it, hangs it or eats all memory
-// costs a unit and not the worker. The child is this same executable, started with other arguments by posix_spawn.
+// A RenderBackend whose renderer lives in a process of its own, so that a scene which crashes it, hangs it or
+// eats all memory costs a unit and not the worker. The child is this same executable, started with other
+// arguments by posix_spawn.
 //
-// When the child dies, the unit at fault is the one whose thread received the signal or made no progress; units that other
-// threads held are rendered again by the next child without anybody noticing. If nobody knows who it was (SIGKILL: the
-// system was out of memory), all that were being rendered are reported.
+// When the child dies, the unit at fault is the one whose thread received the signal or made no progress;
+// units that other threads held are rendered again by the next child without anybody noticing. If nobody
+// knows who it was (SIGKILL: the system was out of memory), all that were being rendered are reported.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +20,8 @@ namespace ls::worker {
 
 struct ChildOptions {
   std::filesystem::path executable;
-  std::vector<std::string> arguments;  // that make it serve(): see worker/main.cpp
-  int slots = 1;                       // units rendered at once; the caller's threads
+  std::vector<std::string> arguments;                 // that make it serve(): see worker/main.cpp
+  int slots = 1;                                      // units rendered at once; the caller's threads
   Duration hang_limit = std::chrono::minutes(5);      // without finishing a sample
   Duration prepare_limit = std::chrono::minutes(60);  // to build one world
   Duration start_limit = std::chrono::minutes(2);     // until the child says hello (its numeric battery)

@@ -21,7 +21,9 @@ std::string to_text(const LocalJob& job) {
 Result<LocalJob> from_text(std::string_view text) {
   try {
     const nlohmann::json json = nlohmann::json::parse(text);
-    const auto digest = [](const nlohmann::json& hex) { return Digest::parse(hex.get<std::string>()).value(); };
+    const auto digest = [](const nlohmann::json& hex) {
+      return Digest::parse(hex.get<std::string>()).value();
+    };
     LocalJob job;
     job.brief.job = JobId{json.at("job")};
     job.brief.scene = digest(json.at("scene"));
@@ -30,8 +32,10 @@ Result<LocalJob> from_text(std::string_view text) {
     job.brief.settings = std::move(*settings);
     job.brief.settings_digest = digest_of(job.brief.settings);
     job.scene = json.at("scene_file").get<std::string>();
-    for (const auto& blob : json.at("blobs")) job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
-    for (const auto& [hex, path] : json.at("files").items()) job.assets[digest(hex)] = path.get<std::string>();
+    for (const auto& blob : json.at("blobs"))
+      job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
+    for (const auto& [hex, path] : json.at("files").items())
+      job.assets[digest(hex)] = path.get<std::string>();
     return job;
   } catch (const std::exception& e) {
     return fail(Errc::internal, std::string("a job that its own agent wrote cannot be read: ") + e.what());

@@ -20,7 +20,8 @@ namespace ls::worker::child {
 namespace {
 
 constexpr int kPollMs = 50;
-// Their ends are first moved above all the numbers that they will have in the child, so that no dup2 overwrites another.
+// Their ends are first moved above all the numbers that they will have in the child, so that no dup2
+// overwrites another.
 constexpr int kHighFd = kFirstSlotFd + kMostSlots + 1;
 
 int raised(int fd) {
@@ -30,7 +31,8 @@ int raised(int fd) {
 }
 
 tl::unexpected<Error> system_error(const char* what) {
-  return fail(Errc::internal, fmt::format("cannot start the render child: {}: {}", what, std::strerror(errno)));
+  return fail(Errc::internal,
+              fmt::format("cannot start the render child: {}: {}", what, std::strerror(errno)));
 }
 
 // The environment without secrets: the child has no use for the join token.
@@ -146,7 +148,8 @@ bool Process::alive() {
   const std::lock_guard lock(reap_mutex_);
   if (end_ || pid_ <= 0) return false;
   siginfo_t info{};
-  return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+  return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         info.si_pid == 0;
 }
 
 std::uint64_t Process::rss_bytes() const {
@@ -171,7 +174,8 @@ bool Process::readable(int fd) {
 
 std::optional<Process::Answer> Process::receive(int fd) {
   Answer answer;
-  if (!receive_all(fd, &answer.reply, sizeof answer.reply) || answer.reply.text_bytes > kTextBytes) return std::nullopt;
+  if (!receive_all(fd, &answer.reply, sizeof answer.reply) || answer.reply.text_bytes > kTextBytes)
+    return std::nullopt;
   answer.text.resize(answer.reply.text_bytes);
   if (!receive_all(fd, answer.text.data(), answer.text.size())) return std::nullopt;
   return answer;

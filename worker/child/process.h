@@ -33,7 +33,8 @@ class Process {
   template <class Watch>
   std::optional<Answer> ask(int fd, Request request, const std::string& text, Watch watch) {
     request.text_bytes = static_cast<std::uint32_t>(text.size());
-    if (!send_all(fd, &request, sizeof request) || !send_all(fd, text.data(), text.size())) return std::nullopt;
+    if (!send_all(fd, &request, sizeof request) || !send_all(fd, text.data(), text.size()))
+      return std::nullopt;
     while (!readable(fd)) watch();
     return receive(fd);
   }
@@ -55,10 +56,10 @@ class Process {
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  std::atomic<int> hung_slot{-1};          // the watchdog killed it for this one
-  std::atomic<bool> preparing{false};      // a world is being built
+  std::atomic<int> hung_slot{-1};      // the watchdog killed it for this one
+  std::atomic<bool> preparing{false};  // a world is being built
   std::mutex prepared_mutex;
-  std::set<std::uint64_t> prepared;        // jobs it knows; guarded by prepared_mutex
+  std::set<std::uint64_t> prepared;  // jobs it knows; guarded by prepared_mutex
 
  private:
   Process() = default;

@@ -1,5 +1,5 @@
-// What agent and render child say to each other: fixed-size frames over a socket pair for each channel, sums and breadcrumbs
-// through one shared memory. Both are the same executable, so plain structs do.
+// What agent and render child say to each other: fixed-size frames over a socket pair for each channel, sums
+// and breadcrumbs through one shared memory. Both are the same executable, so plain structs do.
 #pragma once
 
 #include <atomic>
@@ -21,8 +21,8 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = 256;
 
-inline constexpr std::size_t kTextBytes = 1 << 20;      // a prepared job as JSON; thousands of assets
-inline constexpr std::size_t kSlotPixels = 202 * 202;   // the largest tile whose partial fits a message
+inline constexpr std::size_t kTextBytes = 1 << 20;     // a prepared job as JSON; thousands of assets
+inline constexpr std::size_t kSlotPixels = 202 * 202;  // the largest tile whose partial fits a message
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
 
@@ -51,8 +51,8 @@ static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyabl
 struct Slot {
   render::Breadcrumb where;
   std::atomic<std::int32_t> tile{-1}, round{-1};
-  std::atomic<bool> stop{false};      // set by the parent
-  std::atomic<bool> crashed{false};   // set by the child's signal handler: this thread is the guilty one
+  std::atomic<bool> stop{false};     // set by the parent
+  std::atomic<bool> crashed{false};  // set by the child's signal handler: this thread is the guilty one
   float sums[kSlotPixels * 6];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);

@@ -28,7 +28,8 @@ constexpr std::size_t kAltStackBytes = 64 << 10;
 
 thread_local Slot* t_slot = nullptr;  // of this render thread, for the signal handler
 
-// Marks the guilty thread's slot, then dies of the same signal (SA_RESETHAND has put the default action back).
+// Marks the guilty thread's slot, then dies of the same signal (SA_RESETHAND has put the default action
+// back).
 extern "C" void on_fatal_signal(int signal) {
   if (t_slot) t_slot->crashed.store(true, std::memory_order_relaxed);
   ::raise(signal);
@@ -173,7 +174,8 @@ void confine(std::uint64_t memory_limit) {
   ::setrlimit(RLIMIT_CORE, &no_core);
   // A terminal's Ctrl-C goes to the agent alone; it decides.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadow memory is larger than any limit
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // their shadow memory is larger than any limit
   if (memory_limit > 0) {
     const rlimit data{memory_limit, memory_limit};
     ::setrlimit(RLIMIT_DATA, &data);

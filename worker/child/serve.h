@@ -7,8 +7,9 @@
 
 namespace ls::worker::child {
 
-// Call first thing in the child, before any thread: no new privileges, no core files, the memory limit (bytes of private
-// writable memory; 0: none), signals. The file descriptors of child/protocol.h must be open and no others.
+// Call first thing in the child, before any thread: no new privileges, no core files, the memory limit (bytes
+// of private writable memory; 0: none), signals. The file descriptors of child/protocol.h must be open and no
+// others.
 void confine(std::uint64_t memory_limit);
 
 // Returns the exit code; normally ends the process itself when the agent is gone.

@@ -40,7 +40,9 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
 class GrpcLink final : public CoordinatorLink {
  public:
   GrpcLink(const std::string& address, std::string join_token)
-      : join_token_(std::move(join_token)), channel_(make_channel(address)), stub_(pb::Farm::NewStub(channel_)) {}
+      : join_token_(std::move(join_token)),
+        channel_(make_channel(address)),
+        stub_(pb::Farm::NewStub(channel_)) {}
   ~GrpcLink() override { close(); }
 
   Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) override {

@@ -8,7 +8,8 @@
 
 namespace ls::worker {
 
-// `address` is "host:port". `join_token` goes with blob fetches (the hello has its own). Nothing is connected yet.
+// `address` is "host:port". `join_token` goes with blob fetches (the hello has its own). Nothing is connected
+// yet.
 std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token);
 
 }  // namespace ls::worker

@@ -1,5 +1,5 @@
-// One stream to the coordinator: an unbounded-in-name queue out (the agent's outbox bounds it), messages in to the observer.
-// Kept alive by itself from StartCall to OnDone, so that the link may drop it at any time.
+// One stream to the coordinator: an unbounded-in-name queue out (the agent's outbox bounds it), messages in
+// to the observer. Kept alive by itself from StartCall to OnDone, so that the link may drop it at any time.
 #pragma once
 
 #include <condition_variable>
@@ -13,13 +13,15 @@
 
 namespace ls::worker {
 
-class WorkCall final : public grpc::ClientBidiReactor<lightshaft::farm::v1::FromWorker, lightshaft::farm::v1::ToWorker> {
+class WorkCall final
+    : public grpc::ClientBidiReactor<lightshaft::farm::v1::FromWorker, lightshaft::farm::v1::ToWorker> {
  public:
   static std::shared_ptr<WorkCall> start(lightshaft::farm::v1::Farm::Stub& stub, const WorkerHello& hello,
                                          std::shared_ptr<LinkObserver> observer);
 
   void send(const FromWorker& message);
-  // Sends what is queued, ends the stream and waits for that, at most this long; then cuts it. Not from a reaction.
+  // Sends what is queued, ends the stream and waits for that, at most this long; then cuts it. Not from a
+  // reaction.
   void close(Duration at_most);
 
   void OnReadDone(bool ok) override;

@@ -27,7 +27,7 @@ class FakeBackend final : public LocalBackend {
  public:
   explicit FakeBackend(FakeOptions options) : options_(options) {}
 
-  Digest numeric_class() const override { return fake_numeric_class(); }
+  Digest numeric_class() const override { return options_.numeric_class; }
   tl::expected<void, UnitFailure> prepare(const LocalJob&) override { return {}; }
   void forget(const JobId&) override {}
   std::uint64_t rss_bytes() const override { return 0; }
@@ -46,7 +46,8 @@ class FakeBackend final : public LocalBackend {
     if (faulty) misbehave(stop);
     if (!pause(stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
-    out.partial = fake_partial({brief.scene, brief.settings_digest, fake_numeric_class(), unit.rect, unit.samples});
+    out.partial =
+        fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples});
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
     out.cpu_seconds = thread_cpu_seconds() - start;
     return out;
@@ -58,7 +59,8 @@ class FakeBackend final : public LocalBackend {
     const auto is = [](std::int64_t wanted, std::uint64_t value) {
       return wanted < 0 || static_cast<std::uint64_t>(wanted) == value;
     };
-    return f.kind != FakeFault::Kind::none && is(f.seed, seed) && is(f.tile, unit.tile) && is(f.round, unit.round);
+    return f.kind != FakeFault::Kind::none && is(f.seed, seed) && is(f.tile, unit.tile) &&
+           is(f.round, unit.round);
   }
 
   static void misbehave_with_memory() {
@@ -68,13 +70,18 @@ class FakeBackend final : public LocalBackend {
 
   void misbehave(const std::atomic<bool>& stop) {
     switch (options_.fault.kind) {
-      case FakeFault::Kind::crash: ::raise(SIGSEGV); break;
-      case FakeFault::Kind::memory: misbehave_with_memory(); break;
+      case FakeFault::Kind::crash:
+        ::raise(SIGSEGV);
+        break;
+      case FakeFault::Kind::memory:
+        misbehave_with_memory();
+        break;
       case FakeFault::Kind::hang:
         while (!stop) ::usleep(1000);
         break;
       case FakeFault::Kind::wrong:
-      case FakeFault::Kind::none: break;
+      case FakeFault::Kind::none:
+        break;
     }
   }
 
@@ -93,29 +100,43 @@ class FakeBackend final : public LocalBackend {
 
 Digest fake_numeric_class() { return sha256(std::string_view("fake")); }
 
-std::unique_ptr<LocalBackend> make_fake_backend(FakeOptions options) { return std::make_unique<FakeBackend>(options); }
+std::unique_ptr<LocalBackend> make_fake_backend(FakeOptions options) {
+  return std::make_unique<FakeBackend>(options);
+}
 
 Result<FakeFault> parse_fake_fault(std::string_view text) {
   FakeFault fault;
   if (text.empty()) return fault;
   std::size_t end = std::min(text.find(','), text.size());
   const std::string_view kind = text.substr(0, end);
-  if (kind == "crash") fault.kind = FakeFault::Kind::crash;
-  else if (kind == "hang") fault.kind = FakeFault::Kind::hang;
-  else if (kind == "memory") fault.kind = FakeFault::Kind::memory;
-  else if (kind == "wrong") fault.kind = FakeFault::Kind::wrong;
-  else return fail(Errc::invalid_argument, fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong", kind));
+  if (kind == "crash")
+    fault.kind = FakeFault::Kind::crash;
+  else if (kind == "hang")
+    fault.kind = FakeFault::Kind::hang;
+  else if (kind == "memory")
+    fault.kind = FakeFault::Kind::memory;
+  else if (kind == "wrong")
+    fault.kind = FakeFault::Kind::wrong;
+  else
+    return fail(Errc::invalid_argument,
+                fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong", kind));
   while (end < text.size()) {
     const std::size_t begin = end + 1;
     end = std::min(text.find(',', begin), text.size());
     const std::string_view item = text.substr(begin, end - begin);
     const std::size_t eq = item.find('=');
     const std::string_view name = item.substr(0, eq);
-    std::int64_t* field = name == "seed" ? &fault.seed : name == "tile" ? &fault.tile : name == "round" ? &fault.round : nullptr;
+    std::int64_t* field = name == "seed"    ? &fault.seed
+                          : name == "tile"  ? &fault.tile
+                          : name == "round" ? &fault.round
+                                            : nullptr;
     const std::string_view value = eq == std::string_view::npos ? std::string_view() : item.substr(eq + 1);
-    if (!field || std::from_chars(value.data(), value.data() + value.size(), *field).ptr != value.data() + value.size() ||
+    if (!field ||
+        std::from_chars(value.data(), value.data() + value.size(), *field).ptr !=
+            value.data() + value.size() ||
         value.empty())
-      return fail(Errc::invalid_argument, fmt::format("'{}' is not seed=, tile= or round= with a number", item));
+      return fail(Errc::invalid_argument,
+                  fmt::format("'{}' is not seed=, tile= or round= with a number", item));
   }
   return fault;
 }

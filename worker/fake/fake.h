@@ -1,5 +1,6 @@
-// The fake renderer: every unit is a pure function of its job's seed, its pixels and its samples (common/image/fake_pixels.h).
-// It opens no scene file. For tests of everything but rendering, and for load tests of a farm.
+// The fake renderer: every unit is a pure function of its job's seed, its pixels and its samples
+// (common/image/fake_pixels.h). It opens no scene file. For tests of everything but rendering, and for load
+// tests of a farm.
 #pragma once
 
 #include <memory>
@@ -21,12 +22,14 @@ struct FakeFault {
 // "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong; empty: none.
 Result<FakeFault> parse_fake_fault(std::string_view text);
 
+Digest fake_numeric_class();  // SHA-256 of "fake"
+
 struct FakeOptions {
   Duration delay{};  // of each unit
   FakeFault fault;
+  Digest numeric_class = fake_numeric_class();  // another one, to stand for another kind of machine
 };
 
-Digest fake_numeric_class();  // SHA-256 of "fake"
 std::unique_ptr<LocalBackend> make_fake_backend(FakeOptions options);
 
 }  // namespace ls::worker

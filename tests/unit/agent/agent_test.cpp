@@ -34,7 +34,8 @@ class FetchedFiles final : public BlobFiles {
       const std::filesystem::path& path() const override { return file; }
       std::filesystem::path file = "blob";
     };
-    const auto ok = link_.fetch_blob(blob.digest, 0, [](std::span<const std::byte>) { return Result<void>{}; });
+    const auto ok =
+        link_.fetch_blob(blob.digest, 0, [](std::span<const std::byte>) { return Result<void>{}; });
     if (!ok) return tl::unexpected<Error>(ok.error());
     return std::make_shared<const File>();
   }
@@ -57,8 +58,7 @@ AssignLease assign(const char* lease, const char* job, std::vector<TileIndex> ti
   const RenderSettings s = settings(seed);
   AssignLease a;
   a.lease = {LeaseId{lease}, JobId{job}, {}};
-  for (const TileIndex t : tiles)
-    a.lease.units.push_back({t, 0, TileGrid{s.size, s.tile}.rect(t), {0, 2}});
+  for (const TileIndex t : tiles) a.lease.units.push_back({t, 0, TileGrid{s.size, s.tile}.rect(t), {0, 2}});
   a.brief = JobBrief{JobId{job}, sha256(std::string_view("scene")), s, digest_of(s), {}};
   return a;
 }
@@ -128,7 +128,8 @@ TEST_F(AgentTest, RendersEveryUnitToTheRightBitsOnAnyNumberOfThreads) {
     const std::uint64_t seed = r.unit.job.value == "j-1" ? 1 : 2;
     const RenderSettings s = settings(seed);
     const PixelRect rect = TileGrid{s.size, s.tile}.rect(r.unit.tile);
-    const UnitHeader header{sha256(std::string_view("scene")), digest_of(s), fake_numeric_class(), rect, {0, 2}};
+    const UnitHeader header{
+        sha256(std::string_view("scene")), digest_of(s), fake_numeric_class(), rect, {0, 2}};
     const auto partial = decode_partial(r.exr, header, s.size);
     ASSERT_TRUE(partial) << partial.error().message;
     EXPECT_EQ(*partial, fake_partial(header));
@@ -304,7 +305,8 @@ TEST_F(AgentTest, ReturnsALeaseOfAJobThatItWasNotToldAbout) {
 
   coordinator_.tell(a);
 
-  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1 && c.returned[0].unrendered.size() == 2; });
+  coordinator_.wait_for(
+      [](auto& c) { return c.returned.size() == 1 && c.returned[0].unrendered.size() == 2; });
   EXPECT_TRUE(drain());
 }
 
@@ -314,7 +316,8 @@ TEST_F(AgentTest, NamesItsLeasesOnceASecondWhileItWorks) {
 
   wait_while_time_passes([](auto& c) {
     return std::count_if(c.progress.begin(), c.progress.end(), [](const WorkerProgress& p) {
-             return p.leases == std::vector<WorkerProgress::Entry>{{LeaseId{"l-1"}, 0}} && p.activity == "rendering";
+             return p.leases == std::vector<WorkerProgress::Entry>{{LeaseId{"l-1"}, 0}} &&
+                    p.activity == "rendering";
            }) >= 3;
   });
 }

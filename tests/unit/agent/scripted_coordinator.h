@@ -1,4 +1,5 @@
-// A coordinator in this process for tests of the agent: keeps what the worker said, answers as told. No clock, no sockets.
+// A coordinator in this process for tests of the agent: keeps what the worker said, answers as told. No
+// clock, no sockets.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,11 +18,21 @@ namespace ls::worker {
 class ScriptedCoordinator final : public CoordinatorLink {
  public:
   // ---- what it does; set before or while the agent runs ----
-  void acknowledge_results(bool on) { change([&] { acknowledge_ = on; }); }
-  void refuse_connections(bool on) { change([&] { refuse_ = on; }); }
-  void answer_hello_with(ToWorker message) { change([&] { greeting_ = std::move(message); }); }
-  void add_blob(const std::string& text) { change([&] { blobs_[sha256(std::string_view(text))] = text; }); }
-  void cut_next_fetch() { change([&] { cut_fetch_ = true; }); }
+  void acknowledge_results(bool on) {
+    change([&] { acknowledge_ = on; });
+  }
+  void refuse_connections(bool on) {
+    change([&] { refuse_ = on; });
+  }
+  void answer_hello_with(ToWorker message) {
+    change([&] { greeting_ = std::move(message); });
+  }
+  void add_blob(const std::string& text) {
+    change([&] { blobs_[sha256(std::string_view(text))] = text; });
+  }
+  void cut_next_fetch() {
+    change([&] { cut_fetch_ = true; });
+  }
   void tell(ToWorker message) {
     if (const auto to = observer()) to->received(std::move(message));
   }
@@ -51,7 +62,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
       changed_.wait_for(lock, std::chrono::milliseconds(2), [&] { return condition(*this); });
     }
   }
-  std::vector<WorkerHello> hellos;          // guarded by the mutex: read them in wait_for or after the agent's end
+  std::vector<WorkerHello> hellos;  // guarded by the mutex: read them in wait_for or after the agent's end
   std::vector<UnitResult> results;
   std::vector<UnitFailure> failures;
   std::vector<LeaseReturned> returned;

@@ -24,9 +24,9 @@ std::string content(const fs::path& path) {
 // A coordinator's blobs, in small pieces; counts what it was asked.
 struct Source {
   std::map<Digest, std::string> blobs;
-  std::vector<std::uint64_t> offsets;            // of each fetch
-  std::optional<std::uint64_t> cut_after;        // bytes, once
-  std::optional<std::string> lie;                // sent instead, once
+  std::vector<std::uint64_t> offsets;      // of each fetch
+  std::optional<std::uint64_t> cut_after;  // bytes, once
+  std::optional<std::string> lie;          // sent instead, once
 
   BlobRef add(const std::string& text) {
     const Digest digest = sha256(std::string_view(text));
@@ -42,7 +42,8 @@ struct Source {
         cut_after.reset();
         return fail(Errc::unavailable, "cut");
       }
-      if (auto ok = sink(bytes_of(text).subspan(at, std::min<std::size_t>(7, text.size() - at))); !ok) return ok;
+      if (auto ok = sink(bytes_of(text).subspan(at, std::min<std::size_t>(7, text.size() - at))); !ok)
+        return ok;
     }
     return {};
   }
@@ -56,9 +57,10 @@ class Cache : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   std::unique_ptr<BlobCache> open(std::uint64_t limit = 0) {
-    auto cache = BlobCache::open(folder_, limit, [this](const Digest& d, std::uint64_t o, const BlobCache::Sink& s) {
-      return source_.fetch(d, o, s);
-    });
+    auto cache =
+        BlobCache::open(folder_, limit, [this](const Digest& d, std::uint64_t o, const BlobCache::Sink& s) {
+          return source_.fetch(d, o, s);
+        });
     return std::move(cache.value());
   }
   Source source_;

@@ -44,7 +44,8 @@ std::unique_ptr<RenderBackend> backend(const std::string& fault, int slots = 1,
   return std::move(*made);
 }
 
-void expect_right_pixels(const tl::expected<RenderedUnit, UnitFailure>& result, std::uint64_t seed, TileIndex tile) {
+void expect_right_pixels(const tl::expected<RenderedUnit, UnitFailure>& result, std::uint64_t seed,
+                         TileIndex tile) {
   ASSERT_TRUE(result) << result.error().reason;
   const JobBrief brief = job_with_seed(seed).brief;
   const LeaseUnit u = unit(tile);
@@ -60,7 +61,8 @@ TEST(Child, GivesTheSameBitsAsTheRendererInProcess) {
   const LocalJob job = job_with_seed(3);
 
   EXPECT_EQ(child->numeric_class(), fake_numeric_class());
-  EXPECT_EQ(child->render(job, unit(0), kGoOn).value().partial, direct->render(job, unit(0), kGoOn).value().partial);
+  EXPECT_EQ(child->render(job, unit(0), kGoOn).value().partial,
+            direct->render(job, unit(0), kGoOn).value().partial);
 }
 
 TEST(Child, NamesSignalPixelAndSampleOfACrash) {

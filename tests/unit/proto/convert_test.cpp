@@ -26,16 +26,27 @@ RenderSettings settings() {
 
 AssignLease assignment() {
   const RenderSettings s = settings();
-  JobBrief brief{JobId{"j-1"}, digest_of_text("scene"), s, digest_of(s), {{digest_of_text("grid"), 12, "steam.vdb"}}};
-  Lease lease{LeaseId{"l-1"}, JobId{"j-1"}, {{3, 2, {0, 32, 32, 64}, {4, 8}}, {4, 2, {32, 32, 64, 64}, {4, 8}}}};
+  JobBrief brief{
+      JobId{"j-1"}, digest_of_text("scene"), s, digest_of(s), {{digest_of_text("grid"), 12, "steam.vdb"}}};
+  Lease lease{
+      LeaseId{"l-1"}, JobId{"j-1"}, {{3, 2, {0, 32, 32, 64}, {4, 8}}, {4, 2, {32, 32, 64, 64}, {4, 8}}}};
   return {lease, brief};
 }
 
 const std::vector<FromWorker> kFromWorker = {
-    WorkerHello{kProtocolVersion, "n", "b", digest_of_text("class"), 4, 1 << 30, {"gpu", "big"}, {digest_of_text("held")},
-                "token", WorkerId{"w-9"}},
+    WorkerHello{kProtocolVersion,
+                "n",
+                "b",
+                digest_of_text("class"),
+                4,
+                1 << 30,
+                {"gpu", "big"},
+                {digest_of_text("held")},
+                "token",
+                WorkerId{"w-9"}},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
-    UnitResult{{JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, {1, 2, 3}},
+    UnitResult{
+        {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, {1, 2, 3}},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, true, "why", 11, std::pair{3, 4}, 99},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, false, "why", {}, {}, {}},
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}},
@@ -89,16 +100,29 @@ const Damage kDamages[] = {
     {"hello.threads", [](pb::FromWorker& m) { m.mutable_hello()->set_threads(1 << 20); }, 0},
     {"hello.name", [](pb::FromWorker& m) { m.mutable_hello()->clear_name(); }, 0},
     {"hello.name", [](pb::FromWorker& m) { m.mutable_hello()->set_name(std::string(5000, 'x')); }, 0},
-    {"hello.tags", [](pb::FromWorker& m) { for (int i = 0; i < 100; ++i) m.mutable_hello()->add_tags("t"); }, 0},
+    {"hello.tags",
+     [](pb::FromWorker& m) {
+       for (int i = 0; i < 100; ++i) m.mutable_hello()->add_tags("t");
+     },
+     0},
     {"hello.blobs_held", [](pb::FromWorker& m) { m.mutable_hello()->add_blobs_held("x"); }, 0},
     {"hello.previous_id", [](pb::FromWorker& m) { m.mutable_hello()->set_previous_id("a\nb"); }, 0},
-    {"progress.leases", [](pb::FromWorker& m) { for (int i = 0; i < 2000; ++i) m.mutable_progress()->add_leases(); }, 1},
-    {"progress.cpu_seconds_total", [](pb::FromWorker& m) { m.mutable_progress()->set_cpu_seconds_total(-1); }, 1},
+    {"progress.leases",
+     [](pb::FromWorker& m) {
+       for (int i = 0; i < 2000; ++i) m.mutable_progress()->add_leases();
+     },
+     1},
+    {"progress.cpu_seconds_total", [](pb::FromWorker& m) { m.mutable_progress()->set_cpu_seconds_total(-1); },
+     1},
     {"progress.load_seconds",
-     [](pb::FromWorker& m) { m.mutable_progress()->set_load_seconds(std::numeric_limits<double>::quiet_NaN()); }, 1},
+     [](pb::FromWorker& m) {
+       m.mutable_progress()->set_load_seconds(std::numeric_limits<double>::quiet_NaN());
+     },
+     1},
     {"result.digest", [](pb::FromWorker& m) { m.mutable_result()->set_digest(std::string(33, 'x')); }, 2},
     {"result.exr", [](pb::FromWorker& m) { m.mutable_result()->clear_exr(); }, 2},
-    {"result.exr", [](pb::FromWorker& m) { m.mutable_result()->set_exr(std::string(limits::kPartialBytes + 1, 'x')); }, 2},
+    {"result.exr",
+     [](pb::FromWorker& m) { m.mutable_result()->set_exr(std::string(limits::kPartialBytes + 1, 'x')); }, 2},
     {"unit.job", [](pb::FromWorker& m) { m.mutable_result()->clear_unit(); }, 2},
     {"failure.reason", [](pb::FromWorker& m) { m.mutable_failure()->set_reason(std::string(9000, 'x')); }, 3},
     {"returned.lease", [](pb::FromWorker& m) { m.mutable_returned()->set_lease(std::string(65, 'x')); }, 5},
@@ -143,7 +167,8 @@ TEST(Convert, RefusesABriefOfAnotherJob) {
 
 TEST(Convert, KeepsEveryMessageWithinTheLimitAtItsLargest) {
   AssignLease lease = assignment();
-  lease.lease.units.assign(limits::kUnitsPerLease, {~0U, ~0U, {131000, 131000, 131072, 131072}, {1ULL << 39, 1ULL << 40}});
+  lease.lease.units.assign(limits::kUnitsPerLease,
+                           {~0U, ~0U, {131000, 131000, 131072, 131072}, {1ULL << 39, 1ULL << 40}});
   lease.brief->assets.assign(limits::kAssetsPerJob, {digest_of_text("x"), ~0ULL, std::string(4000, 'n')});
   WorkerHello hello = std::get<WorkerHello>(kFromWorker[0]);
   hello.blobs_held.assign(limits::kBlobsHeld, digest_of_text("x"));
@@ -161,7 +186,8 @@ TEST(Convert, SurvivesRandomlyDamagedBytes) {
   for (int i = 0; i < 20000; ++i) {
     std::string bytes = i % 2 ? to_wire(kFromWorker[i / 2 % kFromWorker.size()]).SerializeAsString()
                               : to_wire(kToWorker[i / 2 % kToWorker.size()]).SerializeAsString();
-    for (int k = 0; k < 3 && !bytes.empty(); ++k) bytes[random() % bytes.size()] = static_cast<char>(random());
+    for (int k = 0; k < 3 && !bytes.empty(); ++k)
+      bytes[random() % bytes.size()] = static_cast<char>(random());
     pb::FromWorker from;
     pb::ToWorker to;
     // Whatever is accepted must be within the limits: it converts back to the same value.
