@@ -44,7 +44,7 @@ fi
 
 started=$SECONDS
 deploy/install-deps.sh
-echo "building (log: build/demo/build.log)"
+echo "building, which takes minutes (log: build/demo/build.log)"
 mkdir -p "$home"
 if ! { cmake --preset release -DLIGHTSHAFT_TESTS=OFF && cmake --build --preset release --target lightshaft lightshaft-coordinator lightshaft-worker; } >"$home/build.log" 2>&1; then
   tail -n 40 "$home/build.log" >&2
@@ -99,7 +99,9 @@ dashboard:  $url/#token=$token
 EOF
 if [ "$detach" = 1 ]; then
   echo "the farm goes on; end it with: deploy/demo.sh --stop"
-elif [ -t 1 ]; then
+elif [ ! -t 1 ]; then
+  echo "without a terminal the farm ends now; deploy/demo.sh --detach leaves it running, with its dashboard"
+else
   echo "the farm runs until Ctrl-C"
   trap 'exit 0' INT TERM
   while kill -0 "$coordinator" 2>/dev/null; do sleep 1; done
