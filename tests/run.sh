@@ -86,7 +86,7 @@ else
   run_ctest asan unit unit-asan
   LIGHTSHAFT_BIN="$PWD/build/asan/bin" run_pytest farm-asan tests/system -m sanitized
   say "ThreadSanitizer"
-  build tsan
+  build tsan agent_test domain_test service_test store_test
   run_ctest tsan tsan threads-tsan
 fi
 
