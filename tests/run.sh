@@ -28,10 +28,10 @@ build() {  # preset, targets...
   cmake --build --preset "$preset" ${1:+--target "$@"} >"$logs/build-$preset.log" 2>&1 || { grep -nE 'error|FAILED' -A 12 "$logs/build-$preset.log" | head -n 80; give_up "the '$preset' build failed"; }
 }
 
-# Each GoogleTest case counts: the binaries are run one by one and their own summaries added up.
+# Each GoogleTest case counts: the binaries' own summaries are added up. (--output-on-failure would print failing ones twice.)
 run_ctest() {  # preset, label, log name
   local log="$logs/$3.log"
-  ctest --preset "$1" -L "$2" --output-on-failure --verbose >"$log" 2>&1
+  ctest --preset "$1" -L "$2" --verbose >"$log" 2>&1
   local rc=$?
   # ctest -V prefixes lines with the test's number.
   local p f s

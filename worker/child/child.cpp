@@ -22,8 +22,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// A unit that is innocent of so many deaths in a row is not tried in this worker any more.
-constexpr int kInnocentDeaths = 5;
+// A unit that is innocent of so many deaths in a row is not tried in this worker any more. Each such death
+// fails another unit, and the farm gives a worker no more of a job after three: an innocent one must not run
+// out before the guilty do.
+constexpr int kInnocentDeaths = 64;
 constexpr Duration kStopLimit = std::chrono::seconds(10);  // from the stop flag to its obedience
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
