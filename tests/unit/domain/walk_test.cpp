@@ -3,7 +3,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Sanitizers make a step ten to fifty times dearer and look for other faults than wrong decisions: fewer histories do.
+// Sanitizers make a step ten to fifty times dearer and look for other faults than wrong decisions: fewer
+// histories do.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr std::uint64_t kShort = 60, kLong = 2;
 #else
