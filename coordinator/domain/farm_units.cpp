@@ -56,13 +56,15 @@ void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
   effects.emplace_back(DigestMismatch{event.unit, first_digest, event.digest, first_worker, event.worker});
   if (job.ended()) return;
   fail(job,
-       fmt::format(
-           "two workers rendered tile {} round {} to different bits though they are of one numeric class: {} "
-           "to "
-           "{}, {} to {}. One of them has bad memory or is not what it says; find out which with `lightshaft "
-           "verify`, take it off the farm and submit the job again",
-           event.unit.tile, event.unit.round, first_worker.value, first_digest.hex(), event.worker.value,
-           event.digest.hex()),
+       fmt::format("two workers rendered tile {} round {} to different bits though they are of one numeric "
+                   "class: {} to "
+                   "{}, {} to {}. One of them has bad memory or is not what it says: let each render the "
+                   "scene alone with "
+                   "`lightshaft render`, take the one whose pixels_sha256 is not the others' off the farm, "
+                   "and submit the "
+                   "job again",
+                   event.unit.tile, event.unit.round, first_worker.value, first_digest.hex(),
+                   event.worker.value, event.digest.hex()),
        std::nullopt);
 }
 
