@@ -66,6 +66,20 @@ bool complete_triangle(const Geometry& g, std::uint32_t i, const V3& o, const V3
   return true;
 }
 
+// A unit direction from the centre in the sphere's own axes: the z axis through its poles.
+V3d local_direction(const Sphere& s, const V3d& n) {
+  const auto* r = s.to_local;
+  return {r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
+          r[6] * n.x + r[7] * n.y + r[8] * n.z};
+}
+
+V2 uv_of(const V3d& local) {
+  double angle = std::atan2(local.y, local.x);
+  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  return {static_cast<float>(angle) * kInvTwoPi,
+          static_cast<float>(std::acos(std::clamp(local.z, -1., 1.))) * kInvPi};
+}
+
 bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
   const Sphere& s = g.spheres[i];
   const double t = intersect(s, V3d(o), V3d(d), 0, kInf);
@@ -80,12 +94,8 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& 
   const float sign = g.surfaces[s.surface].orientation;
   hit.ng = V3(n) * sign;
   const auto* r = s.to_local;
-  const V3d q(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
-              r[6] * n.x + r[7] * n.y + r[8] * n.z);
-  double angle = std::atan2(q.y, q.x);
-  if (angle < 0) angle += 2 * 3.14159265358979323846;
-  hit.uv = {static_cast<float>(angle) * kInvTwoPi,
-            static_cast<float>(std::acos(std::clamp(q.z, -1., 1.))) * kInvPi};
+  const V3d q = local_direction(s, n);
+  hit.uv = uv_of(q);
   // Tangent along increasing azimuth about the local z axis.
   const V3d dpdu(-q.y * r[0] + q.x * r[3], -q.y * r[1] + q.x * r[4], -q.y * r[2] + q.x * r[5]);
   hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
@@ -117,6 +127,8 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3& o, const V3& d,
 }
 
 }  // namespace
+
+V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
   hit.primitive = id;

@@ -92,6 +92,9 @@ class Geometry {
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max);
 
+// Azimuth and polar angle, each over its range, of a unit direction from the sphere's centre.
+V2 sphere_uv(const Sphere& s, const V3d& n);
+
 // Moves a point off the surface to the side that `w` leaves to. In the unit-size world positions are good to
 // a few units in the last place of 1 (6e-8), and so are the BVH's distances perpendicular to a surface: 2^-20
 // = 16 of them.
