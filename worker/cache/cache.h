@@ -2,9 +2,10 @@
 //
 // A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone
 // on with. A file that no longer has its digest (bad disk, meddling) is found when it is first used by this
-// process, thrown away and fetched again. Above the limit the least recently used blobs go first, never one
-// in use: the file is held by a shared flock while a BlobFile lives, also against other workers that use the
-// same folder.
+// process, thrown away and fetched again. Above the limit, which counts what is on its way too, the least
+// recently used go first, never one in use: the file is held by a shared flock while a BlobFile lives, also
+// against other workers that use the same folder. Only files of the cache's own names at their own places are
+// ever removed; CACHEDIR.TAG tells backups to pass by.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +20,8 @@
 #include "worker/agent/blob_files.h"
 
 namespace ls::worker {
+
+class PartialFile;
 
 class BlobCache final : public BlobFiles {
  public:
@@ -35,10 +38,11 @@ class BlobCache final : public BlobFiles {
 
  private:
   BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
-  std::filesystem::path path_of(const Digest& digest) const;
-  std::shared_ptr<const BlobFile> open_verified(const Digest& digest);
+  Result<std::shared_ptr<const BlobFile>> open_verified(const Digest& digest);
   Result<void> download(const BlobRef& blob);
-  Result<void> make_room(std::uint64_t bytes);
+  Result<void> receive(const BlobRef& blob, PartialFile& partial);
+  // Until `bytes` fit beside everything but the file `but`.
+  Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;

@@ -6,9 +6,13 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 #include <vector>
+
+#include "worker/cache/stored.h"
 
 namespace ls::worker {
 namespace {
@@ -26,17 +30,27 @@ tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::p
 }  // namespace
 
 Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
-  std::filesystem::path mine = path;
-  int fd = ::open(mine.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-  if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    ::close(fd);
-    mine += fmt::format(".{}", ::getpid());
-    fd = ::open(mine.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (fd >= 0) ::flock(fd, LOCK_EX | LOCK_NB);
-  }
-  if (fd < 0) return io_error("cannot write", mine);
-  PartialFile file(std::move(mine), fd);
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (fd < 0) return io_error("cannot write", path);
+  PartialFile file(path, fd);
+  // Taken by another process, which may have moved it to its final place by now: not to be written into.
+  const Lock lock = lock_at(fd, path, LOCK_EX);
+  if (lock == Lock::failed) return io_error("cannot lock", path);
+  if (lock == Lock::lost) return open_own(path);
   if (auto ok = file.read_existing(); !ok) return tl::unexpected<Error>(ok.error());
+  return file;
+}
+
+// Not named by the process id: workers in several containers may share the folder, and their ids.
+Result<PartialFile> PartialFile::open_own(const std::filesystem::path& path) {
+  std::string name = path.string() + ".XXXXXX";
+  const int fd = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd < 0) return io_error("cannot write", name);
+  PartialFile file(name, fd);
+  const Lock lock = lock_at(fd, name, LOCK_EX);
+  if (lock == Lock::failed) return io_error("cannot lock", name);
+  if (lock == Lock::lost)
+    return fail(Errc::unavailable, "another worker has cleaned up the cache folder just now");
   return file;
 }
 
@@ -75,7 +89,7 @@ Result<void> PartialFile::append(std::span<const std::byte> bytes) {
   return {};
 }
 
-Result<void> PartialFile::finish(const Digest& expected, const std::filesystem::path& place) {
+Result<bool> PartialFile::finish(const Digest& expected, const std::filesystem::path& place) {
   const Digest got = hash_.finish();
   if (got != expected) {
     discard();
@@ -84,9 +98,15 @@ Result<void> PartialFile::finish(const Digest& expected, const std::filesystem::
   }
   std::error_code error;
   std::filesystem::create_directories(place.parent_path(), error);
-  if (::fdatasync(fd_) != 0 || ::rename(path_.c_str(), place.c_str()) != 0)
-    return io_error("cannot store", place);
-  return {};
+  if (::fdatasync(fd_) != 0) return io_error("cannot store", place);
+  if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, place.c_str(), RENAME_NOREPLACE) == 0) return true;
+  if (errno == EEXIST) {  // another worker was faster
+    discard();
+    return false;
+  }
+  // A file system that knows no such rename.
+  if (errno == EINVAL && ::rename(path_.c_str(), place.c_str()) == 0) return true;
+  return io_error("cannot store", place);
 }
 
 void PartialFile::discard() { ::unlink(path_.c_str()); }

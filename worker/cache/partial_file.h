@@ -1,6 +1,9 @@
 // A blob on its way: bytes appended to a file of their own while their digest is computed; goes on from what
 // an earlier attempt left. The file is locked, so that two workers on one folder do not write into each
 // other's.
+//
+// Errors: resource_exhausted if the disk is full, internal if this machine cannot write or read for another
+// reason.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +25,17 @@ class PartialFile {
   PartialFile& operator=(PartialFile&&) = delete;
   ~PartialFile();
 
+  const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
-  Result<void> append(std::span<const std::byte> bytes);  // resource_exhausted: the disk is full
-  // Verifies, syncs and moves the file to its final place. invalid_argument: other bytes than promised; the
-  // file is removed.
-  Result<void> finish(const Digest& expected, const std::filesystem::path& place);
+  Result<void> append(std::span<const std::byte> bytes);
+  // Verifies, syncs and moves the file to its final place; false: what is there already stays, somebody may
+  // have it in use. invalid_argument: other bytes than promised; the file is removed.
+  Result<bool> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();
 
  private:
   PartialFile(std::filesystem::path path, int fd) : path_(std::move(path)), fd_(fd) {}
+  static Result<PartialFile> open_own(const std::filesystem::path& path);
   Result<void> read_existing();
 
   std::filesystem::path path_;

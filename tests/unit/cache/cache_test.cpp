@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <string>
@@ -27,6 +28,7 @@ struct Source {
   std::vector<std::uint64_t> offsets;      // of each fetch
   std::optional<std::uint64_t> cut_after;  // bytes, once
   std::optional<std::string> lie;          // sent instead, once
+  std::function<void()> meanwhile;         // before the first byte, once
 
   BlobRef add(const std::string& text) {
     const Digest digest = sha256(std::string_view(text));
@@ -35,6 +37,7 @@ struct Source {
   }
   Result<void> fetch(const Digest& digest, std::uint64_t offset, const BlobCache::Sink& sink) {
     offsets.push_back(offset);
+    if (const auto happens = std::exchange(meanwhile, {})) happens();
     if (!blobs.contains(digest)) return fail(Errc::not_found, "no such blob");
     const std::string text = lie ? *std::exchange(lie, {}) : blobs[digest];
     for (std::uint64_t at = offset; at < text.size(); at += 7) {
@@ -135,6 +138,106 @@ TEST_F(Cache, RefusesWhatDoesNotFitBesideWhatIsInUse) {
 
   EXPECT_EQ(second.error().code, Errc::resource_exhausted);
   EXPECT_THAT(second.error().message, testing::HasSubstr("--cache-limit"));
+}
+
+TEST_F(Cache, RemovesNothingButItsOwnFiles) {
+  const std::string digest = sha256(std::string_view("a thesis")).hex();
+  const std::vector<fs::path> foreign = {folder_ / digest, folder_ / "kept" / digest,
+                                         folder_ / "00" / "kept" / digest, folder_ / "partial" / "notes"};
+  for (const fs::path& file : foreign) {
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << std::string(100, 'x');
+  }
+  const auto cache = open(15);
+
+  EXPECT_TRUE(cache->acquire(source_.add("aaaaaaaaaa")));
+  EXPECT_TRUE(cache->acquire(source_.add("bbbbbbbbbb")));
+
+  for (const fs::path& file : foreign) EXPECT_TRUE(fs::exists(file)) << file;
+  EXPECT_EQ(cache->held(10).size(), 1U);
+}
+
+TEST_F(Cache, MarksItsFolderForBackups) {
+  open();
+
+  EXPECT_TRUE(content(folder_ / "CACHEDIR.TAG").starts_with("Signature: 8a477f597d28d172789f06886806bc55"));
+}
+
+TEST_F(Cache, CountsWhatCutTransfersHaveLeftAndRemovesItFirst) {
+  const auto cache = open(115);
+  const BlobRef kept = source_.add("kept");
+  cache->acquire(kept).value();
+  source_.cut_after = 90;
+  EXPECT_EQ(cache->acquire(source_.add(std::string(100, 'x'))).error().code, Errc::unavailable);
+
+  EXPECT_TRUE(cache->acquire(source_.add(std::string(50, 'y'))));
+
+  EXPECT_TRUE(fs::is_empty(folder_ / "partial"));
+  EXPECT_EQ(cache->held(10).size(), 2U);
+}
+
+TEST_F(Cache, HoldsTheLimitForABlobOfUnannouncedSize) {
+  const auto cache = open(105);
+  BlobRef scene = source_.add(std::string(100, 's'));
+  scene.bytes = 0;
+  cache->acquire(source_.add("aaaaaaaaaa")).value();
+
+  EXPECT_TRUE(cache->acquire(scene));
+
+  EXPECT_THAT(cache->held(10), testing::ElementsAre(scene.digest));
+  BlobRef larger = source_.add(std::string(200, 'l'));
+  larger.bytes = 0;
+  EXPECT_EQ(cache->acquire(larger).error().code, Errc::resource_exhausted);
+}
+
+TEST_F(Cache, RemovesWhatAWorkerThatIsGoneHadForItself) {
+  const BlobRef blob = source_.add(std::string(100, 'x'));
+  open();
+  const fs::path orphan = folder_ / "partial" / (blob.digest.hex() + ".Ab12Cd");
+  std::ofstream(orphan) << "half";
+
+  open();
+
+  EXPECT_FALSE(fs::exists(orphan));
+}
+
+TEST_F(Cache, KeepsAGoodFileThatItCannotRead) {
+  const BlobRef blob = source_.add("a grid");
+  const fs::path path = open()->acquire(blob).value()->path();
+  fs::remove(path);
+  fs::create_directory(path);  // opens, but reading it is an error
+
+  const auto file = open()->acquire(blob);
+
+  EXPECT_EQ(file.error().code, Errc::internal);
+  EXPECT_THAT(file.error().message, testing::HasSubstr(path.string()));
+  EXPECT_TRUE(fs::exists(path));
+  EXPECT_EQ(source_.offsets.size(), 1U);
+}
+
+TEST_F(Cache, SaysWhyAFetchedFileCannotBeOpened) {
+  const BlobRef blob = source_.add("a grid");
+  const fs::path inner = folder_ / blob.digest.hex().substr(0, 2);
+  source_.meanwhile = [&] {  // the place is a link to itself: opening it fails for good
+    fs::create_directory(inner);
+    fs::create_symlink(blob.digest.hex(), inner / blob.digest.hex());
+  };
+
+  const auto file = open()->acquire(blob);
+
+  EXPECT_THAT(file.error().message, testing::HasSubstr("symbolic links"));
+  EXPECT_EQ(source_.offsets.size(), 1U);
+}
+
+TEST_F(Cache, KeepsTheFileInUseWhenTwoWorkersFetchTheSameAtOnce) {
+  const BlobRef blob = source_.add("aaaaaaaaaa");
+  const auto one = open(15), two = open(15);
+  std::shared_ptr<const BlobFile> in_use;
+  source_.meanwhile = [&] { in_use = one->acquire(blob).value(); };
+  two->acquire(blob).value();
+
+  EXPECT_EQ(two->acquire(source_.add("bbbbbbbbbb")).error().code, Errc::resource_exhausted);
+  EXPECT_EQ(content(in_use->path()), "aaaaaaaaaa");
 }
 
 TEST_F(Cache, SaysThatABlobIsUnknown) {
