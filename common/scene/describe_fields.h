@@ -113,7 +113,11 @@ void describe(V& v, T& s) {
   v.field({.name = "grid_name", .doc = "which grid of a `.vdb`; empty: the only one, or \"density\""},
           s.grid_name);
   v.field({.name = "filter_type", .doc = "between voxels"}, s.filter);
-  v.field({.name = "wrap_mode", .doc = "outside the grid"}, s.wrap);
+  v.field(
+      {.name = "wrap_mode",
+       .doc = "what a `.vol` goes on with beyond its outermost voxels' centres, and as an albedo beyond its "
+              "box; a density ends there"},
+      s.wrap);
   v.field(
       {.name = "use_grid_bbox", .doc = "place the grid by the bounding box in its file instead of [0, 1]^3"},
       s.use_grid_bbox);

@@ -136,7 +136,7 @@ void smooth(LocalMesh& m) {
 
 Result<Placed> place(const Shape& shape, const AssetLoader& files) {
   const Affine m(shape.to_world);
-  if (!m.finite() || m.determinant() == 0) return fail(Errc::invalid_argument, "its to_world has no inverse");
+  if (!m.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   Placed out;
   auto ok = std::visit(
       overloaded{

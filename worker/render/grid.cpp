@@ -35,19 +35,75 @@ Interval clip(const V3d& lo, const V3d& hi, const V3d& o, const V3d& d, double t
 }  // namespace
 
 Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
-           V3d domain_hi, double density_to_sigma)
-    : size_(size), values_(std::move(values)), lo_(domain_lo), hi_(domain_hi), exact_(world_to_index) {
+           V3d domain_hi, double density_to_sigma, VolumeFilter filter, Wrap wrap)
+    : size_(size),
+      values_(std::move(values)),
+      lo_(domain_lo),
+      hi_(domain_hi),
+      exact_(world_to_index),
+      filter_(filter),
+      wrap_(wrap) {
+  // Within half a voxel of its ends a mirrored grid is a clamped one, and without interpolation no wrapping
+  // shows inside the domain.
+  if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
   for (int k = 0; k < 3; ++k) {
-    last_[k] = std::max(0, size[k] - 2);
-    top_[k] = static_cast<float>(size[k] - 1);
+    last_[k] = std::max(0, size_[k] - 2);
+    top_[k] = static_cast<float>(size_[k] - 1);
   }
   // An axis of one node has no neighbour: stepping by 0 reads the node itself.
-  step_ = {size[0] > 1 ? std::size_t{1} : 0, size[1] > 1 ? static_cast<std::size_t>(size[0]) : 0,
-           size[2] > 1 ? static_cast<std::size_t>(size[0]) * size[1] : 0};
-  for (int i = 0; i < 9; ++i) a_[i] = static_cast<float>(world_to_index.a[i]);
-  b_ = V3(world_to_index.b);
+  step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
+           size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
+  for (int i = 0; i < 9; ++i) a_[i] = static_cast<float>(exact_.a[i]);
+  b_ = V3(exact_.b);
   for (float v : values_) max_value_ = std::max(max_value_, v);
   build_macro_cells(density_to_sigma);
+}
+
+// Around the grid one layer of nodes from the opposite end: so interpolation needs no test for the end, and
+// macro cells bound what lies there. Index coordinates grow by one.
+void Grid::repeat_ends() {
+  const std::array<int, 3> n = size_;
+  const std::vector<float> inner = std::move(values_);
+  for (int& s : size_) s += 2;
+  values_.clear();
+  values_.reserve(static_cast<std::size_t>(size_[0]) * size_[1] * size_[2]);
+  const auto from = [&](int i, int k) { return static_cast<std::size_t>((i - 1 + n[k]) % n[k]); };
+  for (int z = 0; z < size_[2]; ++z)
+    for (int y = 0; y < size_[1]; ++y) {
+      const float* row = inner.data() + (from(z, 2) * n[1] + from(y, 1)) * n[0];
+      values_.push_back(row[n[0] - 1]);
+      values_.insert(values_.end(), row, row + n[0]);
+      values_.push_back(row[0]);
+    }
+  exact_.b = exact_.b + V3d(1);
+  lo_ = lo_ + V3(1);
+  hi_ = hi_ + V3(1);
+  padded_ = true;
+}
+
+// The point of the domain whose value continues the grid there.
+V3 Grid::wrapped(const V3& index) const {
+  V3 q = index;
+  for (int k = 0; k < 3; ++k) {
+    if (q[k] >= lo_[k] && q[k] <= hi_[k]) continue;
+    const float width = hi_[k] - lo_[k], turns = (q[k] - lo_[k]) / width, whole = std::floor(turns);
+    float part = turns - whole;
+    if (wrap_ == Wrap::mirror && std::fmod(whole, 2.f) != 0) part = 1 - part;
+    q[k] = lo_[k] + part * width;
+  }
+  return q;
+}
+
+std::uint64_t Grid::count_above(float limit) const {
+  const int skip = padded_ ? 1 : 0;
+  std::uint64_t n = 0;
+  for (int z = skip; z < size_[2] - skip; ++z)
+    for (int y = skip; y < size_[1] - skip; ++y) {
+      const float* row = values_.data() + (static_cast<std::size_t>(z) * size_[1] + y) * size_[0];
+      n += static_cast<std::uint64_t>(
+          std::count_if(row + skip, row + size_[0] - skip, [&](float v) { return v > limit; }));
+    }
+  return n;
 }
 
 void Grid::build_macro_cells(double density_to_sigma) {
@@ -147,18 +203,20 @@ double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) co
   const V3d oi = exact_.point(o), di = exact_.vector(d);
   const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
   if (!(part.t0 < part.t1)) return 0;
-  // Every crossing of a node plane, in order; within two of them the field is one trilinear patch.
+  // Every crossing of a plane of nodes, or between them, in order; within two the field is one patch.
+  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {
     if (di[k] == 0) continue;
     for (int i = 0; i < size_[k]; ++i) {
-      const double t = (i - oi[k]) / di[k];
+      const double t = (i + offset - oi[k]) / di[k];
       if (t > part.t0 && t < part.t1) cuts.push_back(t);
     }
   }
   std::sort(cuts.begin(), cuts.end());
   const auto at = [&](double t) {
     const V3d q = oi + di * t;
+    if (filter_ == VolumeFilter::nearest) return static_cast<double>(nearest(V3(q)));
     double v = 0;
     int c[3];
     double f[3];

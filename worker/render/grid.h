@@ -1,10 +1,11 @@
-// A dense scalar grid with trilinear interpolation, and macro cells that bound it.
+// A dense scalar grid, interpolated or not, and macro cells that bound it.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "common/scene/scene.h"
 #include "worker/render/math.h"
 #include "worker/render/transform.h"
 
@@ -24,17 +25,31 @@ class Grid {
   // Values at integer index coordinates, x fastest. `world_to_index` maps world points to them. The grid
   // exists inside [domain_lo, domain_hi] (index coordinates, which may reach beyond the outermost nodes:
   // there values are clamped) and is 0 outside. `density_to_sigma`: the largest extinction per unit of value
-  // (world units); it steers the size of macro cells.
+  // (world units); it steers the size of macro cells. `wrap` says what continues the nodes beyond their ends;
+  // but for `clamp` the domain must be that of cell centres, [-1/2, n - 1/2].
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
-       V3d domain_hi, double density_to_sigma);
+       V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
+       Wrap wrap = Wrap::clamp);
 
   V3 to_index(const V3& p) const { return linear(p) + b_; }
   V3 linear(const V3& v) const {
     return {a_[0] * v.x + a_[1] * v.y + a_[2] * v.z, a_[3] * v.x + a_[4] * v.y + a_[5] * v.z,
             a_[6] * v.x + a_[7] * v.y + a_[8] * v.z};
   }
-  // Trilinear value at index coordinates inside the domain.
+  VolumeFilter filter() const { return filter_; }
+  // Value at index coordinates inside the domain. The filter is the caller's choice, once for many values; it
+  // must be filter().
+  template <VolumeFilter kFilter>
   float value(const V3& index) const {
+    if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
+    return nearest(index);
+  }
+  // Value at any index coordinates, whatever the filter: beyond the domain the grid goes on as `wrap` says.
+  float value_anywhere(const V3& index) const {
+    const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
+    return filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q);
+  }
+  float trilinear(const V3& index) const {
     int cell[3];
     float f[3];
     const float q[3] = {index.x, index.y, index.z};
@@ -52,6 +67,13 @@ class Grid {
     const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
     return std::max(0.f, c0 + f[2] * (c1 - c0));
   }
+  // Of the node whose cell the point is in; between two cells that of the larger number.
+  float nearest(const V3& index) const {
+    std::size_t i[3];
+    const float q[3] = {index.x, index.y, index.z};
+    for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(q[k], 0.f), top_[k]) + .5f);
+    return values_[(i[2] * size_[1] + i[1]) * size_[0] + i[0]];
+  }
 
   int cell_size() const { return cell_size_; }
   std::array<int, 3> cells() const { return cells_; }
@@ -63,12 +85,17 @@ class Grid {
   float max_value() const { return max_value_; }
   std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
 
-  // Integral of the trilinear field along o + t d, t in [t0, t1]: exact up to rounding (the field is a cubic
-  // in t within a voxel, and two-point Gauss-Legendre integrates cubics exactly). Zero variance; the truth
-  // for tests of the trackers.
+  // Values above `limit`, each counted once.
+  std::uint64_t count_above(float limit) const;
+
+  // Integral of the field along o + t d, t in [t0, t1]: exact up to rounding (within a voxel the field is a
+  // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). Zero variance; the
+  // truth for tests of the trackers.
   double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
 
  private:
+  void repeat_ends();
+  V3 wrapped(const V3& index) const;
   void build_macro_cells(double density_to_sigma);
   MacroCell bound_cell(int x, int y, int z) const;
 
@@ -79,6 +106,9 @@ class Grid {
   float a_[9] = {};
   V3 b_, lo_, hi_;
   Affine exact_;  // world to index, unrounded
+  VolumeFilter filter_ = VolumeFilter::trilinear;
+  Wrap wrap_ = Wrap::clamp;
+  bool padded_ = false;  // a layer of nodes from the opposite end lies around the given ones
   float max_value_ = 0;
   int cell_size_ = 8;
   std::array<int, 3> cells_{};

@@ -47,7 +47,7 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
     box.b = lo;
     unit_to_scene = unit_to_scene * box;
   }
-  if (!unit_to_scene.finite() || unit_to_scene.determinant() == 0) {
+  if (!unit_to_scene.invertible()) {
     return fail(Errc::invalid_argument,
                 fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
   }
@@ -69,7 +69,7 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
       for (std::size_t i = 0; i < count; ++i) values[i] = data->values[data->channels * i + c];
     }
     out.channels.emplace_back(std::array<int, 3>{n[0], n[1], n[2]}, std::move(values), world_to_index,
-                              V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), to_sigma);
+                              V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), to_sigma, v.filter, v.wrap);
   }
   return out;
 }
@@ -118,16 +118,17 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   Transform t;
   std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
   const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);
-  if (!nodes_to_scene.finite() || nodes_to_scene.determinant() == 0) {
+  if (!nodes_to_scene.invertible()) {
     return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform has no inverse", name));
   }
   const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
   std::vector<float> values(raw.values, raw.values + static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
   out.clamped = raw.negatives;
-  // Interpolation falls to the background within one voxel of the active ones, and the grid ends there.
+  // Values sit at nodes. Towards the background they fall within one voxel of the active ones, and the grid
+  // ends there: nothing is left to wrap.
   out.channels.emplace_back(size, std::move(values), from_world(nodes_to_scene.inverse(), center, scale),
-                            V3d(0), V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma);
+                            V3d(0), V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma, v.filter);
   return out;
 }
 

@@ -42,7 +42,7 @@ struct Medium {
     C3 s;
     for (int k = 0; k < 3; ++k) {
       const V3 q = albedo[k]->to_index(p);
-      s[k] = sigma_t[k] * std::min(1.f, albedo[k]->value(q));
+      s[k] = sigma_t[k] * std::min(1.f, albedo[k]->value_anywhere(q));
     }
     return s;
   }
@@ -91,7 +91,7 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
 }
 
 // `depth`: the optical depth of the first tentative collision; the stream gives the rest.
-template <bool kChromatic>
+template <bool kChromatic, VolumeFilter kFilter>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
@@ -124,7 +124,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       const float dt = depth / rate;
       t = std::min(t + dt, w.end());
       if constexpr (kChromatic) passed += hi * dt;
-      const float rho = m.density->value(w.index(t));
+      const float rho = m.density->value<kFilter>(w.index(t));
       if (rho > hi) ++counters.majorant_violations;
       if (stream.uniform() * hi < rho) {
         f.scattered = true;
@@ -159,7 +159,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 // survives each further unit of depth with probability 1/e and is weighted by e. Unbiased.
 inline constexpr float kRouletteDepth = 4;
 
-template <bool kChromatic>
+template <bool kChromatic, VolumeFilter kFilter>
 C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   float s_max = m.sigma_t.x, s_min = m.sigma_t.x;
   if constexpr (kChromatic) {
@@ -175,7 +175,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
     const float rate = s_max * cell.residual;
     if (rate > 0) {
       for (float t = w.begin() + stream.exponential() / rate; t < w.end(); t += stream.exponential() / rate) {
-        const float r = (m.density->value(w.index(t)) - cell.control) / cell.residual;
+        const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
         if constexpr (kChromatic) {
           for (int c = 0; c < 3; ++c) factors[c] *= 1 - r * (m.sigma_t[c] / s_max);
         } else {
@@ -213,6 +213,18 @@ C3 transmittance_homogeneous(const Medium& m, float length) {
   }
 }
 
+// Grids without interpolation are rare: they have their own code, out of the way of the others'.
+template <bool kChromatic>
+[[gnu::noinline]] Flight fly_nearest(const Medium& m, int hero, float depth, const V3& o, const V3& d,
+                                     float t_max, RandomStream stream, MediumCounters& counters) {
+  return fly_grid<kChromatic, VolumeFilter::nearest>(m, hero, depth, o, d, t_max, stream, counters);
+}
+template <bool kChromatic>
+[[gnu::noinline]] C3 transmittance_nearest(const Medium& m, const V3& o, const V3& d, float t0, float t1,
+                                           RandomStream stream) {
+  return transmittance_grid<kChromatic, VolumeFilter::nearest>(m, o, d, t0, t1, stream);
+}
+
 }  // namespace detail
 
 // Distance to the next scattering along o + t d (d of unit length), or none before t_max. `bits` decides the
@@ -222,7 +234,11 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
                    RandomStream stream, MediumCounters& counters) {
   const float depth = exponential(bits);
   if constexpr (F.grids) {
-    if (m.grid) return detail::fly_grid<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
+    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
+      return detail::fly_nearest<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
+    if (m.grid)
+      return detail::fly_grid<F.chromatic, VolumeFilter::trilinear>(m, hero, depth, o, d, t_max, stream,
+                                                                    counters);
   }
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
@@ -231,7 +247,10 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
 template <Features F>
 C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   if constexpr (F.grids) {
-    if (m.grid) return detail::transmittance_grid<F.chromatic>(m, o, d, t0, t1, stream);
+    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
+      return detail::transmittance_nearest<F.chromatic>(m, o, d, t0, t1, stream);
+    if (m.grid)
+      return detail::transmittance_grid<F.chromatic, VolumeFilter::trilinear>(m, o, d, t0, t1, stream);
   }
   return detail::transmittance_homogeneous<F.chromatic>(m, t1 - t0);
 }

@@ -38,7 +38,9 @@ struct Affine {
       if (!std::isfinite(v)) return false;
     return std::isfinite(b.x) && std::isfinite(b.y) && std::isfinite(b.z);
   }
-  // Singular maps have a determinant of 0: check first.
+  // Finite both ways. A subnormal determinant has no finite inverse, one that overflows no finite map.
+  bool invertible() const { return finite() && std::isnormal(determinant()) && inverse().finite(); }
+  // Of an invertible map.
   Affine inverse() const {
     const double d = 1 / determinant();
     Affine r;

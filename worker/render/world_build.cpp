@@ -65,7 +65,10 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
       load_volume(scene.volumes[m.albedo.value], files, w.geometry.center, w.geometry.scale, per_unit);
   if (!albedo) return tl::unexpected(albedo.error());
   w.clamped_inputs += albedo->clamped;
-  for (Grid& g : albedo->channels) w.grids.push_back(std::move(g));
+  for (Grid& g : albedo->channels) {
+    w.clamped_inputs += g.count_above(1);  // look-ups stop at 1: no medium scatters more than it takes
+    w.grids.push_back(std::move(g));
+  }
   const std::size_t n = albedo->channels.size(), first = w.grids.size() - n;
   for (std::size_t k = 0; k < 3; ++k) out.albedo[k] = &w.grids[first + (n == 1 ? 0 : k)];
   return out;

@@ -8,12 +8,15 @@
 #include <memory>
 #include <random>
 
+#include "tests/support/scene_kit.h"
+#include "worker/render/grid_load.h"
 #include "worker/render/medium.h"
 
 namespace ls::render {
 namespace {
 
 using Size = std::array<int, 3>;
+constexpr VolumeFilter kNearest = VolumeFilter::nearest, kTrilinear = VolumeFilter::trilinear;
 
 // Nodes at integer points of the world; the domain may reach beyond them.
 Grid unit_grid(Size n, std::vector<float> v, double beyond = 0, double sigma = 1) {
@@ -24,6 +27,12 @@ Grid unit_grid(Size n, std::vector<float> v, double beyond = 0, double sigma = 1
           V3d(n[0] - 1 + beyond, n[1] - 1 + beyond, n[2] - 1 + beyond),
           sigma};
 }
+// Voxels of width 1 with their centres at integer points, as a .vol file's.
+Grid voxel_grid(Size n, std::vector<float> v, VolumeFilter filter, Wrap wrap, double sigma = 1) {
+  return {n, std::move(v), Affine(), V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), sigma, filter, wrap};
+}
+// At a point of the world: repeated grids have index coordinates of their own.
+float value_at(const Grid& g, const V3& p) { return g.value_anywhere(g.to_index(p)); }
 std::vector<float> random_values(Size n, unsigned seed, bool sparse = false) {
   std::mt19937 rng(seed);
   std::vector<float> v(static_cast<std::size_t>(n[0]) * n[1] * n[2]);
@@ -44,11 +53,12 @@ TEST(Grid, InterpolatesToItsNodesAndClampsBeyondThem) {
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 2; ++x)
         // Three lerps of numbers below 1, each rounded twice.
-        EXPECT_NEAR(g.value(V3(x, y, z)), values[static_cast<std::size_t>((z * 3 + y) * 2 + x)], 6 * 0x1p-25);
+        EXPECT_NEAR(g.value<kTrilinear>(V3(x, y, z)), values[static_cast<std::size_t>((z * 3 + y) * 2 + x)],
+                    6 * 0x1p-25);
 
-  EXPECT_EQ(g.value(V3(-.4f, -.4f, -.4f)), values.front());
-  EXPECT_EQ(g.value(V3(1.5f, 2.5f, 3.5f)), g.value(V3(1, 2, 3)));
-  EXPECT_FLOAT_EQ(g.value(V3(.5f, 0, 0)), (values[0] + values[1]) / 2);
+  EXPECT_EQ(g.value<kTrilinear>(V3(-.4f, -.4f, -.4f)), values.front());
+  EXPECT_EQ(g.value<kTrilinear>(V3(1.5f, 2.5f, 3.5f)), g.value<kTrilinear>(V3(1, 2, 3)));
+  EXPECT_FLOAT_EQ(g.value<kTrilinear>(V3(.5f, 0, 0)), (values[0] + values[1]) / 2);
 }
 
 TEST(Grid, DiagonalOfTheProductOfCoordinatesIsTheRootOfThreeQuarters) {
@@ -71,6 +81,99 @@ TEST(Grid, IntegralsOfTentRampAndConstantMatchClosedForms) {
   const Grid constant = unit_grid({2, 3, 4}, std::vector<float>(24, 3), .5);
   EXPECT_NEAR(constant.exact_integral({-9, 1, 1}, {1, 0, 0}, 0, 99), 3 * 2, 1e-13);  // 1 + two half voxels
   EXPECT_EQ(constant.exact_integral({-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
+}
+
+TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
+  const Size n{3, 2, 4};
+  const auto values = random_values(n, 9);
+  for (const Wrap wrap : {Wrap::clamp, Wrap::repeat, Wrap::mirror}) {
+    const Grid g = voxel_grid(n, values, kNearest, wrap);
+    for (int z = 0; z < 4; ++z)
+      for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 3; ++x)
+          for (const float off : {-.49f, 0.f, .2f, .49f}) {
+            const V3 p(static_cast<float>(x) + off, static_cast<float>(y) - off, static_cast<float>(z) + off);
+            ASSERT_EQ(g.value<kNearest>(g.to_index(p)),
+                      values[static_cast<std::size_t>((z * 2 + y) * 3 + x)]);
+          }
+  }
+}
+
+TEST(Grid, IntegralsWithoutInterpolationAreSumsOfVoxels) {
+  const Grid g = voxel_grid({4, 1, 1}, {7, 1, 2, 5}, kNearest, Wrap::clamp);
+  EXPECT_NEAR(g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 99), 7 + 1 + 2 + 5, 1e-13);
+  EXPECT_NEAR(g.exact_integral({-.25, 0, 0}, {1, 0, 0}, 0, 1), .75 * 7 + .25 * 1, 1e-14);
+  const Grid block = voxel_grid({2, 2, 2}, {1, 2, 3, 4, 5, 6, 7, 8}, kNearest, Wrap::clamp);
+  EXPECT_NEAR(block.exact_integral({-.5, -.5, -.5}, {1, 1, 1}, 0, 2), 1 + 8, 1e-14);
+}
+
+TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
+  const Grid clamped = voxel_grid({4, 1, 1}, {0, 1, 2, 3}, kTrilinear, Wrap::clamp),
+             mirrored = voxel_grid({4, 1, 1}, {0, 1, 2, 3}, kTrilinear, Wrap::mirror),
+             repeated = voxel_grid({4, 1, 1}, {0, 1, 2, 3}, kTrilinear, Wrap::repeat);
+  for (int i = -8; i <= 56; ++i) {
+    const float x = static_cast<float>(i) / 16;
+    // Between the last node and the first: from 3 at distance 0 to 0 at distance 1.
+    const float expected = x < 0 ? -3 * x : x > 3 ? 3 * (4 - x) : x;
+    EXPECT_FLOAT_EQ(value_at(repeated, {x, 0, 0}), expected) << x;
+    EXPECT_EQ(value_at(clamped, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
+    EXPECT_EQ(value_at(mirrored, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
+  }
+  const auto first_half = [](const Grid& g) { return g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 9); };
+  EXPECT_NEAR(first_half(clamped), 0, 1e-14);
+  EXPECT_NEAR(first_half(mirrored), 0, 1e-14);
+  EXPECT_NEAR(first_half(repeated), .5 * (1.5 + 0) / 2, 1e-14);  // a trapezium
+}
+
+TEST(Grid, BeyondItsBoxAGridGoesOnAsItsWrapModeSays) {
+  const Size n{3, 2, 2};
+  const auto values = random_values(n, 10);
+  std::mt19937 rng(2);
+  for (const VolumeFilter filter : {kNearest, kTrilinear}) {
+    const Grid clamped = voxel_grid(n, values, filter, Wrap::clamp),
+               repeated = voxel_grid(n, values, filter, Wrap::repeat),
+               mirrored = voxel_grid(n, values, filter, Wrap::mirror);
+    for (int i = 0; i < 1000; ++i) {
+      // Multiples of 1/16 that are no border between voxels: sums with whole boxes are exact.
+      const auto draw = [&](int cells) {
+        return static_cast<float>(rng() % static_cast<unsigned>(16 * cells)) / 16 - .5f + 1.f / 32;
+      };
+      const V3 in(draw(3), draw(2), draw(2));
+      const int turn = static_cast<int>(rng() % 7) - 3;
+      const V3 out(in.x + static_cast<float>(3 * turn), in.y, in.z);
+      const float width = 3, folded = turn % 2 == 0 ? in.x : width - 1 - in.x;
+      // Positions are rounded to 2^-22 and voxels differ by at most 1.
+      const float slack = filter == kNearest ? 0 : 0x1p-18f;
+      ASSERT_NEAR(value_at(repeated, out), value_at(repeated, in), slack) << out;
+      ASSERT_NEAR(value_at(mirrored, out), value_at(mirrored, {folded, in.y, in.z}), slack) << out;
+      const float edge = turn == 0 ? in.x : turn > 0 ? 2 : 0;
+      ASSERT_EQ(value_at(clamped, out), value_at(clamped, {edge, in.y, in.z})) << out;
+    }
+  }
+}
+
+TEST(Grid, ASceneChoosesFilterAndWrapMode) {
+  const auto grid_of = [](VolumeFilter filter, Wrap wrap) {
+    test::SceneKit kit({1, 1});
+    const VolumeIndex v = kit.grid({2, 1, 1}, {1, 3}, Transform());
+    auto& volume = std::get<GridVolume>(kit.scene.volumes[v.value]);
+    volume.filter = filter;
+    volume.wrap = wrap;
+    auto loaded = load_volume(volume, AssetLoader{kit.scene, kit.files}, V3d(0), 1, 1);
+    return std::move(loaded.value().channels.at(0));
+  };
+  // Voxels are half a unit wide: centres at 1/4 and 3/4.
+  const V3 near_left(.125f, .5f, .5f), middle(.4375f, .5f, .5f), outside(1.25f, .5f, .5f);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::clamp), near_left), 1);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::clamp), middle), 1.75f);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::clamp), outside), 3);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::repeat), near_left), 1.5f);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::repeat), outside), 1);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::mirror), near_left), 1);
+  EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::mirror), outside), 3);
+  EXPECT_EQ(value_at(grid_of(kNearest, Wrap::clamp), middle), 1);
+  EXPECT_EQ(value_at(grid_of(kNearest, Wrap::repeat), outside), 1);
+  EXPECT_EQ(value_at(grid_of(kNearest, Wrap::mirror), outside), 3);
 }
 
 struct Ray {
@@ -127,13 +230,20 @@ TEST(CellWalk, CoversTheRaysPartInTheDomainOnceAndInOrder) {
 }
 
 TEST(CellWalk, BoundsHoldAtEveryPointOfEveryCell) {
+  const Size n{13, 14, 11};
+  std::vector<Grid> grids;
   for (const bool sparse : {false, true}) {
-    const Grid g = unit_grid({13, 14, 11}, random_values({13, 14, 11}, 3, sparse), .5, 10);
-    std::mt19937 rng(1);
+    grids.push_back(unit_grid(n, random_values(n, 3, sparse), .5, 10));
+    for (const VolumeFilter filter : {kNearest, kTrilinear})
+      for (const Wrap wrap : {Wrap::clamp, Wrap::repeat, Wrap::mirror})
+        grids.push_back(voxel_grid(n, random_values(n, 3, sparse), filter, wrap, 10));
+  }
+  for (const Grid& g : grids) {
     for (const Ray& r : awkward_rays()) {
       for (CellWalk w(g, r.o, r.d, 0, 100); w.next();) {
         for (int i = 0; i <= 8; ++i) {
-          const float v = g.value(w.index(w.begin() + (w.end() - w.begin()) * static_cast<float>(i) / 8));
+          const V3 q = w.index(w.begin() + (w.end() - w.begin()) * static_cast<float>(i) / 8);
+          const float v = g.filter() == kNearest ? g.value<kNearest>(q) : g.value<kTrilinear>(q);
           ASSERT_LE(v, w.cell().hi);
           ASSERT_LE(std::abs(v - w.cell().control), w.cell().residual);
         }
@@ -167,7 +277,7 @@ TEST(Grid, ConstantGridsNeedNoResidual) {
   for (int x = 0; x < g.cells()[0]; ++x) EXPECT_EQ(g.cell(x, 0, 0).residual, 0.f);
 }
 
-// ---- trackers: means within 5 standard errors of the exact integral (6e-7 a check, 30 checks: 2e-5)
+// ---- trackers: means within 5 standard errors of the exact integral (6e-7 a check, 36 checks: 2e-5)
 constexpr int kFlights = 40000;
 
 struct Track {
@@ -180,6 +290,11 @@ std::vector<Track> tracks() {
   t.push_back({"dense", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5)), C3(.3f)});
   t.push_back({"sparse", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 6, true)), C3(2)});
   t.push_back({"chromatic", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 7)), C3(0, .2f, .6f)});
+  const auto voxels = [](unsigned seed) { return random_values({9, 9, 9}, seed); };
+  t.push_back({"nearest", voxel_grid({9, 9, 9}, voxels(11), kNearest, Wrap::clamp), C3(.3f)});
+  t.push_back(
+      {"nearest chromatic", voxel_grid({9, 9, 9}, voxels(12), kNearest, Wrap::repeat), C3(0, .2f, .6f)});
+  t.push_back({"repeated", voxel_grid({9, 9, 9}, voxels(13), kTrilinear, Wrap::repeat), C3(.3f)});
   return t;
 }
 

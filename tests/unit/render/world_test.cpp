@@ -73,6 +73,18 @@ std::vector<Named> scenes() {
                    return k.heterogeneous(k.grid({6, 5, 4}, cloud(), kBox), {.9, .6, .9}, 1, .5);
                  }),
                  2});
+  all.push_back({"grid of plain voxels", with_medium([](SceneKit& k) {
+                   const VolumeIndex v = k.grid({6, 5, 4}, cloud(), kBox);
+                   std::get<GridVolume>(k.scene.volumes[v.value]).filter = VolumeFilter::nearest;
+                   return k.heterogeneous(v, {.9, .6, .9}, 1, .5);
+                 }),
+                 2});
+  all.push_back({"repeated grid", with_medium([](SceneKit& k) {
+                   const VolumeIndex v = k.grid({6, 5, 4}, cloud(), kBox);
+                   std::get<GridVolume>(k.scene.volumes[v.value]).wrap = Wrap::repeat;
+                   return k.heterogeneous(v, {.9, .6, .9}, 1, .5);
+                 }),
+                 2});
   all.push_back({"chromatic grid", with_medium([](SceneKit& k) {
                    return k.heterogeneous(k.constant({0, 1, 4}), {.9, .9, .9}, 1, .5);
                  }),
@@ -230,6 +242,9 @@ TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
   EXPECT_THAT(error_of(with_grid(std::nanf(""), kBox)), HasSubstr("grid.vol"));
   EXPECT_THAT(error_of(with_grid(std::numeric_limits<float>::infinity(), kBox)), HasSubstr("grid.vol"));
   EXPECT_THAT(error_of(with_grid(1, test::scale(0))), HasSubstr("inverse"));
+  // Finite maps whose determinants are not, or have no finite inverse.
+  EXPECT_THAT(error_of(with_grid(1, test::scale(1e200))), HasSubstr("inverse"));
+  EXPECT_THAT(error_of(with_grid(1, test::scale(1e-105))), HasSubstr("inverse"));
   EXPECT_EQ(error_of(with_grid(1, kBox)), "");
 }
 
@@ -244,6 +259,19 @@ TEST(World, CountsNegativeDensitiesThatItMadeZero) {
     return k.heterogeneous(k.grid({2, 1, 1}, {-1, 1}, kBox), {1, 1, 1});
   });
   EXPECT_EQ(describe(*test::world_of(kit)).clamped_inputs, 1u);
+}
+
+TEST(World, CountsAlbedosOfAGridThatAreAboveOne) {
+  for (const Wrap wrap : {Wrap::clamp, Wrap::repeat}) {
+    SceneKit kit = with_medium([&](SceneKit& k) {
+      const VolumeIndex albedo = k.grid({4, 1, 1}, {1.5f, .5f, 1, 2}, kBox);
+      std::get<GridVolume>(k.scene.volumes[albedo.value]).wrap = wrap;
+      const MediumIndex m = k.heterogeneous(k.grid({2, 1, 1}, {2, 1}, kBox), {1, 1, 1});
+      std::get<HeterogeneousMedium>(k.scene.media[m.value]).albedo = albedo;
+      return m;
+    });
+    EXPECT_EQ(describe(*test::world_of(kit)).clamped_inputs, 2u);
+  }
 }
 
 TEST(World, AnEmptySceneIsItsSky) {
