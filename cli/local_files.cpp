@@ -34,14 +34,14 @@ Result<std::shared_ptr<const worker::BlobFile>> LocalBlobFiles::acquire(const Bl
   const auto size = blobs_->size(blob.digest);
   if (!size) return tl::unexpected(size.error());
   const auto bytes = blobs_->read(blob.digest, 0, *size);
-  if (!bytes) return tl::unexpected(bytes.error());
+  if (!bytes) return fail(Errc::failed_precondition, bytes.error().message);
   coordinator::File file(::memfd_create("lightshaft-blob", MFD_CLOEXEC));
   if (!file)
-    return fail(Errc::resource_exhausted,
+    return fail(Errc::failed_precondition,
                 fmt::format("no file in memory can be made: {}", std::strerror(errno)));
   auto memory = std::make_shared<const MemoryFile>(std::move(file));
   if (auto written = coordinator::write_all(memory->file, *bytes, memory->path()); !written)
-    return tl::unexpected(written.error());
+    return fail(Errc::failed_precondition, written.error().message);
   return memory;
 }
 

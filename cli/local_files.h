@@ -10,6 +10,7 @@ namespace ls::cli {
 class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
+  // Its errors are final: nobody waits for this machine to get better.
   Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob) override;
   std::vector<Digest> held(std::size_t) const override { return {}; }
 

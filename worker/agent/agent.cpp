@@ -24,7 +24,8 @@ Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFile
       backend(b),
       files(f),
       clock(c),
-      backoff(options.backoff_first, options.backoff_most, options.backoff_seed) {}
+      backoff(options.backoff_first, options.backoff_most, options.backoff_seed),
+      trouble_backoff(options.trouble_first, options.backoff_most, options.backoff_seed) {}
 
 Result<void> Agent::Impl::run() {
   connection_timer = clock.now();
@@ -179,7 +180,10 @@ void Agent::Impl::cancel(const JobId& job) {
   book.drop_job(job);
   outbox.drop_job(job);
   stop_dropped_units();
-  if (const auto it = jobs.find(job); it != jobs.end()) it->second.cancelled = true;
+  if (const auto it = jobs.find(job); it != jobs.end()) {
+    it->second.cancelled = true;
+    it->second.trouble.clear();
+  }
 }
 
 void Agent::Impl::stop_dropped_units() {
@@ -216,7 +220,9 @@ std::vector<FromWorker> Agent::Impl::due_messages() {
 WorkerProgress Agent::Impl::progress() const {
   WorkerProgress p;
   p.leases = book.progress();
+  const std::string bad = trouble();
   p.activity = draining             ? "draining"
+               : !bad.empty()       ? bad
                : book.running() > 0 ? "rendering"
                : !loading.empty()   ? "loading " + loading
                                     : "idle";

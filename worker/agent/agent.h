@@ -27,6 +27,7 @@ struct AgentOptions {
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_first = std::chrono::milliseconds(100);
   Duration backoff_most = std::chrono::seconds(10);
+  Duration trouble_first = std::chrono::seconds(1);  // after a full disk and the like; up to backoff_most
   Duration drain_limit =
       std::chrono::seconds(60);    // to hand in what is finished; then run() ends with an error
   std::uint64_t backoff_seed = 0;  // of the jitter; workers of a farm should differ

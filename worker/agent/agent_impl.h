@@ -31,7 +31,8 @@ struct Agent::Impl {
     std::vector<std::shared_ptr<const BlobFile>> files;  // pins
     std::uint64_t last_use = 0;
     bool cancelled = false;
-    TimePoint retry_at{};  // after a transfer that was cut
+    TimePoint retry_at{};  // after a transfer that was cut, or trouble
+    std::string trouble;   // of this machine; why the last attempt to load it was given up
   };
   struct RenderSlot {
     std::atomic<bool> stop{false};
@@ -60,8 +61,11 @@ struct Agent::Impl {
   std::optional<JobId> next_to_load();
   bool make_room();  // forgets a world that nobody needs if too many are kept
   void load(const JobBrief& brief);
+  void try_to_load(const JobBrief& brief);
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
+  void hold_off(const JobId& id, const std::string& trouble);
+  std::string trouble() const;  // of the jobs that this machine could not load lately; with mutex held
 
   // ---- render threads ----
   void render_loop(RenderSlot& slot, std::stop_token token);
@@ -101,6 +105,7 @@ struct Agent::Impl {
   std::uint64_t uses = 0;
   double cpu_seconds = 0;
   double load_seconds = 0;
+  Backoff trouble_backoff;
   std::string loading;  // name of what is being fetched or built; empty: nothing
 
   std::vector<std::jthread> threads;

@@ -1,6 +1,9 @@
 // The loader thread: makes jobs ready ahead of need. Blobs first, then the world; both without the lock.
 #include <fmt/format.h>
 
+#include <exception>
+#include <new>
+
 #include "common/base/log.h"
 #include "worker/agent/agent_impl.h"
 
@@ -10,6 +13,13 @@ namespace {
 // bounded.
 constexpr std::size_t kWorldsKept = 2;
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
+// Trouble that did not come again for so long after it was due has gone with its job.
+constexpr Duration kTroubleShown = std::chrono::seconds(30);
+
+// A full disk says nothing about the job: no unit may be counted as failed for it.
+bool of_this_machine(const Error& error) {
+  return error.code == Errc::resource_exhausted || error.code == Errc::internal;
+}
 }  // namespace
 
 void Agent::Impl::load_loop(std::stop_token token) {
@@ -21,7 +31,7 @@ void Agent::Impl::load_loop(std::stop_token token) {
       job.state = Job::State::loading;
       const JobBrief brief = job.brief;
       lock.unlock();
-      load(brief);
+      try_to_load(brief);
       lock.lock();
     } else {
       // A cut transfer is tried again after a pause; otherwise there is a notification.
@@ -57,6 +67,16 @@ bool Agent::Impl::make_room() {
   return true;
 }
 
+void Agent::Impl::try_to_load(const JobBrief& brief) {
+  try {
+    load(brief);
+  } catch (const std::bad_alloc&) {
+    loading_failed(brief.job, UnitFailure{.reason = "out of memory while loading the scene"});
+  } catch (const std::exception& e) {
+    loading_failed(brief.job, UnitFailure{.reason = std::string("cannot load the scene: ") + e.what()});
+  }
+}
+
 void Agent::Impl::load(const JobBrief& brief) {
   const JobId& id = brief.job;
   auto local = std::make_shared<LocalJob>();
@@ -70,6 +90,8 @@ void Agent::Impl::load(const JobBrief& brief) {
     }
     auto file = files.acquire(blob);
     if (!file && file.error().code == Errc::unavailable) return postpone(id, file.error());
+    if (!file && of_this_machine(file.error()))
+      return hold_off(id, fmt::format("cannot get '{}': {}", blob.name, file.error().message));
     if (!file)
       return loading_failed(
           id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
@@ -90,6 +112,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   it->second.local = std::move(local);
   it->second.files = std::move(pins);
   it->second.last_use = ++uses;
+  it->second.trouble.clear();
+  trouble_backoff.reset();
   work.notify_all();
 }
 
@@ -119,6 +143,28 @@ void Agent::Impl::postpone(const JobId& id, const Error& why) {
   it->second.state = Job::State::idle;
   it->second.retry_at = clock.now() + kTransferRetry;
   log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
+}
+
+// Others shall have the units. If they come back here, they wait for the next attempt.
+void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
+  const std::lock_guard lock(mutex);
+  loading.clear();
+  const Duration pause = trouble_backoff.next();
+  if (const auto it = jobs.find(id); it != jobs.end()) {
+    it->second.state = Job::State::idle;
+    it->second.retry_at = clock.now() + pause;
+    it->second.trouble = trouble;
+  }
+  log_warn(fmt::format("job={}", id.value),
+           fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
+  for (LeaseReturned& returned : book.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  inbox->nudge();
+}
+
+std::string Agent::Impl::trouble() const {
+  for (const auto& [id, job] : jobs)
+    if (!job.trouble.empty() && clock.now() < job.retry_at + kTroubleShown) return job.trouble;
+  return {};
 }
 
 }  // namespace ls::worker

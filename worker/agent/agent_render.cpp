@@ -1,6 +1,9 @@
 // The render threads: one unit at a time, each from the front of the lease book.
 #include <fmt/format.h>
 
+#include <exception>
+#include <new>
+
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
@@ -21,8 +24,9 @@ std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
                             unit.rect.width(), unit.rect.height(), bytes, limits::kPartialBytes)};
 }
 
-tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job,
-                                             const LeaseBook::Held& held, const std::atomic<bool>& stop) {
+tl::expected<UnitResult, UnitFailure> rendered_unit(RenderBackend& backend, const LocalJob& job,
+                                                    const LeaseBook::Held& held,
+                                                    const std::atomic<bool>& stop) {
   if (auto failure = too_large(held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
   auto rendered = backend.render(job, held.unit, stop);
   if (!rendered) return tl::unexpected<UnitFailure>(std::move(rendered.error()));
@@ -37,6 +41,20 @@ tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const Local
   result.cpu_seconds = rendered->cpu_seconds;
   result.health = rendered->health;
   return result;
+}
+
+// A backend in this process may run out of memory: that costs the unit, not the process.
+tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job,
+                                             const LeaseBook::Held& held, const std::atomic<bool>& stop) {
+  UnitFailure failure;
+  try {
+    return rendered_unit(backend, job, held, stop);
+  } catch (const std::bad_alloc&) {
+    failure.reason = "out of memory while rendering";
+  } catch (const std::exception& e) {
+    failure.reason = std::string("the renderer failed: ") + e.what();
+  }
+  return tl::unexpected<UnitFailure>(std::move(failure));
 }
 
 }  // namespace

@@ -78,8 +78,11 @@ std::set<TileIndex> tiles_of(const std::vector<UnitResult>& results) {
 class AgentTest : public testing::Test {
  protected:
   void start(AgentOptions options = {}, FakeOptions fake = {}) {
+    start_with(make_fake_backend(fake), std::move(options));
+  }
+  void start_with(std::unique_ptr<RenderBackend> backend, AgentOptions options = {}) {
     coordinator_.add_blob("scene");
-    backend_ = make_fake_backend(fake);
+    backend_ = std::move(backend);
     options.hello.name = "tester";
     agent_ = std::make_unique<Agent>(options, coordinator_, *backend_, files_, clock_);
     runner_ = std::jthread([this] { ended_ = agent_->run(); });
@@ -110,7 +113,7 @@ class AgentTest : public testing::Test {
   ScriptedCoordinator coordinator_;
   AtomicClock clock_;
   FetchedFiles files_{coordinator_};
-  std::unique_ptr<LocalBackend> backend_;
+  std::unique_ptr<RenderBackend> backend_;
   std::unique_ptr<Agent> agent_;
   Result<void> ended_;
   std::jthread runner_;
@@ -267,6 +270,70 @@ TEST_F(AgentTest, ReportsOneUnitAndReturnsTheRestWhenAJobCannotBeLoaded) {
   EXPECT_THAT(coordinator_.failures[0].reason, HasSubstr("steam.vdb"));
   EXPECT_EQ(coordinator_.failures[0].lease, LeaseId{"l-1"});
   EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 9U);
+}
+
+TEST_F(AgentTest, GivesUnitsBackThatAFullDiskKeepsFromBeingLoadedAndTriesAgain) {
+  start();
+  coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
+  coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
+  wait_while_time_passes([](auto& c) {
+    return c.returned.size() == 1 && !c.progress.empty() &&
+           c.progress.back().activity.find("no space left on the disk") != std::string::npos;
+  });
+  coordinator_.fail_fetches_with({});
+  coordinator_.tell(assign("l-2", "j-1", tiles_up_to(10)));
+  wait_while_time_passes([](auto& c) { return c.results.size() == 10; });
+
+  EXPECT_TRUE(drain());
+  EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 10U);
+  EXPECT_TRUE(coordinator_.failures.empty());
+}
+
+TEST_F(AgentTest, DoesNotAskAFullDiskAgainAtOnce) {
+  start();
+  coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  coordinator_.tell(assign("l-2", "j-1", {0}));
+  coordinator_.tell(assign("l-3", "j-2", {0}, 2));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // of the other job
+
+  EXPECT_EQ(coordinator_.returned[1].lease, LeaseId{"l-3"});
+  EXPECT_EQ(coordinator_.fetches, 2);
+}
+
+// A backend that runs out of memory wherever it is told to.
+class Exhausted final : public RenderBackend {
+ public:
+  explicit Exhausted(bool at_loading) : at_loading_(at_loading) {}
+  Digest numeric_class() const override { return {}; }
+  tl::expected<void, UnitFailure> prepare(const LocalJob&) override {
+    if (at_loading_) throw std::bad_alloc();
+    return {};
+  }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob&, const LeaseUnit&,
+                                                 const std::atomic<bool>&) override {
+    throw std::bad_alloc();
+  }
+  void forget(const JobId&) override {}
+  std::uint64_t rss_bytes() const override { return 0; }
+
+ private:
+  const bool at_loading_;
+};
+
+TEST_F(AgentTest, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
+  for (const bool at_loading : {true, false}) {
+    start_with(std::make_unique<Exhausted>(at_loading));
+    coordinator_.tell(assign("l-1", "j-1", {0}));
+    coordinator_.wait_for([](auto& c) { return c.failures.size() == 1; });
+
+    EXPECT_TRUE(drain());
+    EXPECT_THAT(coordinator_.failures[0].reason,
+                HasSubstr(at_loading ? "out of memory while loading" : "out of memory while rendering"));
+    coordinator_.failures.clear();
+    coordinator_.hellos.clear();
+  }
 }
 
 TEST_F(AgentTest, TriesAUnitAgainThatItReportedAsFailed) {

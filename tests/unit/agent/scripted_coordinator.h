@@ -33,6 +33,9 @@ class ScriptedCoordinator final : public CoordinatorLink {
   void cut_next_fetch() {
     change([&] { cut_fetch_ = true; });
   }
+  void fail_fetches_with(std::optional<Error> error) {
+    change([&] { fetch_error_ = std::move(error); });
+  }
   void tell(ToWorker message) {
     if (const auto to = observer()) to->received(std::move(message));
   }
@@ -114,6 +117,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
       const std::lock_guard lock(mutex_);
       ++fetches;
       if (std::exchange(cut_fetch_, false)) return fail(Errc::unavailable, "cut");
+      if (fetch_error_) return tl::unexpected<Error>(*fetch_error_);
       const auto it = blobs_.find(digest);
       if (it == blobs_.end()) return fail(Errc::not_found, "no such blob");
       text = it->second.substr(offset);
@@ -142,6 +146,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   std::shared_ptr<LinkObserver> observer_;
   ToWorker greeting_ = Welcome{WorkerId{"w-1"}, 1};
   std::map<Digest, std::string> blobs_;
+  std::optional<Error> fetch_error_;
   bool acknowledge_ = true, refuse_ = false, cut_fetch_ = false;
 };
 
