@@ -19,8 +19,11 @@ bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) |
 class Parameters {
  public:
   Parameters(const std::map<std::string, std::string>& defines, Report& report)
-      : values_(defines), report_(report) {
-    for (const auto& [name, value] : defines) unused_.insert(name);
+      : values_(defines.begin(), defines.end()), report_(report) {
+    for (const auto& [name, value] : defines) {
+      unused_.insert(name);
+      note_length(name);
+    }
   }
 
   // Something defined from outside that nothing asks for is a typing error, but no reason to stop.
@@ -28,15 +31,21 @@ class Parameters {
     std::vector<std::string> known;
     for (const auto& [name, value] : values_)
       if (!unused_.contains(name)) known.push_back(name);
-    for (const std::string& name : unused_)
+    for (const std::string& name : unused_) {
+      if (!report_.takes_warnings()) return;
       report_.warning(at, fmt::format("nothing in the scene asks for ${}, which was defined for it{}", name,
                                       known.empty() ? "; it has no parameters" : suggestion(name, known)));
+    }
   }
 
   bool declare(const Element& e, std::string name, std::string value) {
     if (name.empty()) return complain(e.at, "<default> needs a name");
+    if (name.size() > kMaxParameterNameBytes)
+      return complain(e.at,
+                      fmt::format("the name of a parameter is longer than {} bytes", kMaxParameterNameBytes));
     if (values_.size() >= kMaxParameters)
       return complain(e.at, fmt::format("more than {} parameters", kMaxParameters));
+    note_length(name);
     values_.emplace(std::move(name), std::move(value));  // -D and earlier defaults win
     return true;
   }
@@ -70,15 +79,20 @@ class Parameters {
   }
 
  private:
-  using Values = std::map<std::string, std::string>;
+  using Values = std::map<std::string, std::string, std::less<>>;
+
+  void note_length(const std::string& name) {
+    longest_ = std::min(std::max(longest_, name.size()), kMaxParameterNameBytes);
+  }
 
   // The longest parameter name that stands at `at` (Mitsuba: "$resx" is `resx` if there is one, else `res`
   // and an x).
   Values::const_iterator longest_at(const std::string& text, std::size_t at) const {
     std::size_t end = at;
-    while (end < text.size() && is_name_char(text[end])) ++end;
+    while (end < std::min(text.size(), at + longest_) && is_name_char(text[end])) ++end;
     for (; end > at; --end)
-      if (const auto it = values_.find(text.substr(at, end - at)); it != values_.end()) return it;
+      if (const auto it = values_.find(std::string_view(text).substr(at, end - at)); it != values_.end())
+        return it;
     return values_.end();
   }
 
@@ -101,6 +115,7 @@ class Parameters {
   Values values_;
   std::set<std::string> unused_;  // of those from outside
   Report& report_;
+  std::size_t longest_ = 0;  // name, of those that may be asked for
   std::size_t total_ = 0;
 };
 

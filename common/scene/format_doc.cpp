@@ -25,7 +25,6 @@ struct Column {
 };
 Column column(const Field&, double x) { return {"float", fmt::format("{}", x)}; }
 Column column(const Field&, int x) { return {"integer", fmt::format("{}", x)}; }
-Column column(const Field&, std::uint64_t x) { return {"integer", fmt::format("{}", x)}; }
 Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; }
 Column column(const Field&, const std::string& x) {
   return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};

@@ -28,6 +28,7 @@ std::string range_text(const Field& f) {
 Params::Params(Reader& reader, const Element& object) : reader_(reader), object_(object) {
   std::map<std::string_view, const Element*> names;
   for (const Element& e : object.children) {
+    if (reader.report().full()) return;  // the rest would be for nothing
     const TagKind kind = kind_of(e);
     if (kind != TagKind::object && kind != TagKind::property && kind != TagKind::transform &&
         kind != TagKind::reference)

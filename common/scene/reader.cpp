@@ -51,21 +51,27 @@ const Element* Reader::resolve(const Element& child) {
   if (kind_of(child) != TagKind::reference) return &child;
   const auto it = ids_.find(child.get("id"));
   if (it != ids_.end()) return it->second;
-  if (!bad_refs_.insert(&child).second) return nullptr;
+  if (report_.full() || !bad_refs_.insert(&child).second) return nullptr;
+  report_.error(value_place(child, "id"),
+                fmt::format("no object has the id \"{}\"{}", child.get("id"), hint_for(child)));
+  return nullptr;
+}
+
+// What an unresolved reference may have meant.
+std::string Reader::hint_for(const Element& reference) const {
+  if (ids_.empty()) return "; no object here has one";
   std::vector<std::string> known;
   for (const auto& [id, object] : ids_) known.push_back(id);
-  std::string hint = ids_.empty() ? "; no object here has one" : suggestion(child.get("id"), known);
-  if (const auto near = nearest_name(child.get("id"), known))
-    hint = fmt::format("; did you mean \"{}\" ({})?", *near,
-                       report_.refer_to(ids_.find(*near)->second->at, child.at));
-  report_.error(value_place(child, "id"),
-                fmt::format("no object has the id \"{}\"{}", child.get("id"), hint));
-  return nullptr;
+  const auto near = nearest_name(reference.get("id"), known);
+  if (!near) return listing(known);
+  return fmt::format("; did you mean \"{}\" ({})?", *near,
+                     report_.refer_to(ids_.find(*near)->second->at, reference.at));
 }
 
 template <class I, class F>
 std::optional<I> Reader::once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
                               F read) {
+  if (report_.full()) return std::nullopt;
   if (object.tag != kind && !(kind == "texture" && object.tag == "spectrum")) {
     report_.error(use.at, fmt::format("a {} is wanted here, not a {}", kind, object.tag));
     return std::nullopt;

@@ -40,6 +40,7 @@ class Reader {
   std::optional<I> once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
                         F read);
 
+  std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
   void warn_unused_sensor(const Element& e);
 

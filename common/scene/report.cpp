@@ -34,9 +34,10 @@ void Report::add(Diagnostic::Severity severity, const Span& at, std::string text
 }
 
 std::string Report::refer_to(const Span& there, const Span& here) const {
-  const SourcePlace p = files_[there.file].place(there.offset);
-  return there.file == here.file ? fmt::format("line {}", p.line)
-                                 : fmt::format("{}, line {}", p.file, p.line);
+  const SourceText& file = files_[there.file];
+  const int line = file.line(there.offset);
+  return there.file == here.file ? fmt::format("line {}", line)
+                                 : fmt::format("{}, line {}", file.name(), line);
 }
 
 std::vector<Diagnostic> Report::take() {

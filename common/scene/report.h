@@ -23,6 +23,8 @@ class Report {
 
   bool has_errors() const { return errors_ > 0; }
   bool full() const { return errors_ >= kMax; }  // more would not be shown: reading may stop
+  // Further warnings would be shown. Whoever has to work for the text of one asks first.
+  bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
   // "line 9", with the file's name if it is not the one of `here`.
   std::string refer_to(const Span& there, const Span& here) const;
   std::vector<Diagnostic> take();  // in the order found, errors kept before warnings when there are too many

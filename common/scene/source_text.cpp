@@ -8,11 +8,18 @@
 namespace ls::scene {
 namespace {
 
+constexpr std::size_t kBlock = 4096;
+static_assert(kMaxTextBytes < std::size_t{1} << 31, "numbers of lines are ints");
+
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
 int count_characters(std::string_view text) {
   return static_cast<int>(
       std::count_if(text.begin(), text.end(), [](char c) { return !is_continuation(c); }));
+}
+
+std::uint32_t count_lines(std::string_view text) {
+  return static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
 // Length in bytes of the well-formed sequence at the start of `text`, 0 if there is none (RFC 3629, table 3-7
@@ -35,29 +42,39 @@ std::size_t sequence_length(std::string_view text) {
 
 }  // namespace
 
-SourceText::SourceText(std::string name, std::string text)
-    : name_(std::move(name)), text_(std::move(text)), line_starts_{0} {
-  for (std::size_t i = 0; i < text_.size(); ++i)
-    if (text_[i] == '\n') line_starts_.push_back(i + 1);
+SourceText::SourceText(std::string name, std::string text) : name_(std::move(name)), text_(std::move(text)) {
+  lines_before_.reserve(text_.size() / kBlock + 1);
+  std::uint32_t lines = 0;
+  for (std::size_t begin = 0; begin <= text_.size(); begin += kBlock) {
+    lines_before_.push_back(lines);
+    lines += count_lines(std::string_view(text_).substr(begin, kBlock));
+  }
 }
 
-std::size_t SourceText::line_of(std::size_t offset) const {
-  const auto next = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset);
-  return static_cast<std::size_t>(next - line_starts_.begin()) - 1;
+int SourceText::line(std::size_t offset) const {
+  offset = std::min(offset, text_.size());
+  const std::size_t block = offset / kBlock, begin = block * kBlock;
+  return static_cast<int>(lines_before_[block] +
+                          count_lines(std::string_view(text_).substr(begin, offset - begin))) +
+         1;
+}
+
+std::size_t SourceText::line_start(std::size_t offset) const {
+  const std::size_t end = offset == 0 ? std::string::npos : text_.rfind('\n', offset - 1);
+  return end == std::string::npos ? 0 : end + 1;
 }
 
 SourcePlace SourceText::place(std::size_t offset) const {
   offset = std::min(offset, text_.size());
-  const std::size_t line = line_of(offset), start = line_starts_[line];
-  return {name_, static_cast<int>(line) + 1,
-          count_characters(std::string_view(text_).substr(start, offset - start)) + 1};
+  const std::size_t start = line_start(offset);
+  return {name_, line(offset), count_characters(std::string_view(text_).substr(start, offset - start)) + 1};
 }
 
 Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                                 std::string message) const {
   offset = std::min(offset, text_.size());
   Diagnostic d{severity, place(offset), std::move(message), {}, 1};
-  const std::size_t start = line_starts_[line_of(offset)];
+  const std::size_t start = line_start(offset);
   std::size_t end = std::min(text_.find('\n', start), text_.size());
   if (end > start && text_[end - 1] == '\r') --end;
   const std::size_t shown = std::min(length, end - std::min(offset, end));

@@ -25,16 +25,21 @@ class SourceText {
 
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
-  // Line and column from 1; the column counts characters (UTF-8 code points), not bytes.
+  // Line and column from 1; the column counts characters (UTF-8 code points), not bytes: that takes the time
+  // to walk the line.
   SourcePlace place(std::size_t offset) const;
+  int line(std::size_t offset) const;  // alone; does not walk
+  std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
   // A diagnostic at [offset, offset + length), with its line cut to a readable length.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                       std::string message) const;
 
  private:
-  std::size_t line_of(std::size_t offset) const;  // index into line_starts_
+  std::size_t line_start(std::size_t offset) const;
   std::string name_, text_;
-  std::vector<std::size_t> line_starts_;
+  // The ends of lines before each block of the text. One entry a line would be many times the size of a text
+  // of empty lines.
+  std::vector<std::uint32_t> lines_before_;
 };
 
 // Offset of the first byte that is not well-formed UTF-8; npos if there is none.

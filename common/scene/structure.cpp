@@ -81,6 +81,7 @@ class Checker {
 
   void check_attributes(const Element& e, const TagRow& row) {
     for (const Attribute& a : e.attributes) {
+      if (report_.full()) return;
       const auto is = [&](const std::string& name) { return name == a.name; };
       if (std::any_of(row.required.begin(), row.required.end(), is) ||
           std::any_of(row.optional.begin(), row.optional.end(), is))

@@ -7,6 +7,8 @@
 #include <cctype>
 #include <vector>
 
+#include "common/scene/limits.h"
+
 namespace ls::scene {
 namespace {
 
@@ -43,11 +45,15 @@ std::optional<std::string> nearest_name(std::string_view given, std::span<const 
   if (given.empty() || given.size() > kMaxName) return std::nullopt;
   const std::string name = folded(given);
   std::optional<std::string> best;
-  std::size_t best_distance = 0;
+  std::size_t best_distance = 0, work = 0;
   for (const std::string& candidate : known) {
     if (candidate.size() > kMaxName) continue;
     const std::string other = folded(candidate);
-    const std::size_t d = distance(name, other), longer = std::max(name.size(), other.size());
+    const std::size_t shorter = std::min(name.size(), other.size()),
+                      longer = std::max(name.size(), other.size());
+    if ((longer - shorter) * 3 > longer) continue;  // they are at least so far apart
+    if (work += shorter * longer; work > kMaxNameWork) break;
+    const std::size_t d = distance(name, other);
     if (d * 3 > longer || (best && d >= best_distance)) continue;
     best = candidate;
     best_distance = d;
@@ -57,6 +63,10 @@ std::optional<std::string> nearest_name(std::string_view given, std::span<const 
 
 std::string suggestion(std::string_view given, std::span<const std::string> known) {
   if (const auto name = nearest_name(given, known)) return fmt::format("; did you mean '{}'?", *name);
+  return listing(known);
+}
+
+std::string listing(std::span<const std::string> known) {
   if (known.empty() || known.size() > kMaxListed) return {};
   return fmt::format("; known here: {}", fmt::join(known, ", "));
 }

@@ -77,6 +77,12 @@ class TreeBuilder {
   bool read_attributes(pugi::xml_node node, Element& out) {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
+      // Also what keeps the search for a second one of the same name short.
+      if (out.attributes.size() == kMaxElementAttributes) {
+        report_.error(out.at,
+                      fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes));
+        return false;
+      }
       Attribute a{attribute.name(), attribute.value(), {}, {}};
       places.next(a);
       if (out.find(a.name)) {

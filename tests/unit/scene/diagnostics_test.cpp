@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
+#include "common/scene/source_text.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -215,6 +217,28 @@ TEST(Diagnostics, AreShownWithTheLineAndACaret) {
 TEST(Diagnostics, ColumnsCountCharactersNotBytes) {
   const auto r = read(with_sensor("<!-- äöü --><shpe/>"));
   EXPECT_EQ(r.diagnostics.at(0).place.column, 14);
+}
+
+TEST(Diagnostics, PlacesAreRightWhereverTheLinesEnd) {
+  std::mt19937 random(5);
+  for (const int length : {1, 7, 90, 5000}) {
+    std::string text;
+    while (text.size() < 40'000) text += std::string(random() % static_cast<unsigned>(length), 'x') + "\n";
+    const scene::SourceText source("t", text);
+    int line = 1, column = 1;
+    for (std::size_t i = 0; i <= text.size(); ++i) {
+      ASSERT_EQ(source.line(i), line) << i;
+      // Columns are counted out: not at every place.
+      if (i % 61 == 0 || i == text.size()) {
+        ASSERT_EQ(source.place(i), (SourcePlace{"t", line, column})) << i;
+      }
+      ++column;
+      if (i < text.size() && text[i] == '\n') {
+        ++line;
+        column = 1;
+      }
+    }
+  }
 }
 
 TEST(Diagnostics, LongLinesAreCutAroundThePlace) {
