@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <variant>
 
 #include "common/base/error.h"
@@ -30,7 +31,7 @@ struct RenderedUnit {
 };
 
 // Blocking calls, made from several threads of the agent at once (one a render thread). `stop` asks for an
-// early return with Errc::failed_precondition. A UnitFailure says whose fault it was.
+// early return; what comes back then is looked at by nobody. A UnitFailure says whose fault it was.
 class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
@@ -41,6 +42,9 @@ class RenderBackend {
                                                          const std::atomic<bool>& stop) = 0;
   virtual void forget(const JobId& job) = 0;
   virtual std::uint64_t rss_bytes() const = 0;
+  // Why it cannot render anything any more, whatever it is asked: the worker ends with this. The failures of
+  // units that come with it are not the units' fault.
+  virtual std::optional<Error> broken() const { return std::nullopt; }
   // Nothing more will be asked: calls that are still blocked should come back soon. May be called more than
   // once.
   virtual void shutdown() {}

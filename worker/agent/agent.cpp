@@ -37,6 +37,7 @@ Result<void> Agent::Impl::run() {
     std::deque<Arrival> arrivals = inbox->wait(until_next_timer());
     for (Arrival& arrival : arrivals) handle(arrival);
     if (stop_requested) break;
+    look_at_backend();
     if (drain_requested) begin_drain();
     if (connection == Connection::opening && clock.now() >= connection_timer) {
       link.close();
@@ -191,6 +192,14 @@ void Agent::Impl::stop_dropped_units() {
     if (slot->unit && !book.is_running(*slot->unit)) slot->stop = true;
 }
 
+void Agent::Impl::look_at_backend() {
+  const auto error = backend.broken();
+  const std::lock_guard lock(mutex);
+  if (!error || broken) return;
+  broken = error;
+  drain_requested = true;
+}
+
 void Agent::Impl::begin_drain() {
   const std::lock_guard lock(mutex);
   if (draining) return;
@@ -238,7 +247,7 @@ std::optional<Result<void>> Agent::Impl::verdict() {
   const bool rendering =
       std::any_of(slots.begin(), slots.end(), [](const auto& slot) { return slot->unit.has_value(); });
   if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up))
-    return Result<void>{};
+    return broken ? Result<void>(tl::unexpected<Error>(*broken)) : Result<void>{};
   if (clock.now() < drain_deadline) return std::nullopt;
   return fail(
       Errc::unavailable,

@@ -40,7 +40,8 @@ class Agent {
         const Clock& clock);
   ~Agent();
 
-  // Until drained (success), refused for good (the coordinator's error) or stopped. Once.
+  // Until drained (success), refused for good (the coordinator's error), its backend is broken (that's error;
+  // what is finished is handed in first) or stopped. Once.
   Result<void> run();
 
   // From any thread. drain(): finish the units in hand, hand in every result, return the rest. stop(): as

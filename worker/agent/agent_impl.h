@@ -50,6 +50,7 @@ struct Agent::Impl {
   void cancel(const JobId& job);
   void stop_dropped_units();  // raises the stop flag of each running unit that is no longer in the book
   void begin_drain();
+  void look_at_backend();  // drains if it is broken, to end with its error
   std::vector<FromWorker> due_messages();
   std::optional<Result<void>> verdict();  // whether run() is over
   Duration until_next_timer() const;
@@ -102,6 +103,7 @@ struct Agent::Impl {
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;
+  std::optional<Error> broken;  // the backend; what run() ends with
   std::uint64_t uses = 0;
   double cpu_seconds = 0;
   double load_seconds = 0;

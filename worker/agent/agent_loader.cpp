@@ -102,6 +102,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   local->brief = brief;
   const TimePoint start = clock.now();
   auto prepared = backend.prepare(*local);
+  if (!prepared && backend.broken()) return hold_off(id, prepared.error().reason);
   if (!prepared) return loading_failed(id, std::move(prepared.error()));
   const std::lock_guard lock(mutex);
   loading.clear();

@@ -91,6 +91,7 @@ std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::sto
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
                            tl::expected<UnitResult, UnitFailure> outcome) {
+  const bool innocent = !outcome && backend.broken();
   {
     const std::lock_guard lock(mutex);
     slot.unit.reset();
@@ -100,6 +101,8 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
     if (lease && outcome) {
       outcome->lease = *lease;
       outbox.add(std::move(*outcome));
+    } else if (lease && innocent) {
+      outgoing.push_back(LeaseReturned{*lease, {key}});
     } else if (lease) {
       outcome.error().unit = key;
       outcome.error().lease = *lease;

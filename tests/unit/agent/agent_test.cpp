@@ -336,6 +336,41 @@ TEST_F(AgentTest, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
   }
 }
 
+// A backend that finds itself unable to go on at its second unit.
+class Broken final : public RenderBackend {
+ public:
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    if (unit.tile == 0) return fake_->render(job, unit, stop);
+    broken_ = true;
+    return tl::unexpected<UnitFailure>(UnitFailure{.reason = "replaced"});
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+  std::optional<Error> broken() const override {
+    return broken_ ? std::optional(Error{Errc::failed_precondition, "the program was replaced"})
+                   : std::nullopt;
+  }
+
+ private:
+  std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+  std::atomic<bool> broken_{false};
+};
+
+TEST_F(AgentTest, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed) {
+  start_with(std::make_unique<Broken>());
+  coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
+
+  EXPECT_EQ(join().error().message, "the program was replaced");
+  EXPECT_EQ(coordinator_.results.size(), 1U);
+  EXPECT_TRUE(coordinator_.failures.empty());
+  std::size_t returned = 0;
+  for (const LeaseReturned& r : coordinator_.returned) returned += r.unrendered.size();
+  EXPECT_EQ(returned, 9U);
+}
+
 TEST_F(AgentTest, TriesAUnitAgainThatItReportedAsFailed) {
   start();
   AssignLease a = assign("l-1", "j-1", {0});
