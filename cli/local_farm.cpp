@@ -31,6 +31,7 @@ struct LocalFarm::Watched final : worker::RenderBackend {
   }
   void forget(const JobId& job) override { backend->forget(job); }
   std::uint64_t rss_bytes() const override { return backend->rss_bytes(); }
+  std::optional<Error> broken() const override { return backend->broken(); }
   void shutdown() override { backend->shutdown(); }
 
   std::unique_ptr<worker::RenderBackend> backend;
@@ -65,10 +66,7 @@ tl::expected<JobId, coordinator::Rejected> LocalFarm::submit(const LocalScene& s
 
 Result<std::unique_ptr<worker::RenderBackend>> LocalFarm::make_backend() const {
   if (!options_.isolate) return worker::make_inprocess_backend(options_.threads);
-  std::error_code error;
   worker::ChildOptions child;
-  child.executable = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error) return fail(Errc::internal, "the path of this program is unknown: " + error.message());
   child.arguments = {kRenderChildFlag, std::to_string(options_.threads)};
   child.slots = options_.threads;
   return worker::make_child_backend(std::move(child));

@@ -4,12 +4,12 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <mutex>
 
 #include "common/scene/serialize.h"
+#include "worker/resident.h"
 
 namespace ls::worker {
 namespace {
@@ -81,14 +81,7 @@ class InProcessBackend final : public LocalBackend {
     worlds_.erase(it);
   }
 
-  std::uint64_t rss_bytes() const override {
-    unsigned long total = 0, resident = 0;
-    if (FILE* file = std::fopen("/proc/self/statm", "re")) {
-      if (std::fscanf(file, "%lu %lu", &total, &resident) != 2) resident = 0;
-      std::fclose(file);
-    }
-    return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  }
+  std::uint64_t rss_bytes() const override { return resident_bytes(::getpid()); }
 
  private:
   std::shared_ptr<const render::World> world(const JobId& job) const {

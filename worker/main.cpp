@@ -57,9 +57,7 @@ void obey_signals(worker::Agent& agent, const sigset_t& signals) {
 
 int run_worker(const worker::Options& options, const sigset_t& signals) {
   worker::raise_file_limit();
-  std::error_code no_path;
-  worker::ChildOptions child_options{.executable = std::filesystem::read_symlink("/proc/self/exe", no_path),
-                                     .arguments = child_arguments(options),
+  worker::ChildOptions child_options{.arguments = child_arguments(options),
                                      .slots = options.threads,
                                      .hang_limit = from_seconds(options.hang_seconds)};
   auto backend = worker::make_child_backend(std::move(child_options));

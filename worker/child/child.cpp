@@ -51,6 +51,7 @@ class ChildBackend final : public RenderBackend {
                                                  const std::atomic<bool>& stop) override;
   void forget(const JobId& job) override;
   std::uint64_t rss_bytes() const override;
+  std::optional<Error> broken() const override;
   void shutdown() override;
 
  private:
@@ -60,6 +61,8 @@ class ChildBackend final : public RenderBackend {
   };
   Result<std::shared_ptr<Process>> living_process();
   Result<void> greet(Process& process);
+  tl::unexpected<Error> broken_by(std::string why);
+  bool tell_forgotten(Process& process);
   // A child that knows the job, and the job's number in it.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
                                                                     std::uint64_t& number);
@@ -80,6 +83,7 @@ class ChildBackend final : public RenderBackend {
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
   bool shut_down_ = false;
+  std::optional<Error> broken_;
 };
 
 // Called with control_mutex_ held.
@@ -104,17 +108,38 @@ Result<void> ChildBackend::greet(Process& process) {
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
     if (clock_.now() > deadline) process.kill();
   });
-  if (!answer)
-    return fail(Errc::internal,
-                fmt::format("the render child {} before it was ready; run the worker with --fake to see "
-                            "whether the renderer is the cause",
-                            process.end().text));
+  if (!answer) {
+    const Process::End end = process.end();
+    std::string why = fmt::format("the render child {} before it was ready", end.text);
+    const bool first = numeric_class_ == Digest{};
+    if (first) why += "; run the worker with --fake to see whether the renderer is the cause";
+    // A signal may be the system's lack of memory, which passes.
+    return first || end.signal ? fail(Errc::internal, std::move(why)) : broken_by(std::move(why));
+  }
   if (numeric_class_ == Digest{})
     numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
   if (numeric_class_ != answer->reply.numeric_class)
-    return fail(Errc::internal,
-                "the numeric class of this machine has changed: its arithmetic or memory is at fault");
+    return broken_by(
+        fmt::format("a new render child has the numeric class {}, not {} as this worker began with",
+                    answer->reply.numeric_class.hex(), numeric_class_.hex()));
   return {};
+}
+
+tl::unexpected<Error> ChildBackend::broken_by(std::string why) {
+  std::error_code unknown;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", unknown);
+  Error error{Errc::failed_precondition,
+              fmt::format("{}: {} or one of its libraries has been replaced, or this machine's arithmetic is "
+                          "at fault; start the worker again",
+                          why, program.string())};
+  const std::lock_guard lock(mutex_);
+  broken_ = error;
+  return tl::unexpected<Error>(std::move(error));
+}
+
+std::optional<Error> ChildBackend::broken() const {
+  const std::lock_guard lock(mutex_);
+  return broken_;
 }
 
 std::uint64_t ChildBackend::number_of(const JobId& job) {
@@ -148,24 +173,39 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   }
   const std::lock_guard control(control_mutex_);
   auto process = living_process();
+  // A child that dies of forgetting is replaced by one that has nothing to forget.
+  if (process && !tell_forgotten(**process)) process = living_process();
   if (!process) return failed(process.error().message);
   if (knows(**process)) return *process;
   if (auto ok = prepare_in(**process, job, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
   return *process;
 }
 
-tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job,
-                                                         std::uint64_t number) {
+// False: the child is dead.
+bool ChildBackend::tell_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {
     const std::lock_guard lock(mutex_);
     forgotten.swap(forgotten_);
   }
   for (const std::uint64_t old : forgotten) {
-    process.ask(process.control_fd(), Request{.kind = Kind::forget, .job = old}, {}, [] {});
+    const TimePoint deadline = clock_.now() + options_.forget_limit;
+    const Request request{.kind = Kind::forget, .job = old};
+    const auto answer = process.ask(process.control_fd(), request, {}, [&] {
+      if (clock_.now() > deadline) process.kill();
+    });
+    if (!answer) {
+      log_warn("", fmt::format("the renderer {} while it freed a scene", process.end().text));
+      return false;
+    }
     const std::lock_guard lock(process.prepared_mutex);
     process.prepared.erase(old);
   }
+  return true;
+}
+
+tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job,
+                                                         std::uint64_t number) {
   const std::string text = child::to_text(job);
   if (text.size() > child::kTextBytes)
     return failed("the job names more files than the render child can be told of");
@@ -287,7 +327,10 @@ ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
   failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
                                                seconds(options_.hang_limit))
                                  : fmt::format("the renderer {}", end.text);
-  if (end.signal == SIGKILL && hung < 0) failure.reason += "; the system may have run out of memory";
+  if (process.garbled)
+    failure.reason = "the renderer answered nonsense";
+  else if (end.signal == SIGKILL && hung < 0)
+    failure.reason += "; the system may have run out of memory";
   log_warn(fmt::format("slot={}", index), failure.reason);
   return {tl::unexpected<UnitFailure>(std::move(failure)), false};
 }

@@ -19,11 +19,13 @@
 namespace ls::worker {
 
 struct ChildOptions {
-  std::filesystem::path executable;
+  // This very program, even if its file has been replaced since it was started.
+  std::filesystem::path executable = "/proc/self/exe";
   std::vector<std::string> arguments;                 // that make it serve(): see worker/main.cpp
   int slots = 1;                                      // units rendered at once; the caller's threads
   Duration hang_limit = std::chrono::minutes(5);      // without finishing a sample
   Duration prepare_limit = std::chrono::minutes(60);  // to build one world
+  Duration forget_limit = std::chrono::minutes(1);    // to free one
   Duration start_limit = std::chrono::minutes(2);     // until the child says hello (its numeric battery)
 };
 

@@ -2,45 +2,73 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstring>
+#include <string_view>
+
+#include "worker/resident.h"
 
 extern char** environ;
 
 namespace ls::worker::child {
 namespace {
 
-constexpr int kPollMs = 50;
-// Their ends are first moved above all the numbers that they will have in the child, so that no dup2
-// overwrites another.
-constexpr int kHighFd = kFirstSlotFd + kMostSlots + 1;
-
-int raised(int fd) {
-  const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, kHighFd);
-  ::close(fd);
-  return high;
-}
-
-tl::unexpected<Error> system_error(const char* what) {
+tl::unexpected<Error> system_error(const char* what, int error = errno) {
+  const char* help = error == EMFILE ? "; raise the limit of open files (ulimit -n)" : "";
   return fail(Errc::internal,
-              fmt::format("cannot start the render child: {}: {}", what, std::strerror(errno)));
+              fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
 
-// The environment without secrets: the child has no use for the join token.
+// The child's ends, by the number that they will have there from kSharedMemoryFd on. They are first moved
+// above all those numbers, so that no dup2 overwrites another.
+class TheirEnds {
+ public:
+  explicit TheirEnds(int slots) : lowest_(kFirstSlotFd + slots + 1) {}
+  ~TheirEnds() {
+    for (const int fd : fds_) ::close(fd);
+  }
+  TheirEnds(const TheirEnds&) = delete;
+  TheirEnds& operator=(const TheirEnds&) = delete;
+
+  Result<int> add(int fd) {
+    const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest_);
+    const int error = errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit is below lowest_
+    ::close(fd);
+    if (high < 0) return system_error("file descriptors", error);
+    fds_.push_back(high);
+    return high;
+  }
+  const std::vector<int>& fds() const { return fds_; }
+
+ private:
+  const int lowest_;
+  std::vector<int> fds_;
+};
+
+// What the child's libraries may want to know, and nothing else: the agent's environment may hold secrets
+// (the join token, a cloud's keys) that a renderer of strangers' files has no use for.
+bool may_see(std::string_view variable) {
+  constexpr std::array kNames{"PATH=", "HOME=", "USER=", "TMPDIR=", "TZ=", "LANG=", "LANGUAGE="};
+  constexpr std::array kFamilies{"LC_", "LD_", "MALLOC_", "GLIBC_TUNABLES=", "TBB_", "LIGHTSHAFT_LOG="};
+  const auto begins = [&](const char* with) { return variable.starts_with(with); };
+  const std::string_view name = variable.substr(0, variable.find('='));
+  return std::any_of(kNames.begin(), kNames.end(), begins) ||
+         std::any_of(kFamilies.begin(), kFamilies.end(), begins) || name.ends_with("SAN_OPTIONS");
+}
+
 std::vector<char*> child_environment() {
   std::vector<char*> kept;
   for (char** e = environ; *e; ++e)
-    if (std::strncmp(*e, "LIGHTSHAFT_JOIN_TOKEN=", 22) != 0 && std::strncmp(*e, "LIGHTSHAFT_TOKEN=", 17) != 0)
-      kept.push_back(*e);
+    if (may_see(*e)) kept.push_back(*e);
   kept.push_back(nullptr);
   return kept;
 }
@@ -49,46 +77,36 @@ std::vector<char*> child_environment() {
 
 Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
   std::shared_ptr<Process> process(new Process);
-  std::vector<int> theirs;
-  const auto close_theirs = [&theirs] {
-    for (const int fd : theirs) ::close(fd);
-  };
+  TheirEnds theirs(options.slots);
   process->memory_bytes_ = sizeof(Slot) * static_cast<std::size_t>(options.slots);
-  const int memory = ::memfd_create("lightshaft-render", MFD_CLOEXEC);
-  if (memory < 0) return system_error("memfd_create");
-  theirs.push_back(raised(memory));
-  if (::ftruncate(theirs[0], static_cast<off_t>(process->memory_bytes_)) != 0) {
-    close_theirs();
+  const int memory_fd = ::memfd_create("lightshaft-render", MFD_CLOEXEC);
+  if (memory_fd < 0) return system_error("memfd_create");
+  const auto memory = theirs.add(memory_fd);
+  if (!memory) return tl::unexpected<Error>(memory.error());
+  if (::ftruncate(*memory, static_cast<off_t>(process->memory_bytes_)) != 0)
     return system_error("shared memory");
-  }
-  void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, theirs[0], 0);
-  if (mapped == MAP_FAILED) {
-    close_theirs();
-    return system_error("mmap");
-  }
+  void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, *memory, 0);
+  if (mapped == MAP_FAILED) return system_error("mmap");
   process->slots_ = static_cast<Slot*>(mapped);
   for (int i = 0; i <= options.slots; ++i) {
     int pair[2];
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) {
-      close_theirs();
-      return system_error("socketpair");
-    }
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) return system_error("socketpair");
     (i == 0 ? process->control_ : process->slot_fds_.emplace_back()) = pair[0];
-    theirs.push_back(raised(pair[1]));
+    if (const auto end = theirs.add(pair[1]); !end) return tl::unexpected<Error>(end.error());
   }
-  const auto started = process->start(options, theirs);
-  close_theirs();
-  if (!started) return tl::unexpected<Error>(started.error());
+  if (const auto ok = process->start(options, theirs.fds()); !ok) return tl::unexpected<Error>(ok.error());
   return process;
 }
 
 Result<void> Process::start(const ChildOptions& options, const std::vector<int>& theirs) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  for (std::size_t i = 0; i < theirs.size(); ++i)
-    posix_spawn_file_actions_adddup2(&actions, theirs[i], kSharedMemoryFd + static_cast<int>(i));
-  posix_spawn_file_actions_addclosefrom_np(&actions, kSharedMemoryFd + static_cast<int>(theirs.size()));
+  int error = posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  for (std::size_t i = 0; i < theirs.size() && error == 0; ++i)
+    error = posix_spawn_file_actions_adddup2(&actions, theirs[i], kSharedMemoryFd + static_cast<int>(i));
+  if (error == 0)
+    error =
+        posix_spawn_file_actions_addclosefrom_np(&actions, kSharedMemoryFd + static_cast<int>(theirs.size()));
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t none;
@@ -96,19 +114,21 @@ Result<void> Process::start(const ChildOptions& options, const std::vector<int>&
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
 
-  std::vector<std::string> arguments = {options.executable.string()};
+  std::error_code no_link;  // /proc/self/exe: people see the name behind it
+  const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
+  std::vector<std::string> arguments = {no_link ? options.executable.string() : behind.string()};
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  const int error = ::posix_spawn(&pid_, options.executable.c_str(), &actions, &attributes, argv.data(),
-                                  child_environment().data());
+  if (error == 0)
+    error = ::posix_spawn(&pid_, options.executable.c_str(), &actions, &attributes, argv.data(),
+                          child_environment().data());
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   if (error == 0) return {};
   pid_ = -1;
-  errno = error;
-  return system_error(options.executable.c_str());
+  return system_error(options.executable.c_str(), error);
 }
 
 Process::~Process() {
@@ -125,6 +145,11 @@ void Process::kill() {
 }
 
 Process::End Process::end() {
+  if (alive()) {  // not under the lock, which kill() needs; not reaped, so that the id stays its own
+    siginfo_t info{};
+    while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
+    }
+  }
   const std::lock_guard lock(reap_mutex_);
   if (end_) return *end_;
   End end;
@@ -152,14 +177,7 @@ bool Process::alive() {
          info.si_pid == 0;
 }
 
-std::uint64_t Process::rss_bytes() const {
-  std::uint64_t total = 0, resident = 0;
-  if (FILE* file = std::fopen(fmt::format("/proc/{}/statm", pid_).c_str(), "re")) {
-    if (std::fscanf(file, "%lu %lu", &total, &resident) != 2) resident = 0;
-    std::fclose(file);
-  }
-  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
+std::uint64_t Process::rss_bytes() const { return resident_bytes(pid_); }
 
 bool Process::some_slot_crashed() const {
   for (int i = 0; i < slots(); ++i)
@@ -167,17 +185,25 @@ bool Process::some_slot_crashed() const {
   return false;
 }
 
-bool Process::readable(int fd) {
-  pollfd p{fd, POLLIN, 0};
-  return ::poll(&p, 1, kPollMs) > 0;
+std::optional<Process::Answer> Process::ask(int fd, Request request, const std::string& text,
+                                            const Watch& watch) {
+  request.text_bytes = static_cast<std::uint32_t>(text.size());
+  auto answer = exchange(fd, request, text, watch);
+  // It may have closed its end and live on: whoever asks for its end() next would wait for ever.
+  if (!answer) kill();
+  return answer;
 }
 
-std::optional<Process::Answer> Process::receive(int fd) {
+std::optional<Process::Answer> Process::exchange(int fd, const Request& request, const std::string& text,
+                                                 const Watch& watch) {
   Answer answer;
-  if (!receive_all(fd, &answer.reply, sizeof answer.reply) || answer.reply.text_bytes > kTextBytes)
+  if (!send_all(fd, &request, sizeof request, watch) || !send_all(fd, text.data(), text.size(), watch) ||
+      !receive_all(fd, &answer.reply, sizeof answer.reply, watch))
     return std::nullopt;
+  garbled = answer.reply.text_bytes > kReasonBytes;
+  if (garbled) return std::nullopt;
   answer.text.resize(answer.reply.text_bytes);
-  if (!receive_all(fd, answer.text.data(), answer.text.size())) return std::nullopt;
+  if (!receive_all(fd, answer.text.data(), answer.text.size(), watch)) return std::nullopt;
   return answer;
 }
 

@@ -29,18 +29,13 @@ class Process {
     Reply reply;
     std::string text;
   };
-  // While a request is under way `watch` is called about every 50 ms and may kill(). Nothing: the child died.
-  template <class Watch>
-  std::optional<Answer> ask(int fd, Request request, const std::string& text, Watch watch) {
-    request.text_bytes = static_cast<std::uint32_t>(text.size());
-    if (!send_all(fd, &request, sizeof request) || !send_all(fd, text.data(), text.size()))
-      return std::nullopt;
-    while (!readable(fd)) watch();
-    return receive(fd);
-  }
+  // While the child keeps it waiting `watch` is called about every 50 ms and may kill(). Nothing: the child
+  // died, or answered nonsense and was killed.
+  std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
   void kill();
-  // How it ended, in words and as a signal. Waits for the end, which must be near.
+  // How it ended, in words and as a signal. Waits for the end, which must be near; kill() gets through
+  // meanwhile.
   struct End {
     std::optional<int> signal;
     int exit_code = 0;
@@ -57,14 +52,14 @@ class Process {
   bool some_slot_crashed() const;
 
   std::atomic<int> hung_slot{-1};      // the watchdog killed it for this one
+  std::atomic<bool> garbled{false};    // it was killed because it answered nonsense
   std::atomic<bool> preparing{false};  // a world is being built
   std::mutex prepared_mutex;
   std::set<std::uint64_t> prepared;  // jobs it knows; guarded by prepared_mutex
 
  private:
   Process() = default;
-  static bool readable(int fd);  // waits 50 ms at most
-  std::optional<Answer> receive(int fd);
+  std::optional<Answer> exchange(int fd, const Request& request, const std::string& text, const Watch& watch);
   Result<void> start(const ChildOptions& options, const std::vector<int>& theirs);
 
   pid_t pid_ = -1;

@@ -3,14 +3,17 @@
 #pragma once
 
 #include <atomic>
+#include <climits>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <type_traits>
 
 #include "common/base/error.h"
 #include "common/image/frame.h"
 #include "common/image/rounds.h"
+#include "common/protocol/limits.h"
 #include "worker/render/render.h"
 
 namespace ls::worker::child {
@@ -21,7 +24,14 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = 256;
 
-inline constexpr std::size_t kTextBytes = 1 << 20;     // a prepared job as JSON; thousands of assets
+// A prepared job as JSON (child/job_text.h): its settings as a string, and of each asset, the scene's file
+// among them, digest, bytes and name, and the digest again with the path. Names and paths may double by
+// escapes.
+inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
+inline constexpr std::size_t kTextBytes =
+    2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
+inline constexpr std::size_t kReasonBytes = 64 << 10;  // of a reply
+
 inline constexpr std::size_t kSlotPixels = 202 * 202;  // the largest tile whose partial fits a message
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
@@ -57,8 +67,10 @@ struct Slot {
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Blocking; false at the end of the other side. Frames of up to kTextBytes of text.
-bool send_all(int fd, const void* data, std::size_t bytes);
-bool receive_all(int fd, void* data, std::size_t bytes);
+// Blocking; false at the end of the other side. While the other side keeps them waiting they call `watch`, if
+// there is one, about every 50 ms.
+using Watch = std::function<void()>;
+bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
+bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});
 
 }  // namespace ls::worker::child

@@ -103,7 +103,7 @@ class Server {
   }
 
   static bool answer(int fd, Reply& reply, const std::string& reason) {
-    reply.text_bytes = static_cast<std::uint32_t>(std::min(reason.size(), kTextBytes));
+    reply.text_bytes = static_cast<std::uint32_t>(std::min(reason.size(), kReasonBytes));
     return send_all(fd, &reply, sizeof reply) && send_all(fd, reason.data(), reply.text_bytes);
   }
 
@@ -170,6 +170,7 @@ class Server {
 
 void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+  ::prctl(PR_SET_NAME, "ls-render-child");  // started as /proc/self/exe it would be called "exe"
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   // A terminal's Ctrl-C goes to the agent alone; it decides.

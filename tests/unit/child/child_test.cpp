@@ -4,13 +4,19 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "common/image/fake_pixels.h"
+#include "common/protocol/limits.h"
+#include "worker/child/protocol.h"
 #include "worker/child/serve.h"
 #include "worker/fake/fake.h"
 
@@ -35,10 +41,10 @@ LeaseUnit unit(TileIndex tile) { return {tile, 0, {0, 0, 32, 32}, {0, 2}}; }
 
 std::unique_ptr<RenderBackend> backend(const std::string& fault, int slots = 1,
                                        Duration hang_limit = std::chrono::minutes(1)) {
-  ChildOptions options{.executable = std::filesystem::read_symlink("/proc/self/exe"),
-                       .arguments = {"--render-child", std::to_string(slots), fault},
+  ChildOptions options{.arguments = {"--render-child", std::to_string(slots), fault},
                        .slots = slots,
-                       .hang_limit = hang_limit};
+                       .hang_limit = hang_limit,
+                       .forget_limit = hang_limit};
   auto made = make_child_backend(options);
   EXPECT_TRUE(made) << made.error().message;
   return std::move(*made);
@@ -132,16 +138,138 @@ TEST(Child, SaysWhyItCannotStart) {
   EXPECT_THAT(made.error().message, HasSubstr("/nonexistent/worker"));
 }
 
+TEST(Child, KillsARendererThatClosesItsEndAndLivesOn) {
+  const auto child = backend("odd,closes");
+
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
+}
+
+TEST(Child, EndsARendererThatStopsInTheMiddleOfAnAnswer) {
+  const auto child = backend("odd,half", 1, std::chrono::milliseconds(200));
+
+  EXPECT_THAT(child->render(job_with_seed(3), unit(0), kGoOn).error().reason, HasSubstr("hung"));
+}
+
+TEST(Child, ReplacesARendererThatHangsWhenItFreesAScene) {
+  const auto child = backend("odd,forget", 1, std::chrono::milliseconds(200));
+  ASSERT_TRUE(child->prepare(job_with_seed(3)));
+  child->forget(job_with_seed(3).brief.job);
+
+  EXPECT_TRUE(child->prepare(job_with_seed(4)));
+}
+
+TEST(Child, IsToldOfAsManyFilesAsAJobMayHave) {
+  const auto child = backend("");
+  LocalJob job = job_with_seed(3);
+  for (std::size_t i = 0; i < limits::kAssetsPerJob; ++i) {
+    const Digest digest = sha256(std::to_string(i));
+    job.brief.assets.push_back({digest, 1, std::string(limits::kNameBytes, 'n')});
+    job.assets[digest] = std::filesystem::path("/") / std::string(200, 'd') / digest.hex();
+  }
+
+  expect_right_pixels(child->render(job, unit(0), kGoOn), 3, 0);
+}
+
+TEST(Child, SeesNoSecretsOfTheAgentsEnvironment) {
+  ::setenv("LIGHTSHAFT_TEST_CLOUD_KEY", "secret", 1);
+  const auto made = make_child_backend({.arguments = {"--render-child", "1", "odd,environment"}});
+  ::unsetenv("LIGHTSHAFT_TEST_CLOUD_KEY");
+
+  EXPECT_TRUE(made) << made.error().message;
+}
+
+TEST(Child, SaysThatThereAreTooFewFileDescriptors) {
+  rlimit before{};
+  ::getrlimit(RLIMIT_NOFILE, &before);
+  const int lowest_free = ::dup(0);
+  ::close(lowest_free);
+  const rlimit few{static_cast<rlim_t>(lowest_free) + 1, before.rlim_max};
+  ::setrlimit(RLIMIT_NOFILE, &few);
+  const auto made = make_child_backend({.arguments = {"--render-child", "1", ""}});
+  ::setrlimit(RLIMIT_NOFILE, &before);
+
+  EXPECT_THAT(made.error().message, HasSubstr("ulimit -n"));
+}
+
+// The class of the child is the content of this file.
+class ChildOfAFile : public testing::Test {
+ protected:
+  ChildOfAFile() { std::ofstream(file_) << "one"; }
+  ~ChildOfAFile() override { std::filesystem::remove(file_); }
+  const std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / fmt::format("ls-child-{}", ::getpid());
+};
+
+TEST_F(ChildOfAFile, IsBrokenWhenANewChildHasAnotherNumericClass) {
+  const auto child = backend("class," + file_.string());
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
+  EXPECT_FALSE(child->broken());
+  std::ofstream(file_) << "two";
+
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
+
+  ASSERT_TRUE(child->broken());
+  EXPECT_THAT(child->broken()->message, AllOf(HasSubstr("replaced"), HasSubstr("child_test")));
+}
+
+TEST_F(ChildOfAFile, IsBrokenWhenANewChildEndsBeforeItIsReady) {
+  const auto child = backend("class," + file_.string());
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
+  std::filesystem::remove(file_);
+
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
+
+  EXPECT_TRUE(child->broken());
+}
+
+// Children that no renderer would be.
+int serve_oddly(const std::string& kind) {
+  using namespace child;
+  if (kind == "environment") {
+    std::ifstream own("/proc/self/environ");
+    const std::string all{std::istreambuf_iterator<char>(own), {}};
+    return all.find("secret") == std::string::npos ? serve(*make_fake_backend({}), 1) : 9;
+  }
+  std::jthread slot([&kind] {
+    Request request;
+    if (!receive_all(kFirstSlotFd, &request, sizeof request)) return;
+    const Reply reply;
+    if (kind == "half") send_all(kFirstSlotFd, &reply, sizeof reply / 2);
+    if (kind == "closes") ::close(kFirstSlotFd);
+  });
+  Request request;
+  while (receive_all(kControlFd, &request, sizeof request)) {
+    std::string text(request.text_bytes, 0);
+    receive_all(kControlFd, text.data(), text.size());
+    if (request.kind == Kind::forget) break;
+    const Reply reply{.numeric_class = fake_numeric_class()};
+    send_all(kControlFd, &reply, sizeof reply);
+  }
+  for (;;) ::pause();
+}
+
+int serve_as_told(int slots, const std::string& how) {
+  if (how.starts_with("odd,")) return serve_oddly(how.substr(4));
+  FakeOptions options;
+  if (how.starts_with("class,")) {
+    std::ifstream in(how.substr(6));
+    std::string text;
+    if (!(in >> text)) return 3;
+    options.numeric_class = sha256(text);
+    options.fault = parse_fake_fault("crash,tile=1").value();
+  } else {
+    options.fault = parse_fake_fault(how).value();
+  }
+  return child::serve(*make_fake_backend(options), slots);
+}
+
 }  // namespace
 }  // namespace ls::worker
 
 int main(int argc, char** argv) {
   if (argc == 4 && std::strcmp(argv[1], "--render-child") == 0) {
     ls::worker::child::confine(ls::worker::kMemoryLimit);
-    ls::worker::FakeOptions options;
-    options.fault = ls::worker::parse_fake_fault(argv[3]).value();
-    const auto backend = ls::worker::make_fake_backend(options);
-    return ls::worker::child::serve(*backend, std::stoi(argv[2]));
+    return ls::worker::serve_as_told(std::stoi(argv[2]), argv[3]);
   }
   testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
