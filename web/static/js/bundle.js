@@ -1,7 +1,8 @@
 // From dropped files to what a job needs: which file is the scene, which files it names, what is missing, what is not
 // used. Only what the scene names is sent.
 
-const kIncludeDepth = 16;
+const kIncludeDepth = 15; // limits of the coordinator's reader
+const kIncludes = 256;
 
 /** Files of a drop or of an <input type=file>, with their paths: [{path, file}]. Folders are walked. */
 export async function filesOfDrop(transfer) {
@@ -38,55 +39,102 @@ export function scenesAmong(files) {
     .sort((a, b) => folderOf(a).length - folderOf(b).length || (a < b ? -1 : 1));
 }
 
-/** Names of the files that a scene text mentions, as it writes them; null if it is not XML (the coordinator says why). */
-export function namesIn(text) {
-  const document = new DOMParser().parseFromString(text, "application/xml");
-  if (document.querySelector("parsererror")) return null;
-  const strings = [...document.querySelectorAll('string[name="filename"]')].map((node) => node.getAttribute("value"));
-  const includes = [...document.querySelectorAll("include[filename]")].map((node) => node.getAttribute("filename"));
-  return { names: [...new Set([...strings, ...includes])].filter(Boolean), includes };
-}
-
 /**
- * {main, assets: [{name, file}], missing: [name], unused: [path]}: `name` is what the scene calls the file. A file is
- * found by its path relative to the scene, or else by its base name if that is unique (files dropped without their
- * folders). A scene that can't be read, or names that hold $parameters, take all files along.
+ * {main, assets: [{name, file}], missing: [name], unused: [path]}: `name` is where the coordinator looks for the file
+ * first among the places that have it. A file is found by its path relative to the scene, or else by its base name if
+ * that is unique (files dropped without their folders). A scene that can't be read, or names that hold $parameters,
+ * take all files along.
  */
 export async function plan(files, main) {
   const scene = files.find(({ path }) => path === main);
   const others = files.filter((file) => file !== scene);
-  const wanted = await namesOf(scene.file, others, main);
-  if (wanted === null || wanted.some((name) => name.includes("$"))) {
+  const survey = new Survey(others, main);
+  if (!(await survey.read(scene.file, [])) || survey.hasParameters) {
     return { main: scene.file, assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [] };
   }
-  const found = wanted.map((name) => ({ name, entry: find(others, name, main) }));
-  const used = new Set(found.map(({ entry }) => entry));
+  survey.resolveStrings();
+  const used = new Set(survey.found.values());
   return {
     main: scene.file,
-    assets: found.filter(({ entry }) => entry).map(({ name, entry }) => ({ name, file: entry.file })),
-    missing: found.filter(({ entry }) => !entry).map(({ name }) => name),
+    assets: [...survey.found].map(([name, { file }]) => ({ name, file })),
+    missing: [...survey.missing],
     unused: others.filter((entry) => !used.has(entry)).map(({ path }) => path),
   };
 }
 
-async function namesOf(file, others, main, depth = 0) {
-  const own = namesIn(await file.text());
-  if (own === null) return null;
-  const all = new Set(own.names);
-  for (const include of depth < kIncludeDepth ? own.includes : []) {
-    const entry = find(others, include, main);
-    const inner = entry && entry.file !== file ? await namesOf(entry.file, others, main, depth + 1) : [];
-    if (inner === null) return null;
-    inner.forEach((name) => all.add(name));
+/** What a scene names, found as the coordinator's reader finds it (common/scene/document.cpp, reader.cpp). */
+class Survey {
+  found = new Map(); // name -> {path, file}
+  missing = new Set();
+  hasParameters = false;
+  #files;
+  #main;
+  #paths = []; // of <path>, the latest first
+  #strings = new Set();
+  #includes = 0;
+
+  constructor(files, main) {
+    this.#files = files;
+    this.#main = main;
   }
-  return [...all];
+
+  /** In document order, since a <path> counts from where it stands. `within`: names of the files that include this one. False: no XML (the coordinator says why). */
+  async read(file, within) {
+    const document = new DOMParser().parseFromString(await file.text(), "application/xml");
+    if (document.querySelector("parsererror")) return false;
+    for (const node of document.querySelectorAll('path[value], include[filename], string[name="filename"][value]')) {
+      const name = node.getAttribute(node.localName === "include" ? "filename" : "value");
+      this.hasParameters ||= name.includes("$");
+      if (node.localName === "path") this.#paths.unshift(joined("", name));
+      else if (node.localName === "string") this.#strings.add(name);
+      else if (name && !(await this.#include(name, within))) return false;
+    }
+    return true;
+  }
+
+  /** Beside the including file, in the <path>s so far, beside the scene. */
+  async #include(name, within) {
+    this.#includes += 1;
+    const beside = within.length ? [joined(`${within.at(-1)}/..`, name)] : [];
+    const place = this.#resolve(name, beside);
+    if (place === null || within.includes(place) || within.length >= kIncludeDepth || this.#includes > kIncludes) return true;
+    return this.read(this.found.get(place).file, [...within, place]);
+  }
+
+  /** Meshes, textures and grids: in all <path>s, beside the scene. */
+  resolveStrings() {
+    for (const name of this.#strings) if (name) this.#resolve(name, []);
+  }
+
+  #resolve(name, first) {
+    const places = [...first, ...this.#paths.map((path) => joined(path, name)), joined("", name)];
+    const exact = places.map((place) => [place, this.#files.find(({ path }) => relative(path, this.#main) === place)]).find(([, entry]) => entry);
+    const [place, entry] = exact ?? [places.at(-1), only(this.#files, name)];
+    if (!entry) {
+      this.missing.add(name);
+      return null;
+    }
+    this.found.set(place, entry);
+    return place;
+  }
 }
 
-function find(files, name, main) {
-  const exact = files.find(({ path }) => relative(path, main) === name.replace(/^\.\//, ""));
-  if (exact) return exact;
+/** The one file of this base name. */
+function only(files, name) {
   const alike = files.filter(({ path }) => baseOf(path) === baseOf(name));
   return alike.length === 1 ? alike[0] : undefined;
+}
+
+/** "a/.." and "./b/x.obj" are "b/x.obj". */
+function joined(folder, name) {
+  const text = folder === "" || name.startsWith("/") ? name : `${folder}/${name}`;
+  const parts = [];
+  for (const part of text.split("/")) {
+    if (part === "" || part === ".") continue;
+    if (part === ".." && parts.length > 0 && parts.at(-1) !== "..") parts.pop();
+    else parts.push(part);
+  }
+  return (text.startsWith("/") ? "/" : "") + parts.join("/");
 }
 
 /** `path` as seen from the folder of `main`: "a/b/c.obj" from "a/s.xml" is "b/c.obj"; "t/x.png" from "a/s.xml" is "../t/x.png". */
