@@ -4,6 +4,8 @@
 
 const kShortestPauseMs = 400;
 const kPausePerCost = 3; // a picture that took 1 s is not asked for again within 3 s
+const kFirstRetryMs = 500; // after a failure, doubled by each further one
+const kLongestRetryMs = 15_000;
 
 class LiveImage extends HTMLElement {
   #canvas = document.createElement("canvas");
@@ -12,6 +14,8 @@ class LiveImage extends HTMLElement {
   #request = null; // AbortController of the request under way
   #timer = 0;
   #notBefore = 0; // performance.now()
+  #failures = 0; // in a row, of what is wanted now
+  #retryAt = 0; // performance.now()
 
   connectedCallback() {
     this.append(this.#canvas);
@@ -24,12 +28,17 @@ class LiveImage extends HTMLElement {
   }
 
   set source(source) { this.#values.source = source; this.#schedule(); }
-  set version(version) { this.#values.version = version; this.#schedule(); }
+  set version(version) {
+    if (version !== this.#values.version) this.#retryAt = this.#failures = 0;
+    this.#values.version = version;
+    this.#schedule();
+  }
   set size(size) { // width * 65536 + height, one number so that equal sizes compare equal
     this.#canvas.width = Math.floor(size / 65536);
     this.#canvas.height = size % 65536;
   }
   set exposure(exposure) {
+    if (exposure !== this.#values.exposure) this.#retryAt = this.#failures = 0;
     this.#values.exposure = exposure;
     this.#preview();
     this.#notBefore = Math.min(this.#notBefore, performance.now() + 120);
@@ -47,7 +56,7 @@ class LiveImage extends HTMLElement {
     if (!this.isConnected || !this.#values.source || this.#request) return;
     const { version, exposure } = this.#values;
     if (this.#shown?.version === version && this.#shown.exposure === exposure) return;
-    this.#timer = setTimeout(() => this.#fetch(), Math.max(0, this.#notBefore - performance.now()));
+    this.#timer = setTimeout(() => this.#fetch(), Math.max(0, this.#notBefore - performance.now(), this.#retryAt - performance.now()));
   }
 
   async #fetch() {
@@ -57,11 +66,14 @@ class LiveImage extends HTMLElement {
     try {
       this.#paint(await source(exposure, this.#request.signal));
       this.dataset.painted = String(Number(this.dataset.painted ?? 0) + 1);
+      this.#shown = { version, exposure };
+      this.#failures = 0;
     } catch {
-      // Nothing folded yet, or a hiccup: the last picture stays, and the next change asks again. The page's own
-      // status says when the coordinator is away.
+      // Nothing folded yet, or a hiccup: the last picture stays, and it is asked for again, ever more rarely, or at the
+      // next change. The page's own status says when the coordinator is away.
+      this.#retryAt = performance.now() + Math.min(kFirstRetryMs * 2 ** this.#failures, kLongestRetryMs);
+      this.#failures += 1;
     }
-    this.#shown = { version, exposure };
     this.#request = null;
     this.#preview();
     this.#notBefore = performance.now() + Math.max(kShortestPauseMs, kPausePerCost * (performance.now() - began));
