@@ -3,6 +3,7 @@
 // parses markup.
 
 const kSvg = "http://www.w3.org/2000/svg";
+const kNode = Symbol("node"); // marks what h() made: no JSON from elsewhere can have it, whatever its fields are called
 
 /**
  * h("a", {href, class, key, onclick, style: {"--x": 1}, ".prop": value}, ...children)
@@ -11,14 +12,14 @@ const kSvg = "http://www.w3.org/2000/svg";
  */
 export function h(tag, attributes, ...children) {
   const { key = null, ...rest } = attributes ?? {};
-  return { tag, key, attributes: rest, children: normalise(children) };
+  return { [kNode]: true, tag, key, attributes: rest, children: normalise(children) };
 }
 
 function normalise(children) {
   return children
     .flat(Infinity)
     .filter((child) => child !== null && child !== undefined && child !== false && child !== true)
-    .map((child) => (typeof child === "object" ? child : { tag: null, key: null, text: String(child) }));
+    .map((child) => (child[kNode] ? child : { [kNode]: true, tag: null, key: null, text: String(child) }));
 }
 
 const nodeOf = new WeakMap(); // element -> the h() node it shows
