@@ -54,6 +54,9 @@ class StubFarm:
         self.refusal = None  # problem details for the next POST /jobs
         self.requests = []  # (method, path)
         self.signed_in = False  # of the one browser that a test has
+        self.broken = set()  # names under /api/v1/ that answer with 503
+        self.put_gate = threading.Event()  # blobs are taken while it is set
+        self.put_gate.set()
         self._streams = []
         self._event_id = 0
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
@@ -139,6 +142,8 @@ def _handler(farm):
                 return self._session(body)
             if not farm.signed_in:
                 return self._problem(401, "No valid token or session came with this request.")
+            if parts[0] in farm.broken:
+                return self._problem(503, "The store is away.")
             answer = getattr(self, f"_{self.command.lower()}_{parts[0]}", None)
             return answer(parts[1:], body) if answer else self._problem(404, f"There is nothing at {path}.")
 
@@ -196,6 +201,7 @@ def _handler(farm):
             return self._send(200, {"missing": [digest for digest in json.loads(body)["digests"] if digest not in farm.blobs]})
 
         def _put_blobs(self, parts, body):
+            farm.put_gate.wait(timeout=60)
             if hashlib.sha256(body).hexdigest() != parts[0]:
                 return self._problem(400, "These bytes have another SHA-256 than their name says.")
             farm.blobs[parts[0]] = body

@@ -25,6 +25,23 @@ def test_asks_for_a_token_and_says_when_it_is_wrong(farm, open_page):
     assert page.evaluate("document.getElementById('token')") is None
 
 
+def test_a_farm_that_fails_after_the_sign_in_says_so(farm, open_page):
+    farm.broken.add("jobs")
+    page = open_page(farm.url)
+    page.wait("document.getElementById('token')")
+    page.click("#token")
+    page.type(TOKEN)
+
+    page.key("Enter", virtual=13, text="\r")
+    page.wait("document.querySelector('.field-error')?.innerText.includes('The store is away.')")
+
+    farm.broken.clear()
+    page.evaluate("document.getElementById('token').select()")
+    page.type(TOKEN)
+    page.click("button[type=submit]")
+    page.wait("document.querySelector('.link.live')")
+
+
 def test_token_in_the_fragment_signs_in_and_leaves_the_address_bar(farm, open_page):
     page = open_page(f"{farm.url}/#token={TOKEN}")
 
@@ -273,6 +290,29 @@ def test_files_can_be_dropped(farm, dashboard):
     })()""")
 
     assert page.text(".bundle h2") == "drop.xml"
+
+
+def test_files_dropped_while_a_job_is_sent_change_nothing(farm, dashboard, scene_files):
+    page = dashboard("#/submit")
+    page.wait("document.getElementById('files')")
+    page.set_files("#files", scene_files)
+    farm.put_gate.clear()
+    page.click(".settings button")
+    page.wait("document.querySelector('.sending')?.innerText.includes('Sending')")
+
+    page.evaluate("""void (() => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File(["<scene version='3.0.0'/>"], "aaa.xml"));
+      document.querySelector(".drop").dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    })()""")
+    page.evaluate("new Promise((resolve) => setTimeout(() => requestAnimationFrame(resolve)))")  # the drop has been seen
+    still_sending = page.evaluate("document.querySelector('.settings button').disabled && document.querySelector('.sending') !== null")
+    listed = page.text(".bundle")
+    farm.put_gate.set()
+
+    page.wait("location.hash === '#/jobs/j-new'")
+    assert still_sending and "aaa.xml" not in listed
+    assert len(farm.submitted) == 1
 
 
 def test_a_missing_file_is_named_before_anything_is_sent(farm, dashboard, scene_files):

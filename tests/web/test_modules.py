@@ -61,3 +61,92 @@ def test_patch_touches_only_what_changed(modules, before, after, touched):
     }})()""")
 
     assert found == [touched, after]
+
+
+def plan(modules, files, main="main.xml"):
+    """{name: text} of what bundle.js would send, and what it misses."""
+    return modules.evaluate(f"""(async () => {{
+      const {{ plan }} = await import("/js/bundle.js");
+      const files = Object.entries({json.dumps(files)}).map(([path, text]) => ({{ path, file: new File([text], path.split("/").pop()) }}));
+      const {{ assets, missing, unused }} = await plan(files, {json.dumps(main)});
+      const texts = await Promise.all(assets.map(async ({{ name, file }}) => [name, await file.text()]));
+      return {{ assets: Object.fromEntries(texts), missing, unused }};
+    }})()""")
+
+
+def scene(*children):
+    return f"<scene version='3.0.0'>{''.join(children)}</scene>"
+
+
+def mesh(name):
+    return f"<shape type='obj'><string name='filename' value='{name}'/></shape>"
+
+
+def include(name):
+    return f"<include filename='{name}'/>"
+
+
+def test_an_include_is_looked_for_beside_the_file_that_includes_it(modules):
+    inner = scene(mesh("right.obj"))
+    planned = plan(modules, {
+        "main.xml": scene(include("parts/a.xml")), "parts/a.xml": scene(include("b.xml")), "parts/b.xml": inner,
+        "b.xml": scene(mesh("wrong.obj")), "right.obj": "r", "wrong.obj": "w"})
+
+    assert set(planned["assets"]) == {"parts/a.xml", "parts/b.xml", "right.obj"}
+    assert planned["assets"]["parts/b.xml"] == inner
+    assert planned["missing"] == [] and set(planned["unused"]) == {"b.xml", "wrong.obj"}
+
+
+def test_paths_are_searched_the_latest_first(modules):
+    planned = plan(modules, {
+        "main.xml": scene("<path value='old'/>", mesh("x.obj"), include("part.xml"), "<path value='new'/>"),
+        "x.obj": "beside", "old/x.obj": "old", "new/x.obj": "new",
+        "old/part.xml": scene("<!-- old -->"), "new/part.xml": scene("<!-- new -->")})
+
+    assert planned["assets"]["new/x.obj"] == "new", "a mesh is looked for in all paths"
+    assert "old/part.xml" in planned["assets"], "an include only in those that stand before it"
+    assert len(planned["assets"]) == 2
+
+
+def test_a_file_that_includes_itself_is_left_to_the_coordinator(modules):
+    planned = plan(modules, {"main.xml": scene(include("a.xml")), "a.xml": scene(include("a.xml"), mesh("x.obj"))})
+
+    assert set(planned["assets"]) == {"a.xml"} and planned["missing"] == ["x.obj"]
+
+
+def test_parameters_in_names_take_all_files_along(modules):
+    planned = plan(modules, {"main.xml": scene(mesh("$what.obj")), "x.obj": "x", "deep/y.obj": "y"})
+
+    assert set(planned["assets"]) == {"x.obj", "deep/y.obj"}
+
+
+def test_a_picture_that_failed_is_asked_for_again_without_a_new_version(modules):
+    painted = modules.evaluate("""(async () => {
+      await import("/js/live_image.js");
+      const image = document.createElement("live-image");
+      let asked = 0;
+      image.source = async () => {
+        asked += 1;
+        if (asked < 3) throw new Error("away");
+        return Object.assign(document.createElement("canvas"), { width: 4, height: 4 });
+      };
+      image.version = 1;
+      document.body.append(image);
+      const end = performance.now() + 15_000;
+      while (!image.dataset.painted && performance.now() < end) await new Promise(requestAnimationFrame);
+      image.remove();
+      return [image.dataset.painted, asked];
+    })()""", timeout=30)
+
+    assert painted == ["1", 3]
+
+
+def test_data_that_looks_like_a_node_is_shown_as_text(modules):
+    shown = modules.evaluate("""(async () => {
+      const { h, patch } = await import("/js/dom.js");
+      const place = document.createElement("div");
+      patch(place, h("p", null, JSON.parse('{"tag": "img", "key": null, "attributes": {"src": "/evil"}, "children": []}')));
+      return [place.querySelectorAll("img").length, place.textContent];
+    })()""")
+
+    assert shown == [0, "[object Object]"]

@@ -55,22 +55,35 @@ async function signIn(token) {
   set(withUi(state, { signingIn: true, signInError: null }));
   try {
     await api.signIn(token);
-    await enter();
+    const problem = await enter();
+    if (problem) {
+      signedOut(problem.status === 401
+        ? "The token is right, but the browser keeps no session: allow cookies for this page."
+        : `The token is right, but the jobs can’t be shown: ${problem.message} Try again.`);
+    }
   } catch (error) {
     signedOut(error.status === 401 || error.status === 403 ? "This token is not known here." : error.message);
   }
   set(withUi(state, { signingIn: false }));
 }
 
+/** Shows the farm. Returns the error if that is not possible. */
 async function enter() {
-  const jobs = await attempt(api.jobs);
-  if (!jobs) {
-    if (state.session === "unknown") setTimeout(enter, kReportPauseMs);
-    return;
+  let jobs;
+  try {
+    jobs = await api.jobs();
+  } catch (error) {
+    if (error.status === 401) signedOut();
+    else if (state.session === "unknown") {
+      set(withUi(state, { notice: error.message }));
+      setTimeout(enter, kReportPauseMs);
+    }
+    return error;
   }
   set(withUi({ ...withJobs(state, jobs), session: "in" }, { signInError: null, notice: null }));
   closeEvents ??= openEvents({ onOpen, onLost, onEvent });
   showRoute();
+  return null;
 }
 
 function signedOut(message = null) {

@@ -4,7 +4,10 @@ import { emptySubmission, withSubmit } from "./state.js";
 import { submitJob } from "./submit.js";
 
 export function makeSubmitActions({ get, set, api }) {
+  const busy = () => ["hashing", "sending"].includes(get().submit.phase);
+
   async function take(files, main = null) {
+    if (busy()) return; // what is being sent stays as it is
     const all = merged(get().submit.files, files);
     const scene = main ?? get().submit.main ?? scenesAmong(all)[0] ?? null;
     set(withSubmit(get(), { files: all, main: scene, plan: null, phase: "choose", error: null }));
@@ -13,12 +16,13 @@ export function makeSubmitActions({ get, set, api }) {
       const plan = await planOf(all, scene);
       if (get().submit.files === all) set(withSubmit(get(), { plan }));
     } catch {
-      set(withSubmit(get(), { error: { message: `The browser can't read ${scene}. If it was moved or changed, choose it again.`, diagnostics: [] } }));
+      if (get().submit.files === all) set(withSubmit(get(), { error: { message: `The browser can't read ${scene}. If it was moved or changed, choose it again.`, diagnostics: [] } }));
     }
   }
 
   async function send(event) {
     event.preventDefault();
+    if (busy()) return;
     const { plan, settings } = get().submit;
     set(withSubmit(get(), { error: null, phase: "hashing", step: "Reading the files", progress: 0 }));
     try {
@@ -50,7 +54,7 @@ export function makeSubmitActions({ get, set, api }) {
       const { name, value } = event.currentTarget;
       set(withSubmit(get(), { settings: { ...get().submit.settings, [name]: value } }));
     },
-    clearFiles: () => set(withSubmit(get(), { ...emptySubmission(), settings: get().submit.settings })),
+    clearFiles: () => busy() || set(withSubmit(get(), { ...emptySubmission(), settings: get().submit.settings })),
     onSubmit: send,
   };
 }
