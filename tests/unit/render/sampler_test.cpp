@@ -119,13 +119,39 @@ TEST(SampleStream, SamplesBeyondTheSequenceAreDrawnByHash) {
             SampleStream(0, 0, 0, last + 3).group(0, Purpose::camera).bits);
 }
 
-TEST(Exponential, IsFiniteEverywhereAndZeroOnlyAtTheTop) {
-  EXPECT_EQ(exponential(0xffffffffu), 0.f);
-  EXPECT_FLOAT_EQ(exponential(0), 32 * std::log(2.f));  // 22 mean free paths
-  EXPECT_GE(exponential(0xfffffffeu), 0.f);
-  for (std::uint64_t b = 0; b < (1ull << 32); b += 65521) {
-    ASSERT_TRUE(std::isfinite(exponential(static_cast<std::uint32_t>(b))));
-    ASSERT_GE(exponential(static_cast<std::uint32_t>(b)), 0.f);
+TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
+  const auto check = [](std::uint32_t bits) {
+    const double x = (static_cast<double>(~bits) + .5) * 0x1p-32, y = (bits + .5) * 0x1p-32;
+    const double exact = x < .5 ? -std::log1p(-x) : -std::log(y);
+    // Four roundings of 2^-24 and a logarithm good to one unit in its last place.
+    ASSERT_NEAR(exponential(bits) / exact, 1, 6 * 0x1p-24) << bits;
+  };
+  EXPECT_FLOAT_EQ(exponential(0), 33 * std::log(2.f));
+  for (std::uint64_t b = 0; b < (1ull << 32); b += 65521) check(static_cast<std::uint32_t>(b));
+  for (int k = 0; k < 32; ++k) {
+    for (std::uint32_t i = 0; i < 300; ++i) {
+      check((1u << k) + i);
+      check(~((1u << k) + i));
+    }
+  }
+  for (std::uint32_t i = 0; i < 300; ++i) check(~i);
+}
+
+// A thin medium scatters the share 1 - e^-depth of all flights (STABILITY N2): as many of the 2^32 inputs, to
+// one.
+TEST(Exponential, TheShareBelowAThinDepthIsThatDepth) {
+  for (const double depth : {1e-9, 1e-8, 3e-8, 1e-7, 1e-6, 1e-3, .5, .7, 2.}) {
+    std::uint64_t lo = 0, hi = 1ull << 32;  // depths fall with bits: the first input below the depth
+    while (lo < hi) {
+      const std::uint64_t mid = (lo + hi) / 2;
+      if (exponential(static_cast<std::uint32_t>(mid)) < static_cast<float>(depth)) {
+        hi = mid;
+      } else {
+        lo = mid + 1;
+      }
+    }
+    const double expected = -0x1p32 * std::expm1(-depth);
+    EXPECT_NEAR(static_cast<double>((1ull << 32) - lo), expected, 1 + expected * 8 * 0x1p-24) << depth;
   }
 }
 
@@ -142,6 +168,23 @@ TEST(RandomStream, HasTheMomentsOfItsDistributions) {
   for (int i = 0; i < kN; ++i) e += r.exponential();
   EXPECT_NEAR(u / kN, .5, 5 * std::sqrt(1. / 12 / kN));  // 5 standard deviations
   EXPECT_NEAR(e / kN, 1, 5 * std::sqrt(1. / kN));
+}
+
+TEST(RandomStream, ItsExponentialsResolveThinDepths) {
+  RandomStream r(43);
+  constexpr int kN = 1 << 22;
+  int odd = 0, below = 0;
+  for (int i = 0; i < kN; ++i) {
+    const float e = r.exponential();
+    ASSERT_GT(e, 0);
+    if (e < 0x1p-13f) {
+      ++below;
+      // -log of a float32 near 1 would be a multiple of 2^-24, but for its second order.
+      odd += std::abs(std::remainder(e, 0x1p-24f)) > .25f * 0x1p-24f;
+    }
+  }
+  EXPECT_NEAR(below, kN * 0x1p-13, 5 * std::sqrt(kN * 0x1p-13));
+  EXPECT_GT(odd, below / 4);  // half of them on average, of 512
 }
 
 }  // namespace
