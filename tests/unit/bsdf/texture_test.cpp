@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/scene/limits.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -177,6 +178,19 @@ TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
   s.textures = {CheckerboardTexture{{0}, {7}, {}}};
   EXPECT_THAT(build_error(s), HasSubstr("does not exist"));
   EXPECT_THAT(build_error(with(BitmapTexture{{3}})), HasSubstr("file 3 of 1"));
+}
+
+// As deep as scenes may be written (common/scene/limits.h), and no deeper.
+TEST(Checkerboard, MayHoldOthersAsDeepAsTheReaderLetsThem) {
+  const auto chain = [](int n) {
+    Scene s;
+    for (std::uint32_t i = 1; i <= static_cast<std::uint32_t>(n); ++i)  // the outermost first
+      s.textures.push_back(CheckerboardTexture{{i}, {i}, {}});
+    s.textures.push_back(ConstantTexture{{.5, .5, .5}});
+    return s;
+  };
+  EXPECT_EQ(build_error(chain(scene::kMaxReferenceDepth)), "");
+  EXPECT_THAT(build_error(chain(scene::kMaxReferenceDepth + 1)), HasSubstr("deep"));
 }
 
 }  // namespace

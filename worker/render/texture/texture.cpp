@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/overloaded.h"
+#include "common/scene/limits.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -74,7 +75,7 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
 // Means of checkerboards, children first. A chain of n takes n passes; one that never settles is a circle.
 Result<void> resolve_checkerboards(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
-  for (int pass = 0; pass <= kMaxTextureDepth; ++pass) {
+  for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {
     bool changed = false;
     for (std::size_t i = 0; i < data.entries.size(); ++i) {
       Entry& e = data.entries[i];
@@ -88,7 +89,7 @@ Result<void> resolve_checkerboards(TextureTable::Data& data) {
   }
   return fail(Errc::invalid_argument,
               fmt::format("checkerboard textures contain each other in a circle, or more than {} deep",
-                          kMaxTextureDepth));
+                          scene::kMaxReferenceDepth));
 }
 
 const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv) {

@@ -24,7 +24,7 @@ class TextureTable {
   TextureTable& operator=(TextureTable&&) noexcept;
 
   // Loads each file once. invalid_argument: an index out of range, textures that refer to each other in a
-  // circle or deeper than kMaxTextureDepth, a texel that is NaN or infinite (with file and texel).
+  // circle or deeper than kMaxReferenceDepth, a texel that is NaN or infinite (with file and texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load);
 
   C3 eval(TextureIndex i, V2 uv) const;
@@ -41,7 +41,5 @@ class TextureTable {
  private:
   std::unique_ptr<Data> data_;
 };
-
-inline constexpr int kMaxTextureDepth = 16;  // checkerboards of checkerboards
 
 }  // namespace ls::render
