@@ -24,13 +24,13 @@ float one_minus_cos(const Sphere& s, float sign, const V3& x) {
 
 }  // namespace
 
-LightChoice Lights::choose(float u_select, V2 u) const {
-  const auto it = std::upper_bound(cdf_.begin(), cdf_.end() - 1, u_select);
+LightChoice Lights::choose(const LightNumbers& numbers) const {
+  const auto it = std::lower_bound(last_.begin(), last_.end() - 1, numbers.light);
   LightChoice c;
-  c.light = static_cast<std::uint32_t>(it - cdf_.begin());
+  c.light = static_cast<std::uint32_t>(it - last_.begin());
   const Light& l = lights_[c.light];
   c.probability = l.probability;
-  c.u = u;
+  c.numbers = numbers;
   c.has_place = l.kind != Kind::directional;
   switch (l.kind) {
     case Kind::point:
@@ -43,7 +43,7 @@ LightChoice Lights::choose(float u_select, V2 u) const {
     case Kind::parallelogram:
     case Kind::mesh:
     case Kind::disk:
-      c.pivot = area_point(l, u).p;
+      c.pivot = area_point(l, numbers).p;
       break;
     case Kind::directional:
       break;
@@ -51,25 +51,28 @@ LightChoice Lights::choose(float u_select, V2 u) const {
   return c;
 }
 
-Lights::Point Lights::area_point(const Light& l, V2 u) const {
+Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) const {
+  if (l.kind == Kind::mesh) return mesh_point(l, numbers);
+  const V2 u(unit_float(numbers.x), unit_float(numbers.y));
   if (l.kind == Kind::parallelogram) {
     return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y};
   }
-  if (l.kind == Kind::disk) {
-    const V2 q = concentric_disk(u);
-    float angle = std::atan2(q.y, q.x);
-    if (angle < 0) angle += kTwoPi;
-    return {l.position + l.axis_u * q.x + l.axis_v * q.y,
-            l.normal,
-            {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi}};
-  }
-  // Mesh: the first number chooses the triangle and is stretched to be used again.
-  const double target = u.x * l.cdf.back();
+  const V2 q = concentric_disk(u);
+  float angle = std::atan2(q.y, q.x);
+  if (angle < 0) angle += kTwoPi;
+  return {l.position + l.axis_u * q.x + l.axis_v * q.y,
+          l.normal,
+          {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi}};
+}
+
+// The first number chooses the triangle and is stretched to be used again.
+Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) const {
+  const double target = (numbers.x + .5) * 0x1p-32 * l.cdf.back();
   const auto it = std::upper_bound(l.cdf.begin(), l.cdf.end() - 1, target);
   const auto k = static_cast<std::uint32_t>(it - l.cdf.begin());
   const double before = k ? l.cdf[k - 1] : 0, width = l.cdf[k] - before;
   const auto r = static_cast<float>(std::clamp((target - before) / width, 0., 1.));
-  const float root = std::sqrt(r), b0 = 1 - root, b1 = u.y * root, b2 = 1 - b0 - b1;
+  const float root = std::sqrt(r), b0 = 1 - root, b1 = unit_float(numbers.y) * root, b2 = 1 - b0 - b1;
   const std::uint32_t tri = l.primitive + k, *idx = &geometry_->indices[std::size_t{3} * tri];
   const V3 v0 = geometry_->positions[idx[0]], v1 = geometry_->positions[idx[1]],
            v2 = geometry_->positions[idx[2]];
@@ -151,9 +154,9 @@ std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) con
     case Kind::parallelogram:
     case Kind::mesh:
     case Kind::disk:
-      return sample_area(l, area_point(l, c.u), x);
+      return sample_area(l, area_point(l, c.numbers), x);
     case Kind::sphere:
-      return sample_sphere(l, c.u, x);
+      return sample_sphere(l, {unit_float(c.numbers.x), unit_float(c.numbers.y)}, x);
     case Kind::directional: {
       return LightSample{-l.normal, kInfinity, V3(0), l.value, l.probability, true};
     }

@@ -28,13 +28,19 @@ struct LightSample {
   bool delta = false;
 };
 
+// Random words a light and a point on it are made from: all 32 bits of each, because which of many lights or
+// triangles they mean is a matter of the last ones.
+struct LightNumbers {
+  std::uint32_t light = 0, x = 0, y = 0;
+};
+
 // What is chosen before the shaded point is known.
 struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
   bool has_place = false;
   V3 pivot;
-  V2 u;  // the numbers its point is made from
+  LightNumbers numbers;
 };
 
 class Lights {
@@ -44,7 +50,12 @@ class Lights {
 
   bool can_sample() const { return !lights_.empty(); }  // any light that next-event estimation can reach
   bool any_with_place() const { return any_with_place_; }
-  LightChoice choose(float u_select, V2 u) const;
+  LightChoice choose(const LightNumbers& numbers) const;
+  // The same from numbers in [0, 1).
+  LightChoice choose(float u_select, V2 u) const {
+    const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
+    return choose({bits(u_select), bits(u.x), bits(u.y)});
+  }
   // Light arriving at x from the chosen light; nothing if none can (behind, outside the cone, zero solid
   // angle).
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
@@ -83,18 +94,29 @@ class Lights {
     V2 uv;
   };
 
-  void add_area(const Scene& scene, std::uint32_t shape, Geometry& geometry);
+  // Where the primitives of a shape lie in Geometry's lists: each shape's are together.
+  struct Range {
+    std::uint32_t first = kNone, count = 0;
+  };
+  struct Primitives {
+    std::vector<Range> triangles, spheres, disks;  // by surface
+  };
+
+  static Primitives primitives_of(const Geometry& geometry);
+  void add_area(const Scene& scene, std::uint32_t shape, const Primitives& primitives, Geometry& geometry);
   Result<void> add_emitter(const Emitter& emitter);
   void set_probabilities(float scene_radius);
   double power(const Light& light, float scene_radius) const;
-  Point area_point(const Light& light, V2 u) const;
+  Point area_point(const Light& light, const LightNumbers& numbers) const;
+  Point mesh_point(const Light& light, const LightNumbers& numbers) const;
   std::optional<LightSample> sample_area(const Light& light, const Point& y, const V3& x) const;
   std::optional<LightSample> sample_sphere(const Light& light, V2 u, const V3& x) const;
   C3 spot_radiance(const Light& light, const V3& towards) const;
   C3 area_radiance(const Light& light, V2 uv) const { return textures_->eval(light.radiance, uv); }
 
   std::vector<Light> lights_;
-  std::vector<float> cdf_;
+  // Light i is chosen by the words above last_[i - 1] up to last_[i]: its probability is exactly their share.
+  std::vector<std::uint32_t> last_;
   const Geometry* geometry_ = nullptr;
   const TextureTable* textures_ = nullptr;
   C3 environment_{0, 0, 0};

@@ -3,49 +3,48 @@
 #include <cmath>
 
 #include "common/base/overloaded.h"
+#include "worker/render/color.h"
 #include "worker/render/lights.h"
 #include "worker/render/transform.h"
 
 namespace ls::render {
-namespace {
 
-C3 color(const Rgb& c) {
-  return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+Lights::Primitives Lights::primitives_of(const Geometry& g) {
+  Primitives p;
+  for (auto* ranges : {&p.triangles, &p.spheres, &p.disks}) ranges->resize(g.surfaces.size());
+  const auto add = [](Range& r, std::size_t i) {
+    if (r.count++ == 0) r.first = static_cast<std::uint32_t>(i);
+  };
+  for (std::size_t i = 0; i < g.triangle_surface.size(); ++i) add(p.triangles[g.triangle_surface[i]], i);
+  for (std::size_t i = 0; i < g.spheres.size(); ++i) add(p.spheres[g.spheres[i].surface], i);
+  for (std::size_t i = 0; i < g.disks.size(); ++i) add(p.disks[g.disks[i].surface], i);
+  return p;
 }
 
-}  // namespace
-
-void Lights::add_area(const Scene& scene, std::uint32_t shape, Geometry& g) {
+void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives& primitives, Geometry& g) {
   const Shape& s = scene.shapes[shape];
   Light l;
   l.radiance = s.emitter->radiance;
   l.textured = !textures_->is_constant(l.radiance);
   l.sign = g.surfaces[shape].orientation;
-  std::uint32_t first = kNone, count = 0;
-  for (std::uint32_t i = 0; i < g.triangle_count(); ++i) {
-    if (g.triangle_surface[i] != shape) continue;
-    if (first == kNone) first = i;
-    ++count;
-  }
-  if (std::holds_alternative<SphereShape>(s.geometry)) {
+  const Range triangles = primitives.triangles[shape], spheres = primitives.spheres[shape],
+              disks = primitives.disks[shape];
+  if (spheres.count > 0) {
     l.kind = Kind::sphere;
-    for (std::uint32_t i = 0; i < g.spheres.size(); ++i) {
-      if (g.spheres[i].surface == shape) l.primitive = i;
-    }
+    l.primitive = spheres.first;
     l.area = 4 * 3.14159265358979323846 * sqr(g.spheres[l.primitive].radius);
-  } else if (std::holds_alternative<DiskShape>(s.geometry)) {
+  } else if (disks.count > 0) {
+    const Disk& d = g.disks[disks.first];
     l.kind = Kind::disk;
-    for (const Disk& d : g.disks) {
-      if (d.surface != shape) continue;
-      l.position = V3(d.center);
-      l.axis_u = V3(d.u);
-      l.axis_v = V3(d.v);
-      l.normal = V3(d.n) * l.sign;
-      l.area = 3.14159265358979323846 * d.u.cross(d.v).length();
-    }
-  } else if (std::holds_alternative<RectangleShape>(s.geometry) && count == 2) {
+    l.position = V3(d.center);
+    l.axis_u = V3(d.u);
+    l.axis_v = V3(d.v);
+    l.normal = V3(d.n) * l.sign;
+    l.area = 3.14159265358979323846 * d.u.cross(d.v).length();
+  } else if (std::holds_alternative<RectangleShape>(s.geometry) && triangles.count == 2) {
     l.kind = Kind::parallelogram;
-    const std::uint32_t* idx = &g.indices[std::size_t{3} * first];  // corners 0, 1, 2 of the rectangle
+    const std::uint32_t* idx =
+        &g.indices[std::size_t{3} * triangles.first];  // corners 0, 1, 2 of the rectangle
     const V3 a = g.positions[idx[0]], b = g.positions[idx[1]], c = g.positions[idx[2]];
     l.position = a;
     l.axis_u = b - a;
@@ -58,8 +57,9 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, Geometry& g) {
     l.uv_v = {0, 1};
   } else {
     l.kind = Kind::mesh;
-    l.primitive = first;
-    for (std::uint32_t i = first; i < first + count && first != kNone; ++i) {
+    l.primitive = triangles.first;
+    for (std::uint32_t n = 0; n < triangles.count; ++n) {
+      const std::uint32_t i = triangles.first + n;
       const V3d e1 = V3d(g.vertex(i, 1)) - V3d(g.vertex(i, 0)),
                 e2 = V3d(g.vertex(i, 2)) - V3d(g.vertex(i, 0));
       l.area += e1.cross(e2).length() / 2;
@@ -140,30 +140,36 @@ double Lights::power(const Light& l, float radius) const {
   return luminance(textures_->mean(l.radiance)) * pi * l.area;
 }
 
-// Half by power, half uniform: no light that matters somewhere is rarer than 1/2n.
+// Half by power, half uniform: no light that matters somewhere is rarer than 1/2n. What is used are shares of
+// the 2^32 random words, and what is stated is exactly what is used.
 void Lights::set_probabilities(float radius) {
   std::vector<double> p;
   double sum = 0;
   for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l, radius)));
+  const double uniform = .5 / static_cast<double>(p.size());
   double acc = 0;
+  std::uint64_t before = 0;
   for (std::size_t i = 0; i < p.size(); ++i) {
-    const double share =
-        (sum > 0 ? .5 * p[i] / sum : .5 / static_cast<double>(p.size())) + .5 / static_cast<double>(p.size());
-    lights_[i].probability = static_cast<float>(share);
-    acc += share;
-    cdf_.push_back(static_cast<float>(acc));
+    acc += (sum > 0 && std::isfinite(sum) ? .5 * p[i] / sum : uniform) + uniform;
+    const bool is_last = i + 1 == p.size();
+    // At least one word each, so that there is a last one.
+    const std::uint64_t edge =
+        is_last ? std::uint64_t{1} << 32
+                : std::max(before + 1, static_cast<std::uint64_t>(std::llround(acc * 0x1p32)));
+    lights_[i].probability = static_cast<float>(static_cast<double>(edge - before) * 0x1p-32);
+    last_.push_back(static_cast<std::uint32_t>(edge - 1));
+    before = edge;
     any_with_place_ = any_with_place_ || lights_[i].kind != Kind::directional;
   }
-  if (p.size() == 1) lights_[0].probability = 1;
-  if (!cdf_.empty()) cdf_.back() = 1;
 }
 
 Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures) {
   Lights l;
   l.geometry_ = &geometry;
   l.textures_ = &textures;
+  const Primitives primitives = primitives_of(geometry);
   for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (scene.shapes[i].emitter) l.add_area(scene, i, geometry);
+    if (scene.shapes[i].emitter) l.add_area(scene, i, primitives, geometry);
   }
   for (const Emitter& e : scene.emitters) {
     if (auto ok = l.add_emitter(e); !ok) return tl::unexpected(ok.error());
