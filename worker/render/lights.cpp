@@ -130,7 +130,7 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
   s.pdf = l.probability / (kTwoPi * cone);
-  s.radiance = area_radiance(l, {0, 0});
+  s.radiance = area_radiance(l, l.textured ? sphere_uv(sphere, n) : V2(0, 0));
   if (!(s.distance > 0) || !std::isfinite(s.pdf)) return std::nullopt;
   return s;
 }

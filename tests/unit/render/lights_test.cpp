@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 
 #include "tests/support/render_check.h"
 #include "worker/render/hash.h"
@@ -166,6 +167,109 @@ TEST(Lights, DensityOfAHitIsThatOfItsSample) {
     }
     EXPECT_GT(hits, 300) << n.name;
   }
+}
+
+// Two colours in the quarters of azimuth and polar angle: from a point on the equator's plane or below a pole
+// as much is seen of one as of the other.
+SceneKit checkered_sphere(bool flip) {
+  SceneKit kit = area(SphereShape{}, {}, flip);
+  const TextureIndex dark = kit.texture({.25, .25, .25}), bright = kit.texture({1.5, 1.5, 1.5});
+  kit.scene.textures.push_back(CheckerboardTexture{dark, bright, {}});
+  kit.scene.shapes[0].emitter->radiance = {static_cast<std::uint32_t>(kit.scene.textures.size() - 1)};
+  return kit;
+}
+
+TEST(Lights, ACheckeredSphereGivesTheMeanOfItsColours) {
+  const Bench outside(checkered_sphere(false)), inside(checkered_sphere(true));
+  constexpr double kMean = (.25 + 1.5) / 2;
+  expect_close(outside.irradiance({0, 0, -3}, {0, 0, 1}, 256), kMean * M_PI / 9);
+  expect_close(outside.irradiance({0, 3, 0}, {0, -1, 0}, 256), kMean * M_PI / 9);
+  expect_close(inside.irradiance({0, 0, 0}, {0, 1, 0}, 256), kMean * M_PI);
+}
+
+TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
+  for (const bool flip : {false, true}) {
+    const Bench b(checkered_sphere(flip));
+    const V3 x = b.at(flip ? V3d(.3, -.2, .4) : V3d(1.5, -.9, .8));
+    RandomStream r(9);
+    int same = 0, count = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const float u = r.uniform(), v = r.uniform();
+      const auto s = b.world->lights.sample(b.world->lights.choose(0, {u, v}), x);
+      SurfaceHit hit;
+      if (!s || !b.world->geometry.complete({PrimitiveId::Kind::sphere, 0}, x, s->direction, hit)) continue;
+      ++count;
+      same += s->radiance == b.world->lights.emitted(hit, -s->direction);
+    }
+    // Rounding may put a point on the other side of a colour's border, a share of 1e-6 of all.
+    EXPECT_GT(count, 1900);
+    EXPECT_GE(same, count - 2);
+  }
+}
+
+TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
+  SceneKit kit = area(RectangleShape{}, {});
+  constexpr int kLights = 20000;
+  for (int i = 1; i < kLights; ++i) {
+    const double power = 1 + i % 7;
+    kit.scene.emitters.push_back(PointEmitter{{0, 0, 1. * i / kLights}, {power, power, power}});
+  }
+  const Bench b(kit);
+  const auto light_of = [&](std::uint64_t word) {
+    return b.world->lights.choose({static_cast<std::uint32_t>(word), 0, 0}).light;
+  };
+  const auto end_of = [&](std::uint32_t light, std::uint64_t from) {  // first word of the next light
+    std::uint64_t lo = from, hi = std::uint64_t{1} << 32;
+    while (lo < hi) {
+      const std::uint64_t mid = (lo + hi) / 2;
+      if (light_of(mid) <= light) {
+        lo = mid + 1;
+      } else {
+        hi = mid;
+      }
+    }
+    return lo;
+  };
+  std::uint64_t word = 0;
+  for (std::uint32_t i = 0; i < kLights; ++i) {
+    const LightChoice c = b.world->lights.choose({static_cast<std::uint32_t>(word), 0, 0});
+    ASSERT_EQ(c.light, i);
+    const std::uint64_t end = end_of(i, word);
+    ASSERT_FLOAT_EQ(c.probability, static_cast<float>(static_cast<double>(end - word) * 0x1p-32)) << i;
+    word = end;
+  }
+  EXPECT_EQ(word, std::uint64_t{1} << 32);
+}
+
+// CPU time of this thread alone, and as a multiple of another linear step's: neither the machine nor its load
+// matters.
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
+  SceneKit kit = area(RectangleShape{}, {});
+  constexpr int kShapes = 20000;
+  const Shape first = kit.scene.shapes[0];
+  for (int i = 1; i < kShapes; ++i) {
+    Shape s = first;
+    s.to_world = translate({1. * i, 0, 0});
+    kit.scene.shapes.push_back(s);
+  }
+  const double t0 = cpu_seconds();
+  auto geometry = Geometry::build(kit.scene, AssetLoader{kit.scene, kit.files});
+  const double t1 = cpu_seconds();
+  ASSERT_TRUE(geometry);
+  const auto textures = TextureTable::build(kit.scene, {});
+  ASSERT_TRUE(textures);
+  const double t2 = cpu_seconds();
+  const auto lights = Lights::build(kit.scene, *geometry, *textures);
+  const double t3 = cpu_seconds();
+  ASSERT_TRUE(lights);
+  EXPECT_EQ(lights->count(), static_cast<std::size_t>(kShapes));
+  EXPECT_LT(t3 - t2, 5 * (t1 - t0));
 }
 
 TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
