@@ -47,17 +47,6 @@ inline float mean_component(const C3& c) { return (c.x + c.y + c.z) * (1.f / 3);
 inline bool is_black(const C3& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline bool is_finite(const V3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// (1 - e^-x) / x, continued to 1 at x = 0; right for every x, negative ones too: the mean of e^-t over [0,
-// x].
-inline float phi(float x) {
-  if (std::abs(x) < 1e-4f) return 1 - x * (.5f - x * (1.f / 6));  // next term x^3/24: below 5e-14
-  return -std::expm1(-x) / x;
-}
-inline double phi(double x) {
-  if (std::abs(x) < 1e-5) return 1 - x * (.5 - x * (1. / 6));
-  return -std::expm1(-x) / x;
-}
-
 // Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis,
 // Revisited").
 struct Frame {
@@ -97,11 +86,6 @@ inline V2 concentric_disk(const V2& u) {
 inline V3 cosine_hemisphere(const V2& u) {
   const V2 d = concentric_disk(u);
   return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};
-}
-// Density 1 / (4 pi).
-inline V3 uniform_sphere(const V2& u) {
-  const float z = 1 - 2 * u.x, r = 2 * safe_sqrt(u.x * (1 - u.x)), a = kTwoPi * u.y;
-  return {r * std::cos(a), r * std::sin(a), z};
 }
 
 }  // namespace ls::render

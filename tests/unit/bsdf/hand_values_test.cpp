@@ -1,6 +1,7 @@
 // Closed forms, symmetries and edges.
 #include <gmock/gmock.h>
 
+#include <ctime>
 #include <limits>
 
 #include "tests/unit/bsdf/materials.h"
@@ -181,11 +182,23 @@ TEST(Beckmann, InverseErrorFunctionInverts) {
   for (double x = -.9999; x < 1; x += .0137) EXPECT_NEAR(std::erf(beckmann::erf_inverse(x)), x, 1e-6);
 }
 
-TEST(Math, MeanAttenuationIsRightForEveryDepth) {
-  EXPECT_EQ(phi(0.f), 1);
-  EXPECT_EQ(phi(std::numeric_limits<float>::infinity()), 0);
-  for (const double x : {-30., -1., -1e-3, -1.01e-4, -9.9e-5, 1e-8, 9.9e-5, 1.01e-4, .5, 20.})
-    EXPECT_NEAR(phi(static_cast<float>(x)), -std::expm1(-x) / x, 3e-7 * std::abs(std::expm1(-x) / x)) << x;
+// CPU time of this thread alone, against that of one material: neither the machine nor its load matters.
+TEST(RoughPlastic, AlikeCoatsAreIntegratedOnce) {
+  const auto seconds = [](double alpha, int count) {
+    Scene s = rough_plastic(Microfacet::ggx, alpha, 1.5, 1, false, {.5, .5, .5});
+    s.bsdfs.resize(static_cast<std::size_t>(count), s.bsdfs[0]);
+    const auto now = [] {
+      timespec t{};
+      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+      return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double start = now();
+    bench(s);
+    return now() - start;
+  };
+  seconds(.21, 1);  // what all coats share
+  const double one = seconds(.22, 1);
+  EXPECT_LT(seconds(.23, 100), 20 * one);
 }
 
 }  // namespace

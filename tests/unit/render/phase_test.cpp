@@ -25,6 +25,10 @@ double distribution(double g, double x) {
   const double root = std::sqrt((1 - a) * (1 - a) + 2 * a * x);
   return (1 - a) * (1 + a) / (2 * a) * (1 / (1 - a) - 1 / root);
 }
+V3 uniform_sphere(const V2& u) {
+  const float z = 1 - 2 * u.x, r = 2 * safe_sqrt(u.x * (1 - u.x)), a = kTwoPi * u.y;
+  return {r * std::cos(a), r * std::sin(a), z};
+}
 float g_of(double g) { return static_cast<float>(g); }
 
 TEST(HenyeyGreenstein, MatchesItsFormulaForAllAnglesFromThePeak) {
@@ -89,6 +93,22 @@ TEST(HenyeyGreenstein, SamplesAreDistributedAsTheDensitySays) {
     const double expected = double{kSamples} / kCells;
     for (const int n : count) chi += (n - expected) * (n - expected) / expected;
     EXPECT_LT(chi, kLimit) << "g " << g;
+  }
+}
+
+// The largest anisotropy below 1 that float32 has is sharp, but finite, also at the ends of the random
+// numbers.
+TEST(HenyeyGreenstein, IsFiniteUpToTheLastFloatBelowOne) {
+  for (const float sign : {1.f, -1.f}) {
+    const HenyeyGreenstein hg{sign * (1 - 0x1p-24f)};
+    for (const float u : {0.f, 0x1p-24f, .5f, 1 - 0x1p-24f}) {
+      const V3 w = normalize(V3(.3f, -.5f, .8f));
+      const PhaseSample s = hg.sample(w, {u, .3f});
+      EXPECT_TRUE(is_finite(s.w)) << u;
+      EXPECT_NEAR(dot(s.w, s.w), 1, 1e-6) << u;
+      EXPECT_TRUE(std::isfinite(s.pdf) && s.pdf > 0) << u;
+      EXPECT_TRUE(std::isfinite(hg.value(w, s.w))) << u;
+    }
   }
 }
 
