@@ -1,6 +1,7 @@
-# Writes OUT with the SHA-256 of everything that decides a sample's bits: the renderer's and the shared code's sources and
-# the compiler with its flags. Run at build time; the file changes only if the digest does.
-file(GLOB_RECURSE sources ${ROOT}/common/*.h ${ROOT}/common/*.cpp ${ROOT}/worker/render/*.h ${ROOT}/worker/render/*.cpp)
+# Writes OUT with the SHA-256 of everything that decides a sample's bits: the renderer's and the shared code's sources, the
+# files that say how they are built, and the compiler with its flags. Run at build time; the file changes only if the digest does.
+include(${CMAKE_CURRENT_LIST_DIR}/build_id_inputs.cmake)
+build_id_inputs(sources ${ROOT})
 list(SORT sources)
 set(all "${COMPILER}\n${FLAGS}\n")
 foreach(source ${sources})

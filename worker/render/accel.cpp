@@ -238,6 +238,12 @@ bool Accel::has_boundaries() const { return state_->boundary != nullptr; }
 std::uint64_t Accel::bytes() const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
 }
-std::string Accel::describe() { return fmt::format("embree {} {}", RTC_VERSION_STRING, kDeviceConfig); }
+std::string Accel::describe() {
+  // The version of the library that was loaded, which the headers do not know.
+  const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
+  const auto version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
+  if (device) rtcReleaseDevice(device);
+  return fmt::format("embree {} {}", version, kDeviceConfig);
+}
 
 }  // namespace ls::render

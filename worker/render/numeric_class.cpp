@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include "common/base/digest.h"
 #include "worker/render/accel.h"
+#include "worker/render/bsdf/bsdf.h"
 #include "worker/render/build_id.h"
 #include "worker/render/geometry.h"
 #include "worker/render/hash.h"
@@ -24,7 +26,8 @@ void add(Sha256& h, const std::vector<T>& values) {
   h.update(std::as_bytes(std::span(values)));
 }
 
-// The mathematical library's values, at 4096 arguments each.
+// The mathematical library's values, at 4096 arguments each: every function that the renderer calls. Square
+// roots and divisions are exact everywhere.
 void add_math(Sha256& h) {
   std::vector<float> v;
   RandomStream r(1);
@@ -32,7 +35,21 @@ void add_math(Sha256& h) {
     const float u = r.uniform(), x = 40 * u - 20;
     for (float y :
          {std::exp(x), std::expm1(x), std::log(u + 0x1p-30f), std::log1p(u), std::sin(x), std::cos(x),
-          std::tan(u), std::atan2(u, x), std::acos(2 * u - 1), std::sqrt(u), std::pow(u, 2.4f)}) {
+          std::tan(u), std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4f), std::erf(x / 8)}) {
+      v.push_back(y);
+    }
+  }
+  add(h, v);
+}
+void add_math_in_double(Sha256& h) {
+  std::vector<double> v;
+  RandomStream r(3);
+  for (int i = 0; i < 4096; ++i) {
+    const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
+    // Sine and cosine of different numbers, as they are called: one call for both is another function.
+    for (double y :
+         {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
+          std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4), std::hypot(u, x)}) {
       v.push_back(y);
     }
   }
@@ -87,13 +104,82 @@ void add_hits(Sha256& h) {
   add(h, hits);
 }
 
+void push(std::vector<float>& v, const V3& w) { v.insert(v.end(), {w.x, w.y, w.z}); }
+
+// Rays at spheres, which the BVH leaves to code of our own: which is met, where, and how it is parametrised.
+void add_sphere_hits(Sha256& h) {
+  Geometry g;
+  RandomStream r(4);
+  for (int i = 0; i < 64; ++i) {
+    Sphere s;
+    for (int k = 0; k < 3; ++k) s.center[k] = 2 * double{r.uniform()} - 1;
+    s.radius = .02 + .2 * double{r.uniform()};
+    g.spheres.push_back(s);
+  }
+  g.opaque_spheres = 64;
+  g.surfaces.emplace_back();
+  const auto accel = Accel::build(g, 1);
+  if (!accel) return;
+  std::vector<float> v;
+  for (int i = 0; i < 10'000; ++i) {
+    const float ox = 2 * r.uniform() - 1, oy = 2 * r.uniform() - 1, dx = r.uniform() - .5f,
+                dy = r.uniform() - .5f;
+    const V3 o(ox, oy, -2), d = normalize(V3(dx, dy, 1));
+    const auto id = accel->nearest(o, d, kInfinity);
+    v.push_back(id ? static_cast<float>(id->index) : -1);
+    SurfaceHit hit;
+    if (!id || !g.complete(*id, o, d, hit)) continue;
+    v.insert(v.end(), {hit.t, hit.uv.x, hit.uv.y});
+    for (const V3& w : {hit.p, hit.ng, hit.shading.s, hit.shading.t}) push(v, w);
+  }
+  add(h, v);
+}
+
+// Samples of every kind of material.
+void add_bsdf_samples(Sha256& h) {
+  Scene scene;
+  scene.textures = {ConstantTexture{{.7, .5, .2}}, ConstantTexture{{.15, .15, .15}},
+                    ConstantTexture{{.4, .4, .4}}};
+  const TextureIndex colour{0}, smooth{1}, rough{2};
+  const Rgb eta{.14, .37, 1.44}, k{3.98, 2.38, 1.6};
+  scene.bsdfs = {DiffuseBsdf{colour}, ConductorBsdf{eta, k, colour}, DielectricBsdf{1.5, 1, colour, colour}};
+  for (const Microfacet type : {Microfacet::ggx, Microfacet::beckmann}) {
+    scene.bsdfs.push_back(RoughConductorBsdf{type, smooth, rough, eta, k, colour});
+    scene.bsdfs.push_back(RoughPlasticBsdf{type, .2, 1.5, 1, true, colour, colour});
+  }
+  const auto textures = TextureTable::build(scene, {});
+  if (!textures) return;
+  const auto bsdfs = BsdfTable::build(scene, *textures);
+  if (!bsdfs) return;
+  std::vector<float> v;
+  RandomStream r(5);
+  for (std::uint32_t b = 0; b < scene.bsdfs.size(); ++b) {
+    for (int i = 0; i < 1000; ++i) {
+      const float z = 1 - r.uniform(), angle = kTwoPi * r.uniform(), sine = safe_sqrt(1 - z * z);
+      const float lobe = r.uniform(), x = r.uniform(), y = r.uniform();
+      const V3 wo(sine * std::cos(angle), sine * std::sin(angle), z);
+      const auto s = bsdfs->sample({b}, {0, 0}, wo, lobe, {x, y});
+      if (!s) continue;
+      push(v, s->wi);
+      push(v, s->weight);
+      const BsdfEval e = bsdfs->eval({b}, {0, 0}, wo, s->wi);
+      push(v, e.f_cos);
+      v.insert(v.end(), {s->pdf, e.pdf});
+    }
+  }
+  add(h, v);
+}
+
 Digest compute() {
   Sha256 h;
   h.update(kBuildId);
   h.update(Accel::describe());
   add_math(h);
+  add_math_in_double(h);
   add_reciprocals(h);
   add_hits(h);
+  add_sphere_hits(h);
+  add_bsdf_samples(h);
   return h.finish();
 }
 
