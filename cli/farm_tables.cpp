@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "cli/json_fields.h"
 #include "cli/say.h"
+#include "common/base/plain_text.h"
 
 namespace ls::cli {
 namespace {
@@ -13,33 +15,21 @@ namespace {
 using nlohmann::json;
 using Row = std::vector<std::string>;
 
-// What comes from elsewhere must not move the cursor or colour the terminal.
-std::string plain(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return text;
-}
-
-std::string text(const json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_string() ? plain(found->get<std::string>()) : "";
-}
+std::string text(const json& object, const char* key) { return plain_text(text_field(object, key)); }
 
 std::string number(const json& object, const char* key, const char* format) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? fmt::format(fmt::runtime(format), found->get<double>())
-                                                     : "-";
+  const auto value = number_field(object, key);
+  return value ? fmt::format(fmt::runtime(format), *value) : "-";
 }
 
 std::string time_of(const json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? show_seconds(found->get<double>()) : "-";
+  const auto value = number_field(object, key);
+  return value ? show_seconds(*value) : "-";
 }
 
 std::string percent(const json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? fmt::format("{:.0f} %", 100 * found->get<double>())
-                                                     : "-";
+  const auto value = number_field(object, key);
+  return value ? fmt::format("{:.0f} %", 100 * *value) : "-";
 }
 
 std::string table(const std::vector<Row>& rows) {
@@ -100,9 +90,8 @@ std::string job_text(const json& job) {
       {"samples per pixel", number(job, "spp_done", "{:.6g}") + " of " + number(job, "spp", "{:.0f}")});
   rows.push_back({"RMSE", number(job, "rmse", "{:.4g}")});
   std::string relmse = number(job, "relmse", "{:.4g}");
-  if (const auto ci = job.find("relmse_ci95");
-      ci != job.end() && ci->is_array() && ci->size() == 2 && (*ci)[0].is_number() && (*ci)[1].is_number())
-    relmse += fmt::format(" ({:.4g} to {:.4g})", (*ci)[0].get<double>(), (*ci)[1].get<double>());
+  if (const auto ci = pair_field(job, "relmse_ci95"))
+    relmse += fmt::format(" ({:.4g} to {:.4g})", ci->first, ci->second);
   rows.push_back({"relMSE", relmse});
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
@@ -110,7 +99,7 @@ std::string job_text(const json& job) {
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)
-      if (warning.is_string()) rows.push_back({"warning", plain(warning.get<std::string>())});
+      if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});
   return table(rows);
 }
 

@@ -6,6 +6,7 @@
 #include "cli/job_options.h"
 #include "cli/local_world.h"
 #include "cli/say.h"
+#include "common/base/plain_text.h"
 #include "worker/machine.h"
 
 namespace ls::cli {
@@ -44,20 +45,22 @@ ordered_json to_json(const LocalScene& scene, const LocalWorld& built, const ren
 void print_list(const char* title, const std::vector<std::string>& items) {
   if (items.empty()) return;
   print(title);
-  for (const std::string& item : items) print("  " + item);
+  for (const std::string& item : items) print("  " + plain_text(item));
 }
 
 void print_text(const LocalScene& scene, const LocalWorld& built, const render::WorldReport& report) {
   const auto& job = built.job;
-  print(fmt::format("{}: {} x {} pixels, {} samples per pixel, integrator {} ({})", scene.name,
+  print(fmt::format("{}: {} x {} pixels, {} samples per pixel, integrator {} ({})", plain_text(scene.name),
                     job.settings.size.width, job.settings.size.height, job.spp.value_or(0),
                     job.settings.integrator, report.variant));
   print_list("used", report.used);
   print_list("left out", report.left_out);
   if (!job.assets.empty()) print("assets");
-  for (const BlobRef& asset : job.assets) print(fmt::format("  {}  {}", asset.name, show_bytes(asset.bytes)));
+  for (const BlobRef& asset : job.assets)
+    print(fmt::format("  {}  {}", plain_text(asset.name), show_bytes(asset.bytes)));
   if (!report.bytes.empty()) print("in memory");
-  for (const auto& [name, bytes] : report.bytes) print(fmt::format("  {}  {}", name, show_bytes(bytes)));
+  for (const auto& [name, bytes] : report.bytes)
+    print(fmt::format("  {}  {}", plain_text(name), show_bytes(bytes)));
   if (report.clamped_inputs > 0)
     print(fmt::format("{} inputs were clamped (negative densities, degenerate triangles)",
                       report.clamped_inputs));

@@ -48,5 +48,5 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
-  return action();
+  return run_guarded(app.get_subcommands().front()->get_name(), action);
 }

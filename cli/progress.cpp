@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "cli/say.h"
+#include "common/base/plain_text.h"
 
 namespace ls::cli {
 namespace {
@@ -38,12 +39,12 @@ std::string progress_line(const ProgressFigures& f, int columns) {
     const int full = static_cast<int>(std::floor(kBarCells * part));
     line += fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' '));
   }
-  if (f.state != "running") line += " " + f.state;
+  if (f.state != "running") line += " " + plain_text(f.state);
   line += fmt::format(" {:.1f} spp", f.spp_done);
   if (f.samples_per_second > 0) line += "  " + show_rate(f.samples_per_second);
   if (f.relmse) line += fmt::format("  relMSE {:.3g}", *f.relmse);
   if (f.eta_seconds) line += fmt::format("  {} left", show_seconds(*f.eta_seconds));
-  if (!f.trouble.empty()) line += "  " + f.trouble;
+  if (!f.trouble.empty()) line += "  " + plain_text(f.trouble);
   if (columns > 0 && line.size() >= static_cast<std::size_t>(columns))
     line.resize(static_cast<std::size_t>(columns) - 1);
   return line;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/json_fields.h"
 #include "cli/say.h"
 
 namespace ls::cli {
@@ -13,15 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-double number(const json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? found->get<double>() : 0;
-}
-
-std::string text(const json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_string() ? found->get<std::string>() : "";
-}
+double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
 
 void add_true_error(json& report, const std::vector<TrueError::Point>& points) {
   const auto put = [](json& object, const TrueError::Point& p) {
@@ -53,12 +46,10 @@ std::string report_summary(const std::string& report) {
   std::string line =
       fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
                   show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
-  if (const auto relmse = j.find("relmse"); relmse != j.end() && relmse->is_number())
-    line += fmt::format(", relMSE {:.3g}", relmse->get<double>());
-  if (const auto ci = j.find("relmse_ci95");
-      ci != j.end() && ci->is_array() && ci->size() == 2 && (*ci)[0].is_number())
-    line += fmt::format(" ({:.3g} to {:.3g})", (*ci)[0].get<double>(), (*ci)[1].get<double>());
-  if (const std::string verdict = text(j, "verdict"); !verdict.empty()) line += ": " + verdict;
+  if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
+  if (const auto ci = pair_field(j, "relmse_ci95"))
+    line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
+  if (const std::string verdict = text_field(j, "verdict"); !verdict.empty()) line += ": " + verdict;
   if (const auto bad = number(j, "nonfinite_samples"); bad > 0)
     line += fmt::format("; {:g} samples were not finite and count as zero", bad);
   return line;
@@ -66,7 +57,7 @@ std::string report_summary(const std::string& report) {
 
 std::string pixels_digest(const std::string& report) {
   const json j = json::parse(report, nullptr, false);
-  return j.is_object() ? text(j, "pixels_sha256") : "";
+  return j.is_object() ? text_field(j, "pixels_sha256") : "";
 }
 
 std::uint64_t peak_rss_bytes() {

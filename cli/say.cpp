@@ -5,6 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <exception>
+#include <new>
+
+#include "common/base/plain_text.h"
 
 namespace ls::cli {
 namespace {
@@ -13,34 +17,44 @@ bool input_at_fault(Errc code) { return code == Errc::invalid_argument; }
 
 }  // namespace
 
-void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+void say(const std::string& line) { fmt::print(stderr, "{}\n", plain_text(line)); }
 
 void print(const std::string& line) {
   fmt::print("{}\n", line);
   std::fflush(stdout);
 }
 
+void complain(const std::string& text) { say("lightshaft: error: " + text); }
+
 int usage_error(const std::string& text) {
-  say("lightshaft: error: " + text);
+  complain(text);
   return kUsage;
 }
 
 int say_error(const Error& error) {
-  say("lightshaft: error: " + error.message);
+  complain(error.message);
   return input_at_fault(error.code) ? kUsage : kFailed;
 }
 
 int say_rejected(const coordinator::Rejected& rejected) {
   say_diagnostics(rejected.diagnostics);
-  if (rejected.diagnostics.empty()) say("lightshaft: error: " + rejected.error.message);
-  const Errc code = rejected.error.code;
-  // resource_exhausted: more was asked for than the limits allow.
-  return input_at_fault(code) || code == Errc::resource_exhausted || !rejected.diagnostics.empty() ? kUsage
-                                                                                                   : kFailed;
+  if (rejected.diagnostics.empty()) complain(rejected.error.message);
+  return input_at_fault(rejected.error.code) || !rejected.diagnostics.empty() ? kUsage : kFailed;
 }
 
 void say_diagnostics(const std::vector<Diagnostic>& diagnostics) {
   if (!diagnostics.empty()) fmt::print(stderr, "{}", format_diagnostics(diagnostics));
+}
+
+int run_guarded(const std::string& command, const std::function<int()>& action) {
+  try {
+    return action();
+  } catch (const std::bad_alloc&) {
+    complain("out of memory in `" + command + "`");
+  } catch (const std::exception& e) {
+    complain("`" + command + "` failed: " + e.what());
+  }
+  return kFailed;
 }
 
 std::string show_bytes(std::uint64_t bytes) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "common/base/plain_text.h"
 #include "common/scene/limits.h"
 
 namespace ls {
@@ -31,10 +32,8 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > scene::kMaxExcerptBytes / 2 ? column - scene::kMaxExcerptBytes / 2 : 0;
-  std::string line(characters(d.source_line, first, first + scene::kMaxExcerptBytes));
-  // Control characters would move the caret or the terminal.
-  for (char& c : line)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  const std::string line =
+      plain_text(characters(d.source_line, first, first + scene::kMaxExcerptBytes));  // the caret stays
   const std::string number = std::to_string(d.place.line);
   const std::size_t room = first + scene::kMaxExcerptBytes - column;
   const std::size_t length = std::min<std::size_t>(static_cast<std::size_t>(std::max(1, d.length)), room);
@@ -46,9 +45,10 @@ std::string excerpt(const Diagnostic& d) {
 
 std::string format_diagnostic(const Diagnostic& d) {
   const char* severity = d.severity == Diagnostic::Severity::error ? "error" : "warning";
-  std::string text = d.place.line > 0 ? fmt::format("{}:{}:{}: {}: {}\n", d.place.file, d.place.line,
-                                                    d.place.column, severity, d.text)
-                                      : fmt::format("{}: {}: {}\n", d.place.file, severity, d.text);
+  const std::string file = plain_text(d.place.file), what = plain_text(d.text);
+  std::string text =
+      d.place.line > 0 ? fmt::format("{}:{}:{}: {}: {}\n", file, d.place.line, d.place.column, severity, what)
+                       : fmt::format("{}: {}: {}\n", file, severity, what);
   if (!d.source_line.empty() && d.place.line > 0) text += excerpt(d);
   return text;
 }

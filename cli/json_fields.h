@@ -1,0 +1,17 @@
+// Fields of a farm's answers, which may be missing or of another type.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace ls::cli {
+
+std::string text_field(const nlohmann::json& object, const char* key, const std::string& otherwise = "");
+std::optional<double> number_field(const nlohmann::json& object, const char* key);
+int int_field(const nlohmann::json& object, const char* key, int otherwise);
+std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object,
+                                                    const char* key);  // [1.5, 2]
+
+}  // namespace ls::cli

@@ -1,0 +1,55 @@
+#include "common/base/plain_text.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace ls {
+namespace {
+
+struct Character {
+  std::uint32_t code = 0;
+  std::size_t bytes = 0;
+};
+
+// The UTF-8 character that the text begins with; nothing if these bytes are none.
+std::optional<Character> first_character(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const std::uint32_t lead = byte(0);
+  if (lead < 0x80) return Character{lead, 1};
+  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (lead < 0xC2 || lead > 0xF4 || text.size() < length) return std::nullopt;
+  std::uint32_t code = lead & (0xFFu >> (length + 1));
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return std::nullopt;
+    code = code << 6 | (byte(i) & 0x3F);
+  }
+  return Character{code, length};
+}
+
+bool is_shown(std::uint32_t code) {
+  const auto within = [code](std::uint32_t first, std::uint32_t last) {
+    return code >= first && code <= last;
+  };
+  // Controls; line and paragraph separator with the embeddings and overrides; the isolates.
+  return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
+}
+
+}  // namespace
+
+std::string plain_text(std::string_view text) {
+  std::string plain;
+  plain.reserve(text.size());
+  while (!text.empty()) {
+    const auto character = first_character(text);
+    const std::size_t bytes = character ? character->bytes : 1;
+    if (character ? is_shown(character->code) : static_cast<unsigned char>(text[0]) > 0x9F)
+      plain += text.substr(0, bytes);
+    else
+      plain += ' ';
+    text.remove_prefix(bytes);
+  }
+  return plain;
+}
+
+}  // namespace ls
