@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "cli/commands.h"
 #include "cli/job_options.h"
 #include "cli/local_render.h"
@@ -7,6 +9,7 @@
 #include "cli/replay.h"
 #include "cli/say.h"
 #include "common/protocol/limits.h"
+#include "worker/child/child.h"
 #include "worker/machine.h"
 
 namespace ls::cli {
@@ -27,9 +30,10 @@ Result<LocalRenderOptions> options_of(const Flags& flags) {
   auto spec = flags.job.parse();
   if (!spec) return tl::unexpected(spec.error());
   options.spec = std::move(*spec);
-  options.threads = worker::usable_cpus();
+  const int most = flags.isolate ? worker::kMostChildThreads : limits::kThreads;
+  options.threads = std::min(worker::usable_cpus(), most);
   if (!flags.threads.empty()) {
-    const auto threads = parse_whole("--threads", flags.threads, 1, limits::kThreads);
+    const auto threads = parse_whole("--threads", flags.threads, 1, static_cast<std::uint64_t>(most));
     if (!threads) return tl::unexpected(threads.error());
     options.threads = static_cast<int>(*threads);
   }

@@ -4,10 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
 
+#include "common/base/secret.h"
 #include "common/protocol/limits.h"
+#include "worker/child/child.h"
 #include "worker/machine.h"
 
 namespace ls::worker {
@@ -21,7 +22,7 @@ constexpr double kMemoryShare = 0.9;
 void describe(CLI::App& app, Options& o, std::string& token_file) {
   app.add_option("--coordinator", o.coordinator, "HOST:PORT where the coordinator listens for workers");
   app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, kMostChildThreads));
   app.add_option("--cache", o.cache, "Folder for scenes and assets, may be shared by workers");
   app.add_option("--cache-limit", o.cache_limit, "Bytes to keep there, e.g. 20G; default: no limit")
       ->transform(CLI::AsSizeValue(false));
@@ -42,15 +43,10 @@ void describe(CLI::App& app, Options& o, std::string& token_file) {
   app.set_version_flag("--version", kBuild);
 }
 
-std::optional<std::string> read_token(const std::string& file) {
-  if (file.empty()) {
-    const char* token = std::getenv("LIGHTSHAFT_JOIN_TOKEN");
-    return token ? token : "";
-  }
-  std::ifstream in(file);
-  std::string token;
-  if (!std::getline(in, token)) return std::nullopt;
-  return token;
+Result<std::string> join_token(const std::string& file) {
+  if (!file.empty()) return read_secret(file);
+  const char* token = std::getenv("LIGHTSHAFT_JOIN_TOKEN");
+  return token ? token : "";
 }
 
 int usage(const std::string& message) {
@@ -62,7 +58,7 @@ int usage(const std::string& message) {
 
 std::variant<Options, int> parse_options(int argc, char** argv) {
   Options o;
-  o.threads = std::min(usable_cpus(), 256);
+  o.threads = std::min(usable_cpus(), kMostChildThreads);
   o.name = host_name();
   o.cache = default_cache();
   o.memory_limit = static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(usable_memory_bytes()));
@@ -86,9 +82,10 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   if (o.render_child) return o;
   if (o.coordinator.empty() || o.coordinator.find(':') == std::string::npos)
     return usage("--coordinator HOST:PORT is needed, e.g. --coordinator localhost:50051");
-  const auto token = read_token(token_file);
-  if (!token || token->size() > limits::kTokenBytes)
-    return usage("no join token can be read from " + token_file);
+  const auto token = join_token(token_file);
+  if (!token) return usage("--token-file: " + token.error().message);
+  if (token->size() > limits::kTokenBytes)
+    return usage(fmt::format("the join token has more than {} characters", limits::kTokenBytes));
   o.join_token = *token;
 #ifndef LIGHTSHAFT_RENDERER
   if (!o.fake)

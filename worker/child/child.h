@@ -18,6 +18,8 @@
 
 namespace ls::worker {
 
+inline constexpr int kMostChildThreads = 256;
+
 struct ChildOptions {
   // This very program, even if its file has been replaced since it was started.
   std::filesystem::path executable = "/proc/self/exe";

@@ -14,6 +14,7 @@
 #include "common/image/frame.h"
 #include "common/image/rounds.h"
 #include "common/protocol/limits.h"
+#include "worker/child/child.h"
 #include "worker/render/render.h"
 
 namespace ls::worker::child {
@@ -22,7 +23,7 @@ namespace ls::worker::child {
 inline constexpr int kSharedMemoryFd = 3;
 inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
-inline constexpr int kMostSlots = 256;
+inline constexpr int kMostSlots = kMostChildThreads;
 
 // A prepared job as JSON (child/job_text.h): its settings as a string, and of each asset, the scene's file
 // among them, digest, bytes and name, and the digest again with the path. Names and paths may double by
@@ -52,7 +53,7 @@ struct Reply {
   Outcome outcome{};
   std::uint32_t text_bytes = 0;  // the reason, when it failed
   Digest numeric_class;          // hello
-  double cpu_seconds = 0;
+  double cpu_seconds = 0, wall_seconds = 0;
   std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
