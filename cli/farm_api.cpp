@@ -4,7 +4,10 @@
 
 #include <cctype>
 #include <cstdlib>
-#include <fstream>
+
+#include "cli/json_fields.h"
+#include "cli/patience.h"
+#include "common/base/secret.h"
 
 namespace ls::cli {
 namespace {
@@ -18,14 +21,6 @@ constexpr std::size_t kDigestsPerQuestion = 10'000;
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
   return value ? value : "";
-}
-
-Result<std::string> read_token(const std::string& file) {
-  std::ifstream in(file);
-  std::string token;
-  if (!(in >> token))
-    return fail(Errc::invalid_argument, fmt::format("--token-file {}: there is no token in it", file));
-  return token;
 }
 
 Errc code_of(int status) {
@@ -42,7 +37,11 @@ Errc code_of(int status) {
       return Errc::not_found;
     case 409:
       return Errc::failed_precondition;
+    case 408:
+    case 429:
+    case 502:
     case 503:
+    case 504:
       return Errc::unavailable;
     case 507:
       return Errc::resource_exhausted;
@@ -51,25 +50,14 @@ Errc code_of(int status) {
   }
 }
 
-template <class T>
-T field(const json& object, const char* key, T otherwise) {
-  const auto found = object.find(key);
-  if (found == object.end()) return otherwise;
-  if constexpr (std::is_same_v<T, std::string>) {
-    return found->is_string() ? found->template get<std::string>() : otherwise;
-  } else {
-    return found->is_number_integer() ? found->template get<T>() : otherwise;
-  }
-}
-
 Diagnostic diagnostic_of(const json& d) {
   Diagnostic out;
-  out.severity = field<std::string>(d, "severity", "error") == "warning" ? Diagnostic::Severity::warning
-                                                                         : Diagnostic::Severity::error;
-  out.place = {field<std::string>(d, "file", ""), field(d, "line", 0), field(d, "column", 0)};
-  out.text = field<std::string>(d, "text", "");
-  out.source_line = field<std::string>(d, "source_line", "");
-  out.length = field(d, "length", 1);
+  out.severity = text_field(d, "severity", "error") == "warning" ? Diagnostic::Severity::warning
+                                                                 : Diagnostic::Severity::error;
+  out.place = {text_field(d, "file", ""), int_field(d, "line", 0), int_field(d, "column", 0)};
+  out.text = text_field(d, "text", "");
+  out.source_line = text_field(d, "source_line", "");
+  out.length = int_field(d, "length", 1);
   return out;
 }
 
@@ -102,8 +90,8 @@ Rejected problem_of(const HttpResponse& response) {
                                     response.body.substr(0, kMaxShownBody));
     return out;
   }
-  out.error.message = field<std::string>(
-      j, "detail", field<std::string>(j, "title", fmt::format("status {}", response.status)));
+  out.error.message =
+      text_field(j, "detail", text_field(j, "title", fmt::format("status {}", response.status)));
   if (response.status == 401)
     out.error.message +=
         " (give the token with --token-file FILE or in LIGHTSHAFT_TOKEN; a coordinator keeps it in the file "
@@ -132,8 +120,8 @@ Result<FarmApi> FarmApi::open(const FarmOptions& options) {
   o.ca = options.ca.empty() ? environment("LIGHTSHAFT_CA") : options.ca;
   o.token = environment("LIGHTSHAFT_TOKEN");
   if (!options.token_file.empty()) {
-    auto token = read_token(options.token_file);
-    if (!token) return tl::unexpected(token.error());
+    auto token = read_secret(options.token_file);
+    if (!token) return fail(Errc::invalid_argument, "--token-file: " + token.error().message);
     o.token = std::move(*token);
   }
   auto client = HttpClient::open(std::move(o));
@@ -169,14 +157,18 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Dig
       question["digests"].push_back(next->first);
     const auto answer = as_json(client_.request("POST", "/api/v1/blobs/missing", question.dump()));
     if (!answer) return tl::unexpected(answer.error());
-    for (const json& missing : answer->value("missing", json::array())) {
+    const auto missing_ones = answer->find("missing");
+    if (missing_ones == answer->end() || !missing_ones->is_array())
+      return refused({Errc::internal, "the coordinator's answer does not say which files it lacks"});
+    for (const json& missing : *missing_ones) {
       const auto found = missing.is_string() ? by_digest.find(missing.get<std::string>()) : by_digest.end();
       if (found == by_digest.end()) continue;
       const std::string path = "/api/v1/blobs/" + found->first;
       if (found->second) said(fmt::format("sending {}", found->second->path.string()));
-      const auto put =
-          checked(found->second ? client_.upload(path, found->second->path)
-                                : client_.request("PUT", path, scene.text, "application/octet-stream"));
+      const auto put = patiently([&] {  // by digest: sending it twice does no harm
+        return checked(found->second ? client_.upload(path, found->second->path)
+                                     : client_.request("PUT", path, scene.text, "application/octet-stream"));
+      });
       if (!put) return tl::unexpected(put.error());
     }
   }

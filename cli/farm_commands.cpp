@@ -7,8 +7,10 @@
 #include "cli/farm_tables.h"
 #include "cli/farm_wait.h"
 #include "cli/job_options.h"
+#include "cli/json_fields.h"
 #include "cli/output_file.h"
 #include "cli/say.h"
+#include "common/base/plain_text.h"
 #include "common/job/limits.h"
 
 namespace ls::cli {
@@ -42,7 +44,7 @@ int show(FarmApi& api, const Flags& flags) {
 int change(FarmApi& api, const Flags& flags, const json& body) {
   const auto job = api.patch(job_path(flags.id), body);
   if (!job) return say_rejected(job.error());
-  print(flags.farm.json ? dump(*job) : fmt::format("{} {}", flags.id, job->value("state", "")));
+  print(flags.farm.json ? dump(*job) : fmt::format("{} {}", flags.id, plain_text(text_field(*job, "state"))));
   return kOk;
 }
 int pause(FarmApi& api, const Flags& flags) { return change(api, flags, {{"state", "paused"}}); }

@@ -176,18 +176,21 @@ Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path&
 }
 
 Result<HttpResponse> HttpClient::download(const std::string& path, const fs::path& file) {
-  const fs::path aside = file.string() + ".part";
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  const bool straight = fs::exists(status) && !fs::is_regular_file(status);
+  const fs::path aside = straight ? file : fs::path(file.string() + ".part");
   FilePtr target(std::fopen(aside.c_str(), "wbe"));
   if (!target) return fail(Errc::unavailable, fmt::format("{} cannot be written", aside.string()));
   auto response = state_->perform(path, state_->headers(), target.get());
   const bool closed = std::fclose(target.release()) == 0;
-  std::error_code error;
+  error.clear();
   if (response && response->status / 100 == 2 && closed) {
-    fs::rename(aside, file, error);
+    if (!straight) fs::rename(aside, file, error);
     if (!error) return response;
   }
   std::error_code ignored;
-  fs::remove(aside, ignored);
+  if (!straight) fs::remove(aside, ignored);
   if (!response || response->status / 100 != 2) return response;
   return fail(Errc::resource_exhausted,
               fmt::format("{} cannot be written{}", file.string(), error ? ": " + error.message() : ""));

@@ -36,8 +36,8 @@ class HttpClient {
                                std::string_view content_type = "application/json");
   // PUTs the bytes of a file, without holding them in memory.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file);
-  // Writes a 2xx answer's body to `file` by way of a temporary one beside it; of other answers the body is
-  // returned.
+  // Writes a 2xx answer's body to `file` by way of a temporary one beside it, or straight if it is a pipe or
+  // a device; of other answers the body is returned.
   Result<HttpResponse> download(const std::string& path, const std::filesystem::path& file);
 
   static constexpr std::size_t kMaxAnswerBytes = std::size_t{256} << 20;

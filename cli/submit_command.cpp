@@ -4,8 +4,11 @@
 #include "cli/farm_api.h"
 #include "cli/farm_wait.h"
 #include "cli/job_options.h"
+#include "cli/json_fields.h"
 #include "cli/output_file.h"
+#include "cli/patience.h"
 #include "cli/say.h"
+#include "common/base/plain_text.h"
 
 namespace ls::cli {
 namespace {
@@ -19,10 +22,12 @@ struct Flags {
 
 int fetch_results(FarmApi& api, const std::string& id, const Flags& flags) {
   if (!flags.out.empty())
-    if (const auto got = api.download(job_path(id) + "/image.exr", flags.out); !got)
+    if (const auto got = patiently([&] { return api.download(job_path(id) + "/image.exr", flags.out); });
+        !got)
       return say_rejected(got.error());
   if (!flags.report.empty())
-    if (const auto got = api.download(job_path(id) + "/report", flags.report); !got)
+    if (const auto got = patiently([&] { return api.download(job_path(id) + "/report", flags.report); });
+        !got)
       return say_rejected(got.error());
   return kOk;
 }
@@ -43,8 +48,9 @@ int run(const Flags& flags) {
     if (!flags.quiet) say(line);
   });
   if (!job) return say_rejected(job.error());
-  const std::string id = job->value("id", "");
-  print(flags.farm.json ? job->dump() : id);
+  const std::string id = text_field(*job, "id");
+  if (id.empty()) return say_error({Errc::internal, "the coordinator's answer names no job"});
+  print(flags.farm.json ? job->dump() : plain_text(id));
   if (!flags.wait && flags.out.empty() && flags.report.empty()) return kOk;
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return say_rejected(end.error());
