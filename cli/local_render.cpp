@@ -134,12 +134,13 @@ class LocalRender {
   int finish() {
     const auto view = farm_->coordinator().job(job_);
     if (!view) return say_error(view.error());
-    if (keepers_.trouble) return say_error(*keepers_.trouble);
     if (const auto error = farm_->agent_error()) return say_error(*error);
     if (view->state == JobState::failed) {
       if (const auto fault = farm_->scene_fault()) return say_rejected(cli::scene_fault(scene_, *fault));
       return say_error({Errc::internal, view->error});
     }
+    // What a full disk kept from the folder of partials does not cost the image.
+    if (keepers_.trouble) complain(keepers_.trouble->message);
     const bool cut = view->state != JobState::done;
     if (cut && view->spp_done == 0) {
       say("lightshaft: interrupted before anything was rendered: no image is written");
@@ -147,6 +148,7 @@ class LocalRender {
     }
     if (const auto written = write_results(cut); !written)
       return say_error(Error{Errc::unavailable, written.error().message});
+    if (keepers_.trouble && !cut) return kFailed;
     if (cut) say(fmt::format("lightshaft: interrupted: {} holds what there was", options_.out.string()));
     return cut ? kFailed : kOk;
   }
@@ -155,12 +157,18 @@ class LocalRender {
     coordinator::Coordinator& coordinator = farm_->coordinator();
     const auto image = coordinator.image_exr(job_);
     if (!image) return tl::unexpected(image.error());
-    if (auto written = write_output(options_.out, *image); !written) return written;
+    const auto saved = save_result(options_.out, *image);
+    const auto told = write_report(cut, saved.has_value());
+    return saved ? told : saved;
+  }
+
+  Result<void> write_report(bool cut, bool say_summary) {
+    coordinator::Coordinator& coordinator = farm_->coordinator();
     const auto tiles = coordinator.tiles(job_);
     if (!tiles) return tl::unexpected(tiles.error());
     std::vector<RoundIndex> folded;
     for (const auto& tile : *tiles) folded.push_back(tile.rounds_folded);
-    if (keepers_.partials)
+    if (keepers_.partials && !keepers_.trouble)
       if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
     const auto told = coordinator.report_json(job_);
     if (!told) return tl::unexpected(told.error());
@@ -169,8 +177,8 @@ class LocalRender {
     const auto report = local_report(*told, facts);
     if (!report) return tl::unexpected(report.error());
     if (options_.report)
-      if (auto written = write_output(*options_.report, *report); !written) return written;
-    if (options_.quiet) return {};
+      if (auto saved = save_result(*options_.report, *report); !saved) return saved;
+    if (options_.quiet || !say_summary) return {};
     say(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
     print("pixels_sha256 " + pixels_digest(*report));
     return {};

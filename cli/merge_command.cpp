@@ -33,8 +33,8 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments
       continue;
     }
     const auto before = static_cast<std::ptrdiff_t>(files.size());
-    for (const auto& entry : fs::directory_iterator(argument, error))
-      if (entry.path().extension() == ".exr") files.push_back(entry.path());
+    for (fs::directory_iterator entry(argument, error), end; !error && entry != end; entry.increment(error))
+      if (entry->path().extension() == ".exr") files.push_back(entry->path());
     if (error) return fail(Errc::invalid_argument, fmt::format("{}: {}", argument, error.message()));
     std::sort(files.begin() + before, files.end());
   }
@@ -58,11 +58,13 @@ Result<void> write_report(const Flags& flags, const Merged& merged, const std::s
                                  {"numeric_class", merged.numeric_class.hex()},
                                  {"duplicates", merged.duplicates},
                                  {"clamped_values", clamped}};
-  return write_output(flags.report, j.dump(2) + "\n");
+  return save_result(flags.report, j.dump(2) + "\n");
 }
 
 int run(const Flags& flags) {
   if (const auto ok = check_output("-o", flags.out); !ok) return say_error(ok.error());
+  if (!flags.report.empty())
+    if (const auto ok = check_output("--report", flags.report); !ok) return say_error(ok.error());
   const auto files = files_of(flags.partials);
   if (!files) return say_error(files.error());
   std::vector<PartialSource> sources;
@@ -79,7 +81,7 @@ int run(const Flags& flags) {
   provenance.numeric_class = merged->numeric_class;
   const auto image = final_exr(merged->film, provenance, flags.float_output);
   if (!image) return say_error(image.error());
-  if (const auto written = write_output(flags.out, image->exr); !written) return say_error(written.error());
+  if (const auto saved = save_result(flags.out, image->exr); !saved) return say_error(saved.error());
   const std::string digest = pixels_sha256(merged->film).hex();
   if (!flags.report.empty())
     if (const auto written = write_report(flags, *merged, digest, image->clamped); !written)

@@ -1,8 +1,12 @@
 #include "cli/output_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 
 #include "coordinator/store/files.h"
@@ -17,8 +21,23 @@ Result<void> check_output(const std::string& option, const fs::path& file) {
   if (!fs::is_directory(folder, error))
     return fail(Errc::invalid_argument,
                 fmt::format("{} {}: there is no folder {}", option, file.string(), folder.string()));
-  if (fs::is_directory(file, error))
+  const fs::file_status status = fs::status(file, error);
+  if (fs::is_directory(status))
     return fail(Errc::invalid_argument, fmt::format("{} {}: this is a folder", option, file.string()));
+  if (!fs::exists(status) || fs::is_regular_file(status)) return check_folder(option, folder);
+  if (::access(file.c_str(), W_OK) != 0)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} {}: cannot be written: {}", option, file.string(), std::strerror(errno)));
+  return {};
+}
+
+Result<void> check_folder(const std::string& option, const fs::path& folder) {
+  std::string trial = (folder / ".lightshaft-XXXXXX").string();
+  const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));
+  if (!made)
+    return fail(Errc::invalid_argument, fmt::format("{}: no file can be made in the folder {}: {}", option,
+                                                    folder.string(), std::strerror(errno)));
+  ::unlink(trial.c_str());
   return {};
 }
 
@@ -36,6 +55,27 @@ Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes
 
 Result<void> write_output(const fs::path& file, const std::string& text) {
   return write_output(file, std::as_bytes(std::span(text)));
+}
+
+Result<void> save_result(const fs::path& file, std::span<const std::byte> bytes) {
+  auto written = write_output(file, bytes);
+  if (written) return written;
+  std::error_code error;
+  std::string aside =
+      (fs::temp_directory_path(error) / "lightshaft-XXXXXX").string() + file.extension().string();
+  const int suffix = static_cast<int>(file.extension().string().size());
+  const coordinator::File rescue(error ? -1 : ::mkostemps(aside.data(), suffix, O_CLOEXEC));
+  if (!rescue) return written;
+  if (auto rescued = coordinator::write_all(rescue, bytes, aside); !rescued) {
+    ::unlink(aside.c_str());
+    return written;
+  }
+  return fail(written.error().code,
+              fmt::format("{}; what was to be written there is in {}", written.error().message, aside));
+}
+
+Result<void> save_result(const fs::path& file, const std::string& text) {
+  return save_result(file, std::as_bytes(std::span(text)));
 }
 
 }  // namespace ls::cli

@@ -4,6 +4,8 @@
 
 #include <fstream>
 
+#include "cli/output_file.h"
+
 namespace ls::cli {
 
 namespace fs = std::filesystem;
@@ -14,6 +16,7 @@ Result<PartialDir> PartialDir::open(fs::path folder) {
   if (error)
     return fail(Errc::unavailable,
                 fmt::format("--partial-dir {} cannot be made: {}", folder.string(), error.message()));
+  if (auto ok = check_folder("--partial-dir", folder); !ok) return tl::unexpected(ok.error());
   return PartialDir(std::move(folder));
 }
 
