@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/base/clock.h"
+#include "common/image/render_limits.h"
 
 namespace ls::coordinator::limits {
 
@@ -19,9 +20,9 @@ inline constexpr std::size_t kMaxAssets = 100'000;  // named by one request
 inline constexpr std::size_t kMaxWarnings = 100;    // kept with a job
 inline constexpr std::size_t kMaxNameBytes = 256;   // of a job or worker
 inline constexpr std::size_t kMaxJobs = 100'000;
-inline constexpr int kMaxFrameSide = 32768;
-inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;  // 67 million: 3.2 GB of film sums
-inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
+using ls::kMaxFramePixels;
+using ls::kMaxFrameSide;
+using ls::kMaxSpp;
 inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
 inline constexpr int kMaxPriority = 1'000'000;
 

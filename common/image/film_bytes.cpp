@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "common/image/film.h"
+#include "common/image/render_limits.h"
 
 namespace ls {
 namespace {
@@ -182,9 +183,8 @@ Result<Film> Film::load(std::span<const std::byte> bytes) {
   grid.frame.height = in.value<int>();
   grid.tile = in.value<int>();
   const auto present = in.value<std::uint32_t>();
-  constexpr int kMaxSide = 65536;
   for (const int side : {grid.frame.width, grid.frame.height, grid.tile})
-    if (side < 1 || side > kMaxSide) return damaged("its size is impossible");
+    if (side < 1 || side > kMaxFrameSide) return damaged("its size is impossible");
   if (present > grid.count()) return damaged("it has more tiles than its frame");
   Film film(grid);
   for (std::uint32_t i = 0; i < present; ++i) {

@@ -12,11 +12,11 @@
 #include <string_view>
 
 #include "common/image/byte_cursor.h"
+#include "common/image/render_limits.h"
 
 namespace ls {
 namespace {
 
-constexpr std::int32_t kMaxSide = 65536;
 constexpr std::int32_t kMaxUnitJson = 1024;
 constexpr std::size_t kMaxNameBytes = 31;  // the format's limit without the long-names flag
 
@@ -77,7 +77,7 @@ Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> 
   std::int32_t v[4];  // inclusive
   std::memcpy(v, raw.data(), sizeof v);
   for (const std::int32_t x : v)
-    if (x < 0 || x >= kMaxSide)
+    if (x < 0 || x >= kMaxFrameSide)
       return refuse(fmt::format("{} [{},{},{},{}] is out of range", name, v[0], v[1], v[2], v[3]));
   if (v[0] > v[2] || v[1] > v[3]) return refuse(fmt::format("{} is empty", name));
   return PixelRect{v[0], v[1], v[2] + 1, v[3] + 1};

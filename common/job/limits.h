@@ -4,17 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "common/image/render_limits.h"
+
 namespace ls {
 
-inline constexpr int kMaxFrameSide = 65536;  // pixels
-inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 31;
 inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels a side
 inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
-inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 31;  // fits the final EXR's UINT layer
-// Tiles x rounds. 10^9 samples are fine for one small tile (16 million rounds), not for a whole frame.
+// Tiles x rounds. 2^24 samples are fine for one small tile (262 thousand rounds), not for a whole frame.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
-inline constexpr int kMaxDepthSetting = 1 << 20;  // of max_depth and rr_depth
-inline constexpr double kMaxSeconds = 1e9;        // of a time budget
+inline constexpr double kMaxSeconds = 1e9;  // of a time budget
 inline constexpr double kMaxTargetError = 1e6;
 inline constexpr int kMaxPriority = 1'000'000;                      // either sign
 inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;  // of a spec or settings text

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "common/image/render_limits.h"
+
 namespace ls::limits {
 
 inline constexpr std::size_t kMessageBytes = 1 << 20;  // one gRPC message
@@ -26,7 +28,7 @@ inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
 
-inline constexpr int kFrameSide = 1 << 17;  // pixels
-inline constexpr std::uint64_t kSampleIndex = std::uint64_t{1} << 40;
+inline constexpr int kFrameSide = kMaxFrameSide;  // pixels
+inline constexpr std::uint64_t kSampleIndex = kMaxSpp;
 
 }  // namespace ls::limits

@@ -34,10 +34,11 @@ struct Field {
   std::string_view name;
   std::string_view doc;
   std::string_view unit = "";
-  Range range = kAny;      // of a number, or of each component of a colour
-  Rgb fallback{1, 1, 1};   // colour of a texture or volume that is not given
-  bool derived = false;    // follows from something else in the file; not a parameter of its own
-  bool named_ior = false;  // names of materials ("water") are welcome too
+  Range range = kAny;        // of a number, or of each component of a colour
+  Rgb fallback{1, 1, 1};     // colour of a texture or volume that is not given
+  bool derived = false;      // follows from something else in the file; not a parameter of its own
+  bool named_ior = false;    // names of materials ("water") are welcome too
+  bool constvolume = false;  // a colour that may stand in a <volume type="constvolume">
   bool required = false;
   // For the documentation, where the C++ type doesn't tell: "point", "medium" (a nested one with the field's
   // name), "<phase>" (a nested one without a name). Derived fields without it are not written in files.
@@ -77,7 +78,8 @@ LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light
 LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
         "gives each side of a surface a bsdf; one nested bsdf serves both")
 LS_TYPE(ConstVolume, "volume", "constvolume", "",
-        "the same value everywhere; also written as a plain `<rgb>` or `<float>`")
+        "one value: everywhere as an albedo or in a `homogeneous` medium, in [0, 1]^3 as the density of a "
+        "`heterogeneous` one; also written as a plain `<rgb>` or `<float>`")
 LS_TYPE(GridVolume, "volume", "gridvolume", "", "values on a grid, from a file")
 LS_TYPE(IsotropicPhase, "phase", "isotropic", "",
         "scatters equally into all directions; what a medium has if none is given")
@@ -105,7 +107,8 @@ LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
         "looks along the +z of `to_world`, +y up, +x to the left")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 LS_TYPE(IntegratorSettings, "integrator", "volpath",
-        "volpath, volpath_simple, volpathmis; path, direct, ptracer", "how light is followed")
+        "volpath, volpath_distant_mis, volpath_simple, volpathmis; path, direct, ptracer",
+        "how light is followed")
 #undef LS_TYPE
 
 template <class T, class U>

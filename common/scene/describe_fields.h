@@ -16,7 +16,7 @@ void describe(V& v, T& t) {
   v.field({.name = "filename", .doc = "the image", .required = true}, t.file);
   v.field({.name = "filter_type", .doc = "between texels"}, t.filter);
   v.field({.name = "wrap_mode", .doc = "outside [0, 1]"}, t.wrap);
-  v.field({.name = "raw", .doc = "values are not colours: no sRGB decoding of 8-bit files"}, t.raw);
+  v.field({.name = "raw", .doc = "values are not colours: no sRGB decoding of 8- and 16-bit files"}, t.raw);
   v.field({.name = "to_uv",
            .doc = "moves (u, v) before the look-up: of a 4 x 4 matrix its x and y rows and its translation"},
           t.to_uv);
@@ -133,8 +133,17 @@ void describe(V& v, T& p) {
 }
 template <class V, Of<HomogeneousMedium> T>
 void describe(V& v, T& m) {
-  v.field({.name = "sigma_t", .doc = "extinction", .unit = "1/length", .range = kNonNegative}, m.sigma_t);
-  v.field({.name = "albedo", .doc = "share of extinction that is scattering", .range = kUnit}, m.albedo);
+  v.field({.name = "sigma_t",
+           .doc = "extinction",
+           .unit = "1/length",
+           .range = kNonNegative,
+           .constvolume = true},
+          m.sigma_t);
+  v.field({.name = "albedo",
+           .doc = "share of extinction that is scattering",
+           .range = kUnit,
+           .constvolume = true},
+          m.albedo);
   v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
   v.field({.name = "phase",
            .doc = "how light is scattered; `isotropic` if there is none",
@@ -327,9 +336,11 @@ void describe(V& v, T& i) {
   v.field({.name = "name", .doc = "\"volpath\" or \"path\" (leaves media out)", .derived = true}, i.name);
   v.field({.name = "max_depth",
            .doc = "longest path in segments: 1 emission, 2 direct light; -1: no limit",
-           .range = {-1, 1e9}},
+           .range = {-1, kMaxDepthSetting}},
           i.max_depth);
-  v.field({.name = "rr_depth", .doc = "depth from which Russian roulette may end a path", .range = {1, 1e9}},
+  v.field({.name = "rr_depth",
+           .doc = "depth from which Russian roulette may end a path",
+           .range = {1, kMaxDepthSetting}},
           i.rr_depth);
   v.field({.name = "hide_emitters", .doc = "lights are invisible to the camera"}, i.hide_emitters);
 }
@@ -353,7 +364,7 @@ void describe(V& v, T& s) {
   v.field({.name = "sensor", .doc = ""}, s.sensor);
   v.field({.name = "film", .doc = ""}, s.film);
   v.field({.name = "integrator", .doc = ""}, s.integrator);
-  v.field({.name = "sample_count", .doc = "samples per pixel, of the sampler", .range = {1, kMaxSampleCount}},
+  v.field({.name = "sample_count", .doc = "samples per pixel, of the sampler", .range = {1, kMaxSpp}},
           s.sample_count);
 }
 

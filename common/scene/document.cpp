@@ -70,6 +70,11 @@ class Parameters {
         return complain(a.value_at, fmt::format("with its parameters put in, this is longer than {} bytes",
                                                 kMaxValueBytes));
     }
+    // What is put in comes from elsewhere.
+    if (find_invalid_utf8(out) != std::string_view::npos || find_control(out) != std::string_view::npos)
+      return complain(a.value_at,
+                      "with its parameters put in, this has bytes in it that are no UTF-8 text, or control "
+                      "characters");
     total_ += out.size();
     if (total_ > kMaxSubstitutedBytes)
       return complain(a.value_at,

@@ -29,7 +29,8 @@ Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; 
 Column column(const Field&, const std::string& x) {
   return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};
 }
-Column column(const Field&, const Vec3& x) { return {"rgb", text_of(x)}; }
+Column column(const Field& f, const Rgb& x) { return {f.constvolume ? "rgb, volume" : "rgb", text_of(x)}; }
+Column column(const Field&, const Vec3& x) { return {"point, vector", text_of(x)}; }
 Column column(const Field&, const Transform&) { return {"transform", "identity"}; }
 Column column(const Field&, const UvTransform&) { return {"transform", "identity"}; }
 Column column(const Field&, AssetIndex) { return {"string", ""}; }
@@ -239,9 +240,11 @@ std::string scene_format_markdown() {
   add_types(out, static_cast<const ReconstructionFilter*>(nullptr));
   add_type<IntegratorSettings>(out);
   out +=
-      "`volpathmis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and `direct` means `path` "
+      "`volpathmis`, `volpath_distant_mis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and "
+      "`direct` means `path` "
       "with max_depth 2; `moment` and `aov` mean the\n"
-      "integrator within them. A sampler of any name gives `sample_count` (default 4) samples a pixel.\n\n";
+      "integrator within them. A sampler, whatever its type, gives `sample_count` (default 4) samples a "
+      "pixel.\n\n";
   out += meaningless_section() + unsupported_section() + names_section();
   return out += kCanonical;
 }

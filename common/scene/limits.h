@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "common/image/render_limits.h"
+
 namespace ls::scene {
 
 inline constexpr std::size_t kMaxTextBytes = std::size_t{32} << 20;       // one scene file
@@ -22,9 +24,6 @@ inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, by ref
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxNameWork = 4'000'000;  // cells of edit distance tables for one suggestion
 inline constexpr std::size_t kMaxExcerptBytes = 160;    // of a source line in a message
-inline constexpr int kMaxFrameSide = 65536;
-inline constexpr std::size_t kMaxFramePixels = std::size_t{1} << 30;
-inline constexpr double kMaxSampleCount = 1e9;
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
 

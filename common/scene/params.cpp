@@ -126,6 +126,10 @@ bool Params::in_range(const Field& f, const Element& e, double x) {
   return false;
 }
 
+bool Params::in_range(const Field& f, const Element& e, const std::array<double, 3>& v) {
+  return std::all_of(v.begin(), v.end(), [&](double x) { return in_range(f, e, x); });
+}
+
 std::optional<std::string> Params::string_value(std::string_view name, const Element& e) {
   if (e.tag == "string") return std::string(e.get("value"));
   wrong_type(name, e, "a <string>");
@@ -193,12 +197,32 @@ void Params::convert(const Field& f, const Element& e, std::string& value) {
 }
 
 void Params::convert(const Field& f, const Element& e, Vec3& value) {
-  if (e.tag != "vector" && e.tag != "point") {
-    if (const auto c = colour(f, e, "a colour or a vector")) value = *c;
+  if (e.tag != "vector" && e.tag != "point") return wrong_type(f.name, e, "a <point> or <vector>");
+  if (const auto v = read_xyz(e, 0, reader_.report()); v && in_range(f, e, *v)) value = *v;
+}
+
+void Params::convert(const Field& f, const Element& e, Rgb& value) {
+  const Element* object = f.constvolume ? object_at(e) : nullptr;
+  if (!object || object->tag != "volume") {
+    if (const auto c = colour(f, e, f.constvolume ? "a colour or a constant <volume>" : "a colour"))
+      value = *c;
     return;
   }
-  if (const auto v = read_xyz(e, 0, reader_.report()))
-    if (std::all_of(v->begin(), v->end(), [&](double x) { return in_range(f, e, x); })) value = *v;
+  const auto index = reader_.volume(*object, e);
+  if (!index) return;
+  const Rgb* constant = reader_.constant(*index);
+  if (!constant)
+    return reader_.report().error(
+        e.at,
+        fmt::format("'{}' of {} is the same everywhere: only a constvolume will do; a grid belongs into a "
+                    "medium \"heterogeneous\"",
+                    f.name, title()));
+  if (in_range(f, e, *constant)) value = *constant;
+}
+
+const Element* Params::object_at(const Element& e) {
+  const TagKind kind = kind_of(e);
+  return kind == TagKind::reference ? reader_.resolve(e) : kind == TagKind::object ? &e : nullptr;
 }
 
 void Params::convert(const Field& f, const Element& e, Transform& value) {
@@ -239,17 +263,18 @@ std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_
     wrong_type(f.name, e, wanted);
     return std::nullopt;
   }
-  for (const double x : *c)
-    if (!in_range(f, e, x)) return std::nullopt;
-  return c;
+  return in_range(f, e, *c) ? c : std::nullopt;
 }
 
 void Params::convert(const Field& f, const Element& e, TextureIndex& value) {
-  const Element* object = kind_of(e) == TagKind::reference ? reader_.resolve(e)
-                          : kind_of(e) == TagKind::object  ? &e
-                                                           : nullptr;
+  const Element* object = object_at(e);
   if (object && (object->tag == "texture" || object->tag == "spectrum")) {
-    if (const auto index = reader_.texture(*object, e)) value = *index;
+    const auto index = reader_.texture(*object, e);
+    if (!index) return;
+    // Of images nothing is known here.
+    if (const auto& b = reader_.bounds(*index); b && !(in_range(f, e, b->low) && in_range(f, e, b->high)))
+      return;
+    value = *index;
   } else if (object) {
     reader_.report().error(e.at, fmt::format("'{}' of {} wants a colour or a texture, not a <{}>", f.name,
                                              title(), object->tag));
@@ -263,11 +288,12 @@ void Params::convert(const Field& f, const Element& e, std::optional<TextureInde
 }
 
 void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
-  const Element* object = kind_of(e) == TagKind::reference ? reader_.resolve(e)
-                          : kind_of(e) == TagKind::object  ? &e
-                                                           : nullptr;
+  const Element* object = object_at(e);
   if (object && object->tag == "volume") {
-    if (const auto index = reader_.volume(*object, e)) value = *index;
+    const auto index = reader_.volume(*object, e);
+    if (!index) return;
+    if (const Rgb* constant = reader_.constant(*index); constant && !in_range(f, e, *constant)) return;
+    value = *index;
   } else if (object) {
     reader_.report().error(e.at, fmt::format("'{}' of {} wants a colour or a <volume>, not a <{}>", f.name,
                                              title(), object->tag));

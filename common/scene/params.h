@@ -47,7 +47,8 @@ class Params {
   void convert(const Field& f, const Element& e, bool& value);
   void convert(const Field& f, const Element& e, std::uint64_t& value);
   void convert(const Field& f, const Element& e, std::string& value);
-  void convert(const Field& f, const Element& e, Vec3& value);  // of a point, vector or colour
+  void convert(const Field& f, const Element& e, Vec3& value);
+  void convert(const Field& f, const Element& e, Rgb& value);
   void convert(const Field& f, const Element& e, Transform& value);
   void convert(const Field& f, const Element& e, UvTransform& value);
   void convert(const Field& f, const Element& e, AssetIndex& value);
@@ -90,6 +91,9 @@ class Params {
   void not_one_of(std::string_view name, const Element& e, const std::string& given,
                   const std::vector<std::string>& names);
   bool in_range(const Field& f, const Element& e, double x);
+  bool in_range(const Field& f, const Element& e, const std::array<double, 3>& x);
+  // The object that stands at `e` or is referred to there; nullptr if `e` is a plain value (or reported).
+  const Element* object_at(const Element& e);
   std::optional<std::string> string_value(std::string_view name, const Element& e);
   std::optional<Rgb> colour(const Field& f, const Element& e, std::string_view wanted);
 

@@ -1,9 +1,11 @@
 // Sensor, film, filter, sampler and integrator.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "common/scene/integrators.h"
 #include "common/scene/known.h"
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
@@ -30,12 +32,13 @@ void Reader::read_sensor(const Element& e) {
     describe_lens(binder, s);
     if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
     if (!has_focus) s.focus_distance = s.far_clip;
-  } else {
-    p.take("focus_distance");  // a pinhole has everything in focus
   }
   if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
-  if (!std::isfinite(determinant3(s.to_world)) || determinant3(s.to_world) == 0)
-    report_.error(e.at, "to_world flattens the camera's space: it can't be inverted");
+  if (!is_rigid(s.to_world))
+    report_.error(
+        e.at,
+        "to_world of a sensor may only move, turn and mirror: this one scales or shears, which Mitsuba 3 "
+        "refuses, too; leave its <scale> out");
 
   read_sensor_medium(p, s);
   const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
@@ -76,17 +79,23 @@ void Reader::read_fov(Params& p, Sensor& s) {
   }
   s.fov = 2 * std::atan(std::sqrt(36.0 * 36 + 24.0 * 24) / (2 * length)) * (180 / std::numbers::pi);
   s.fov_axis = FovAxis::diagonal;
-  p.take("fov_axis");  // has no say then, as in Mitsuba
+  // As in Mitsuba.
+  if (const Element* axis = p.take("fov_axis"))
+    report_.warning(
+        value_place(*axis, "name"),
+        fmt::format("'fov_axis' of {} has no effect here: it says what fov measures, and there is no "
+                    "fov",
+                    p.title()));
 }
 
 void Reader::read_film(const Element& e) {
+  used_parts_.insert(&e);
   if (e.get("type") != "hdrfilm") return unknown_plugin(e, report_);
   Params p(*this, e);
   FilmSettings& film = scene_.film;
   bind(p, film);
   check_crop(p);
-  if (static_cast<std::size_t>(film.size.width) * static_cast<std::size_t>(film.size.height) >
-      kMaxFramePixels)
+  if (std::int64_t{film.size.width} * film.size.height > kMaxFramePixels)
     report_.error(e.at, fmt::format("a frame of {} x {} is larger than {} pixels", film.size.width,
                                     film.size.height, kMaxFramePixels));
   const auto filters = p.take_nested("rfilter");
@@ -125,6 +134,7 @@ ReconstructionFilter Reader::read_plain_filter(const Element& e) {
 }
 
 ReconstructionFilter Reader::read_filter(const Element& e) {
+  used_parts_.insert(&e);
   const std::string_view type = e.get("type");
   if (type == "box") return read_plain_filter<BoxFilter>(e);
   if (type == "tent") return read_plain_filter<TentFilter>(e);
@@ -141,10 +151,12 @@ ReconstructionFilter Reader::read_filter(const Element& e) {
 
 // Samples are this program's own; only how many of them is the scene's to say.
 void Reader::read_sampler(const Element& e) {
+  used_parts_.insert(&e);
+  const auto& known = supported_plugins("sampler");
+  if (std::find(known.begin(), known.end(), e.get("type")) == known.end()) return unknown_plugin(e, report_);
   Params p(*this, e);
   if (const Element* count = p.take("sample_count"))
-    p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSampleCount}}, *count,
-              scene_.sample_count);
+    p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSpp}}, *count, scene_.sample_count);
   p.finish();
 }
 
@@ -168,14 +180,11 @@ void Reader::read_integrator(const Element& e, int depth) {
     return p.finish();
   }
   IntegratorSettings& i = scene_.integrator;
-  if (type == "path" || type == "direct" || type == "ptracer")
-    i.name = "path";
-  else if (type == "volpath" || type == "volpathmis" || type == "volpath_simple")
-    i.name = "volpath";
-  else
-    return unknown_plugin(e, report_);
+  const IntegratorRow* row = integrator_row(type);
+  if (!row) return unknown_plugin(e, report_);
+  i.name = row->ours;
   bind(p, i);
-  if (type == "direct") i.max_depth = 2;
+  if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
 }
 

@@ -17,7 +17,6 @@ void Reader::read_emitter(const Element& e) {
   Params p(*this, e);
   ConstantEmitter emitter;
   bind(p, emitter);
-  p.take("to_world");  // moves nothing
   p.finish();
   for (const Emitter& other : scene_.emitters)
     if (std::holds_alternative<ConstantEmitter>(other))
@@ -61,8 +60,8 @@ void Reader::read_spot(const Element& e) {
   if (emitter.texture && std::holds_alternative<ConstantTexture>(scene_.textures[emitter.texture->value]))
     report_.error(e.at,
                   "'texture' of emitter \"spot\" wants an image; a single colour belongs into 'intensity'");
-  if (determinant3(emitter.to_world) == 0)
-    report_.error(e.at, "to_world flattens this light: it can't be inverted");
+  if (!invertible(emitter.to_world))
+    report_.error(e.at, "to_world flattens this light or leaves the range of numbers: it can't be inverted");
   scene_.emitters.emplace_back(emitter);
 }
 

@@ -13,14 +13,14 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
   if (type == "constvolume") {
     ConstVolume volume;
     bind(p, volume);
-    p.take("to_world");  // moves nothing: it is the same everywhere
     scene_.volumes.emplace_back(volume);
   } else if (type == "gridvolume") {
     GridVolume volume;
     bind(p, volume);
     if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
-    if (determinant3(volume.to_world) == 0)
-      report_.error(e.at, "to_world of this volume flattens it: it can't be inverted");
+    if (!invertible(volume.to_world))
+      report_.error(e.at,
+                    "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
     scene_.volumes.emplace_back(volume);
   } else {
     unknown_plugin(e, report_);

@@ -1,8 +1,6 @@
 // Shapes, with what stands in them: bsdf, area emitter, media.
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
 #include "common/scene/transform.h"
@@ -79,8 +77,7 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
 }
 
 void Reader::check_placement(const Element& e, const Shape& shape) {
-  const double det = determinant3(shape.to_world);
-  if (det == 0 || !std::isfinite(det))
+  if (!invertible(shape.to_world))
     report_.error(
         e.at, fmt::format("to_world flattens this {} or leaves the range of numbers: it can't be inverted",
                           e.get("type")));

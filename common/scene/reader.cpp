@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/scene/known.h"
 #include "common/scene/limits.h"
 #include "common/scene/read.h"
@@ -21,6 +23,7 @@ Scene Reader::read() {
     if (report_.full()) return {};
     read_child(child);
   }
+  read_idle_parts();
   if (!sensor_) report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
   return std::move(scene_);
 }
@@ -43,8 +46,23 @@ void Reader::read_child(const Element& child) {
   if (e->tag == "volume") return void(volume(*e, child));
   if (e->tag == "phase") return void(phase(*e, child));
   if (e->tag == "medium") return void(medium(*e, child));
-  if (e->find("id")) return;  // a film, filter or sampler that a sensor refers to
+  if (e->find("id")) return parts_.push_back(e);  // a film, filter or sampler that a sensor may refer to
   report_.error(e->at, fmt::format("a <{}> belongs into a <sensor>", e->tag));
+}
+
+// What is wrong with a film, filter or sampler is told even if no sensor uses it; nothing else comes of it.
+void Reader::read_idle_parts() {
+  const FilmSettings film = scene_.film;
+  const std::uint64_t sample_count = scene_.sample_count;
+  for (const Element* e : parts_) {
+    if (report_.full()) return;
+    if (used_parts_.contains(e)) continue;
+    if (e->tag == "film") read_film(*e);
+    if (e->tag == "rfilter") read_filter(*e);
+    if (e->tag == "sampler") read_sampler(*e);
+    scene_.film = film;
+    scene_.sample_count = sample_count;
+  }
 }
 
 const Element* Reader::resolve(const Element& child) {
@@ -118,6 +136,30 @@ TextureIndex Reader::add_constant_texture(const Rgb& value) {
 VolumeIndex Reader::add_constant_volume(const Rgb& value) {
   scene_.volumes.push_back(ConstVolume{value});
   return {static_cast<std::uint32_t>(scene_.volumes.size() - 1)};
+}
+
+const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
+  // What a texture contains stands before it in the list.
+  for (std::size_t i = texture_bounds_.size(); i < scene_.textures.size(); ++i) {
+    std::optional<Bounds> b;
+    const auto include = [&](double low, double high) {
+      b = b ? Bounds{std::min(b->low, low), std::max(b->high, high)} : Bounds{low, high};
+    };
+    if (const auto* constant = std::get_if<ConstantTexture>(&scene_.textures[i])) {
+      for (const double x : constant->value) include(x, x);
+    } else if (const auto* checks = std::get_if<CheckerboardTexture>(&scene_.textures[i])) {
+      for (const TextureIndex inner : {checks->color0, checks->color1})
+        if (inner.value < i && texture_bounds_[inner.value])
+          include(texture_bounds_[inner.value]->low, texture_bounds_[inner.value]->high);
+    }
+    texture_bounds_.push_back(b);
+  }
+  return texture_bounds_[texture.value];
+}
+
+const Rgb* Reader::constant(VolumeIndex volume) const {
+  const auto* c = std::get_if<ConstVolume>(&scene_.volumes[volume.value]);
+  return c ? &c->value : nullptr;
 }
 
 std::optional<AssetIndex> Reader::asset(const std::string& name, const Span& at) {

@@ -31,6 +31,12 @@ class Reader {
 
   TextureIndex add_constant_texture(const Rgb& value);
   VolumeIndex add_constant_volume(const Rgb& value);
+  // Between which numbers a texture's colours are; nothing if only images could tell.
+  struct Bounds {
+    double low, high;
+  };
+  const std::optional<Bounds>& bounds(TextureIndex texture);
+  const Rgb* constant(VolumeIndex volume) const;  // nullptr: it is a grid
   std::optional<AssetIndex> asset(const std::string& name, const Span& at);
 
  private:
@@ -42,6 +48,7 @@ class Reader {
 
   std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
+  void read_idle_parts();
   void warn_unused_sensor(const Element& e);
 
   std::optional<TextureIndex> read_texture(const Element& e);
@@ -91,6 +98,10 @@ class Reader {
   Scene scene_;
   const Element* sensor_ = nullptr;
   const Element* integrator_ = nullptr;
+  // Films, filters and samplers of the top level, and which of them a sensor referred to.
+  std::vector<const Element*> parts_;
+  std::unordered_set<const Element*> used_parts_;
+  std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
 
   Memo<TextureIndex> textures_;
   Memo<BsdfIndex> bsdfs_;

@@ -17,7 +17,8 @@
 namespace ls {
 
 using Rgb = std::array<double, 3>;
-using Vec3 = std::array<double, 3>;
+// A place or direction. Not the type of a colour: files write the two differently.
+struct Vec3 : std::array<double, 3> {};
 
 // Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
 struct Transform {
@@ -65,7 +66,7 @@ struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  bool raw = false;  // true: no sRGB decoding of 8-bit files
+  bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
   UvTransform to_uv;
   bool operator==(const BitmapTexture&) const = default;
 };

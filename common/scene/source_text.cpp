@@ -86,6 +86,16 @@ Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offse
   return d;
 }
 
+std::size_t find_control(std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const bool blank = c == '\t' || c == '\n' || c == '\r';
+    const bool c1 = c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+    if ((c < 0x20 && !blank) || c == 0x7F || c1) return i;
+  }
+  return std::string_view::npos;
+}
+
 std::size_t find_invalid_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const std::size_t n = sequence_length(text.substr(i));

@@ -44,5 +44,8 @@ class SourceText {
 
 // Offset of the first byte that is not well-formed UTF-8; npos if there is none.
 std::size_t find_invalid_utf8(std::string_view text);
+// Of the first control character in well-formed UTF-8 (below U+0020 but for blanks and ends of lines, U+007F
+// to U+009F); npos if there is none.
+std::size_t find_control(std::string_view text);
 
 }  // namespace ls::scene

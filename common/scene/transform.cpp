@@ -156,6 +156,23 @@ double determinant3(const Transform& t) {
   return dot(a, cross(b, c));
 }
 
+bool invertible(const Transform& t) {
+  // The inverse's determinant is 1/det: not finite if det is subnormal.
+  return std::all_of(t.m.begin(), t.m.end(), [](double x) { return std::isfinite(x); }) &&
+         std::isnormal(determinant3(t));
+}
+
+// M transpose(M) = 1.
+bool is_rigid(const Transform& t) {
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = i; j < 3; ++j) {
+      double product = 0;
+      for (std::size_t k = 0; k < 3; ++k) product += t.m[4 * i + k] * t.m[4 * j + k];
+      if (!(std::abs(product - (i == j ? 1 : 0)) <= kUnitSlack)) return false;
+    }
+  return true;
+}
+
 bool is_similarity(const Transform& t) {
   const Vec3 columns[3] = {{t.m[0], t.m[4], t.m[8]}, {t.m[1], t.m[5], t.m[9]}, {t.m[2], t.m[6], t.m[10]}};
   const double size = dot(columns[0], columns[0]);

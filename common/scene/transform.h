@@ -11,6 +11,11 @@ Vec3 transform_point(const Transform& t, const Vec3& p);  // affine part
 Vec3 transform_vector(const Transform& t, const Vec3& v);
 double determinant3(const Transform& t);  // of the linear part
 
+// Neither flat nor beyond the range of numbers, and so is the inverse.
+bool invertible(const Transform& t);
+// Moves, turns and mirrors only, up to 1e-3 as Mitsuba 3 tells it for sensors.
+bool is_rigid(const Transform& t);
+
 // The steps of a <transform>, each applied after those before it. What is wrong is reported and left out.
 Transform read_transform(const Element& e, Report& report);
 // The largest relative difference between singular values of the linear part is within rounding of single

@@ -97,9 +97,7 @@ class Checker {
     walker.walk(s_.sensor);
     if (wrong_.empty()) check_twosided();
     if (wrong_.empty()) check_texture_nesting();
-    if (wrong_.empty() &&
-        static_cast<std::size_t>(s_.film.size.width) * static_cast<std::size_t>(s_.film.size.height) >
-            kMaxFramePixels)
+    if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
     return wrong_;
   }

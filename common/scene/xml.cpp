@@ -45,6 +45,21 @@ class AttributePlaces {
   std::size_t at_;
 };
 
+// What a value can't have in it, once character numbers (&#0; ...) are decoded; empty if all is well. `raw`:
+// as it is written.
+std::string_view unprintable(const Attribute& a, std::string_view raw) {
+  if (find_invalid_utf8(a.value) != std::string_view::npos) return "a number that is no character";
+  if (find_control(a.value) != std::string_view::npos) return "a control character";
+  // A zero ends the text of the value: it can only be seen where it is written.
+  for (std::size_t at = raw.find("&#"); at != std::string_view::npos; at = raw.find("&#", at + 2)) {
+    std::size_t digit = at + 2;
+    if (digit < raw.size() && raw[digit] == 'x') ++digit;
+    const std::size_t end = raw.find_first_not_of('0', digit);
+    if (end != digit && end < raw.size() && raw[end] == ';') return "a zero byte";
+  }
+  return {};
+}
+
 class TreeBuilder {
  public:
   TreeBuilder(std::uint32_t file, Report& report)
@@ -87,6 +102,11 @@ class TreeBuilder {
       places.next(a);
       if (out.find(a.name)) {
         report_.error(a.name_at, fmt::format("<{}> has the attribute '{}' twice", out.tag, a.name));
+        return false;
+      }
+      if (const auto wrong = unprintable(a, text_.substr(a.value_at.offset, a.value_at.length));
+          !wrong.empty()) {
+        report_.error(a.value_at, fmt::format("the value of '{}' has {} in it", a.name, wrong));
         return false;
       }
       if (a.value.size() > kMaxValueBytes) {

@@ -167,8 +167,11 @@ TEST(Convert, RefusesABriefOfAnotherJob) {
 
 TEST(Convert, KeepsEveryMessageWithinTheLimitAtItsLargest) {
   AssignLease lease = assignment();
-  lease.lease.units.assign(limits::kUnitsPerLease,
-                           {~0U, ~0U, {131000, 131000, 131072, 131072}, {1ULL << 39, 1ULL << 40}});
+  lease.lease.units.assign(limits::kUnitsPerLease, {~0U,
+                                                    ~0U,
+                                                    {limits::kFrameSide - 8, limits::kFrameSide - 8,
+                                                     limits::kFrameSide, limits::kFrameSide},
+                                                    {limits::kSampleIndex - 2, limits::kSampleIndex}});
   lease.brief->assets.assign(limits::kAssetsPerJob, {digest_of_text("x"), ~0ULL, std::string(4000, 'n')});
   WorkerHello hello = std::get<WorkerHello>(kFromWorker[0]);
   hello.blobs_held.assign(limits::kBlobsHeld, digest_of_text("x"));

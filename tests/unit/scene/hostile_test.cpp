@@ -196,7 +196,7 @@ TEST(HostileScenes, RandomDamageIsAnsweredNeverACrash) {
                                 "]]>",
                                 "<include filename=\"cloud.vol\"/>"};
   int good = 0;
-  for (int n = 0; n < 3000; ++n) {
+  for (int n = 0; n < 6000; ++n) {
     std::string text = kExample;
     for (std::size_t edits = 1 + below(3); edits > 0; --edits) {
       const std::size_t at = below(text.size());

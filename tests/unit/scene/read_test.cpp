@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/integrators.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -202,7 +203,7 @@ TEST(Reading, IncludesBringObjectsAndDefaults) {
   const auto r = read_scene("main.xml",
                             "<scene version=\"3.0.0\"><include filename=\"parts/base.xml\"/><shape "
                             "type=\"cube\"><ref id=\"b\"/></shape>"
-                            "<sensor type=\"perspective\"><sampler type=\"any\"><integer "
+                            "<sensor type=\"perspective\"><sampler type=\"independent\"><integer "
                             "name=\"sample_count\" value=\"$spp\"/></sampler></sensor></scene>",
                             assets);
   ASSERT_TRUE(r.scene) << messages(r);
@@ -258,7 +259,10 @@ TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
   const auto name = [](const std::string& type) {
     return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator;
   };
-  for (const char* type : {"volpath", "volpathmis", "volpath_simple"}) EXPECT_EQ(name(type).name, "volpath");
+  for (const char* type : {"volpath", "volpathmis", "volpath_distant_mis", "volpath_simple"})
+    EXPECT_EQ(name(type).name, "volpath");
+  // Whatever the table names, a scene may say.
+  for (const auto& row : scene::integrators()) EXPECT_EQ(name(std::string(row.name)).name, row.ours);
   EXPECT_EQ(name("path").name, "path");
   EXPECT_EQ(name("direct").max_depth, 2);
   const auto wrapped =
@@ -267,6 +271,34 @@ TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
   ASSERT_TRUE(wrapped.scene);
   EXPECT_EQ(wrapped.scene->integrator.max_depth, 3);
   EXPECT_EQ(wrapped.diagnostics.size(), 1u) << "a warning about the moments";
+}
+
+TEST(Reading, AHomogeneousMediumTakesConstantVolumes) {
+  const Scene s = must_read(with_sensor(
+      "<volume type=\"constvolume\" id=\"v\"><rgb name=\"value\" value=\"1 2 3\"/></volume>"
+      "<shape type=\"cube\"><bsdf type=\"null\"/><medium type=\"homogeneous\" name=\"interior\">"
+      "<ref name=\"sigma_t\" id=\"v\"/><volume type=\"constvolume\" name=\"albedo\"><float name=\"value\" "
+      "value=\"0.5\"/></volume></medium></shape>"));
+  const auto& m = only<HomogeneousMedium>(s.media);
+  EXPECT_EQ(m.sigma_t, (Rgb{1, 2, 3}));
+  EXPECT_EQ(m.albedo, (Rgb{.5, .5, .5}));
+  EXPECT_TRUE(s.volumes.empty());
+}
+
+TEST(Reading, PartsThatNoSensorRefersToChangeNothing) {
+  const std::string part =
+      "<film type=\"hdrfilm\" id=\"f\"><integer name=\"width\" value=\"99\"/></film>"
+      "<sampler type=\"stratified\" id=\"s\"><integer name=\"sample_count\" "
+      "value=\"99\"/></sampler>";
+  EXPECT_EQ(must_read(with_sensor(part)), must_read(with_sensor("")));
+}
+
+TEST(Reading, ASensorMayBeMirrored) {
+  const Scene s = must_read(
+      "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\">"
+      "<scale x=\"-1\"/><lookat origin=\"0,0,1\" target=\"3,1,2\" up=\"0,1,0\"/>"
+      "</transform></sensor></scene>");
+  EXPECT_EQ(s.sensor.to_world.m[11], 1);
 }
 
 }  // namespace

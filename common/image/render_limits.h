@@ -1,0 +1,14 @@
+// What a picture may be at most: the same for scenes, jobs, the protocol and the coordinator, so that what one
+// of them takes the others do not refuse.
+#pragma once
+
+#include <cstdint>
+
+namespace ls {
+
+inline constexpr int kMaxFrameSide = 32768;                             // pixels
+inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;  // 67 million: 3.2 GB of film sums
+inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
+inline constexpr int kMaxDepthSetting = 1 << 20;  // of max_depth and rr_depth
+
+}  // namespace ls
