@@ -45,8 +45,8 @@ class UploadedAssets final : public AssetSource {
     const auto asset = find(name);
     if (!asset) return tl::unexpected(asset.error());
     if (asset->bytes > limits::kMaxIncludeBytes)
-      return fail(Errc::resource_exhausted, fmt::format("\"{}\" has {} bytes; an included scene may have {}",
-                                                        name, asset->bytes, limits::kMaxIncludeBytes));
+      return fail(Errc::invalid_argument, fmt::format("\"{}\" has {} bytes; an included scene may have {}",
+                                                      name, asset->bytes, limits::kMaxIncludeBytes));
     const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
     if (!bytes) return tl::unexpected(bytes.error());
     return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
@@ -99,7 +99,7 @@ Result<void> check_size(FrameSize size) {
     return tl::unexpected(invalid(fmt::format("an image of {} x {} has no pixels", size.width, size.height)));
   if (size.width > limits::kMaxFrameSide || size.height > limits::kMaxFrameSide ||
       std::int64_t{size.width} * size.height > limits::kMaxFramePixels)
-    return fail(Errc::resource_exhausted,
+    return fail(Errc::invalid_argument,
                 fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width,
                             size.height, limits::kMaxFrameSide, limits::kMaxFramePixels));
   return {};
@@ -112,7 +112,7 @@ Result<void> check_spec(const JobSpec& spec) {
     return tl::unexpected(
         invalid(fmt::format("time must be between 0 and {} seconds", limits::kMaxTimeSeconds)));
   if (spec.spp && (*spec.spp == 0 || *spec.spp > limits::kMaxSpp))
-    return fail(*spec.spp == 0 ? Errc::invalid_argument : Errc::resource_exhausted,
+    return fail(Errc::invalid_argument,
                 fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
   if (std::abs(spec.priority) > limits::kMaxPriority)
     return tl::unexpected(invalid(fmt::format("priority must be within +-{}", limits::kMaxPriority)));
@@ -147,11 +147,11 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
     return tl::unexpected(rejected(std::move(error), std::move(found)));
   };
   if (request.scene_text.size() > limits::kMaxSceneText)
-    return refuse({Errc::resource_exhausted, fmt::format("the scene text has {} bytes; {} are allowed",
-                                                         request.scene_text.size(), limits::kMaxSceneText)});
+    return refuse({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",
+                                                       request.scene_text.size(), limits::kMaxSceneText)});
   if (request.assets.size() > limits::kMaxAssets)
-    return refuse({Errc::resource_exhausted, fmt::format("{} assets were named; {} are allowed",
-                                                         request.assets.size(), limits::kMaxAssets)});
+    return refuse({Errc::invalid_argument, fmt::format("{} assets were named; {} are allowed",
+                                                       request.assets.size(), limits::kMaxAssets)});
   if (auto ok = check_spec(request.spec); !ok) return refuse(ok.error());
 
   UploadedAssets assets(request.assets, blobs);
@@ -173,7 +173,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   job.spp = request.spec.spp;
   if (!job.spp && !request.spec.target_error && !request.spec.time) job.spp = scene.sample_count;
   if (job.spp && *job.spp > limits::kMaxSpp)
-    return refuse({Errc::resource_exhausted,
+    return refuse({Errc::invalid_argument,
                    fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
   for (const Asset& a : scene.assets) {
     const auto known = [&](const BlobRef& b) { return b.digest == a.digest; };
@@ -181,7 +181,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
       job.assets.push_back({a.digest, a.bytes, a.name});
   }
   if (job.assets.size() > ls::limits::kAssetsPerJob)
-    return refuse({Errc::resource_exhausted,
+    return refuse({Errc::invalid_argument,
                    fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
                                job.assets.size(), ls::limits::kAssetsPerJob)});
   const SceneFeatures features = features_of(scene);

@@ -64,7 +64,7 @@ Result<void> check_plan(const JobPlan& plan) {
   const std::uint64_t spp = plan.spp.value_or(kMaxSppWithoutLimit);
   // Rounds first: their number fits 32 bits then.
   if (tiles > kMaxTiles || spp > kMaxUnitsPerJob * 64 || tiles * round_count(spp) > kMaxUnitsPerJob) {
-    return fail(Errc::resource_exhausted,
+    return fail(Errc::invalid_argument,
                 fmt::format("{} tiles at {} spp are more than {} units; use larger tiles or fewer samples",
                             tiles, spp, kMaxUnitsPerJob));
   }
