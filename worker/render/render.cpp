@@ -62,7 +62,15 @@ const Variant& choose(const Features& need) {
   return std::end(kVariants)[-1];
 }
 
-bool finite(const C3& c) { return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z); }
+// What a sum in float32 can hold of 2^31 samples. A larger sample is an error of the scene; added up it would
+// make the whole unit infinite, which no retry can mend. NaN fails too. A limit of the sample's own, so that
+// what is rejected does not depend on how samples are grouped.
+constexpr float kLargestRadiance = 0x1p96f;
+bool usable(const SampleOutcome& s) {
+  const C3& c = s.radiance;
+  return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
+         std::abs(c.z) <= kLargestRadiance && !s.cut_off;
+}
 
 struct PixelSums {
   double half[2][3] = {};
@@ -77,7 +85,7 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
     health.majorant_violations += out.majorant_violations;
     // A sample that went wrong is counted, contributes zero and stays in N: never drawn again (STABILITY
     // N54).
-    if (!finite(out.radiance) || out.cut_off) {
+    if (!usable(out)) {
       ++health.nonfinite;
       continue;
     }
@@ -144,7 +152,7 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
   const SampleOutcome out = choose(world.need).sample(world, x, y, sample);
-  return {{out.radiance.x, out.radiance.y, out.radiance.z}, finite(out.radiance) && !out.cut_off};
+  return {{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out)};
 }
 
 WorldReport describe(const World& w) {
