@@ -2,8 +2,6 @@
 #pragma once
 
 #include <deque>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "worker/render/accel.h"
@@ -46,7 +44,6 @@ class World {
   FrameSize size;
 
   std::uint64_t clamped_inputs = 0;
-  std::vector<std::string> notes;  // for the report: what was left out and why
 
   bool depth_allows(int scatterings) const { return max_depth < 0 || scatterings < max_depth; }
 };

@@ -1,32 +1,58 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "common/assets/image.h"
 #include "common/base/overloaded.h"
+#include "worker/render/color.h"
 #include "worker/render/grid_load.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
 namespace {
 
-C3 color(const Rgb& c) {
-  return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
-}
 Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
 Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
 
-HenyeyGreenstein phase_of(const Scene& scene, PhaseIndex i) {
-  return std::visit(overloaded{[](const IsotropicPhase&) { return HenyeyGreenstein{0}; },
-                               [](const HgPhase& p) { return HenyeyGreenstein{static_cast<float>(p.g)}; }},
-                    scene.phases.at(i.value));
+// Beyond this, products of an extinction with a density and a length leave float32.
+constexpr double kMaxExtinction = 1e30;
+
+// g as float32 holds it: .99999999 is 1 there, where the phase function is no function.
+Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
+  const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
+  if (!hg) return HenyeyGreenstein{0};
+  const auto g = static_cast<float>(hg->g);
+  if (!(std::abs(g) < 1)) {
+    return fail(Errc::invalid_argument,
+                fmt::format("a phase function's g = {} is, to the precision of the renderer, not between -1 "
+                            "and 1; light scattered so far forward passes as if there were no medium",
+                            hg->g));
+  }
+  return HenyeyGreenstein{g};
+}
+
+// sigma: per world unit; largest: of the density.
+Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
+  for (const double s : sigma) {
+    if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
+    return fail(Errc::invalid_argument,
+                fmt::format("a medium's extinction reaches {} per scene unit: check its sigma_t, scale and "
+                            "densities",
+                            s * largest * world_scale));
+  }
+  return {};
 }
 
 // Lengths shrink by the world's scale, so coefficients grow by its inverse.
-Medium homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
+Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
   Medium out;
   const Rgb sigma_t = times(m.sigma_t, m.scale / scale);
+  if (auto ok = check_extinction(sigma_t, 1, scale); !ok) return tl::unexpected(ok.error());
+  auto phase = phase_of(scene, m.phase);
+  if (!phase) return tl::unexpected(phase.error());
   out.sigma_t = color(sigma_t);
   out.sigma_s = color(times(sigma_t, m.albedo));
-  out.phase = phase_of(scene, m.phase);
+  out.phase = *phase;
   return out;
 }
 
@@ -34,7 +60,9 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
                              World& w) {
   Medium out;
   out.grid = true;
-  out.phase = phase_of(scene, m.phase);
+  auto phase = phase_of(scene, m.phase);
+  if (!phase) return tl::unexpected(phase.error());
+  out.phase = *phase;
   const double per_unit = m.scale / w.geometry.scale;
   auto density =
       load_volume(scene.volumes.at(m.sigma_t.value), files, w.geometry.center, w.geometry.scale, per_unit);
@@ -54,6 +82,8 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
                     files.name(std::get<GridVolume>(scene.volumes[m.sigma_t.value]).file),
                     density->channels.size()));
   }
+  if (auto ok = check_extinction(sigma, density->channels[0].max_value(), w.geometry.scale); !ok)
+    return tl::unexpected(ok.error());
   w.grids.push_back(std::move(density->channels[0]));
   out.density = &w.grids.back();
   out.sigma_t = color(sigma);
@@ -74,21 +104,36 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
   return out;
 }
 
+// The media that the camera or some surface names.
+std::vector<bool> named_media(const Scene& scene) {
+  std::vector<bool> named(scene.media.size(), false);
+  if (scene.sensor.medium) named[scene.sensor.medium->value] = true;
+  for (const Shape& s : scene.shapes) {
+    if (!s.is_medium_transition) continue;
+    if (s.interior) named[s.interior->value] = true;
+    if (s.exterior) named[s.exterior->value] = true;
+  }
+  return named;
+}
+
+// The others keep their place in the list, but nothing of them is loaded.
 Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w) {
-  for (const ls::Medium& medium : scene.media) {
+  const std::vector<bool> named = named_media(scene);
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    if (!named[i]) {
+      w.media.emplace_back();
+      continue;
+    }
     Result<Medium> m = std::visit(
-        overloaded{[&](const HomogeneousMedium& h) -> Result<Medium> {
-                     return homogeneous(scene, h, w.geometry.scale);
-                   },
+        overloaded{[&](const HomogeneousMedium& h) { return homogeneous(scene, h, w.geometry.scale); },
                    [&](const HeterogeneousMedium& h) { return heterogeneous(scene, h, files, w); }},
-        medium);
+        scene.media[i]);
     if (!m) return tl::unexpected(m.error());
     w.media.push_back(*m);
   }
   return {};
 }
 
-// Media that some surface or the camera names; the others are not loaded into the decision.
 Features needs_of(const World& w) {
   Features f;
   if (!w.use_media) return f;
@@ -170,7 +215,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.filter = PixelFilter(scene.film.filter);
   w.need = needs_of(w);
   bool homogeneous_media = false;
-  for (const Medium& m : w.media) homogeneous_media = homogeneous_media || !m.grid;
+  for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = w.need.media && homogeneous_media && w.lights.any_with_place();
   return std::shared_ptr<const World>(world);
 }

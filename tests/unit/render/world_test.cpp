@@ -248,6 +248,45 @@ TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
   EXPECT_EQ(error_of(with_grid(1, kBox)), "");
 }
 
+TEST(World, RefusesPhaseFunctionsThatRoundToAMirrorOrNoMediumAtAll) {
+  const auto with_g = [](double g) {
+    return with_medium([&](SceneKit& k) { return k.homogeneous({1, 1, 1}, {1, 1, 1}, g); });
+  };
+  EXPECT_THAT(error_of(with_g(.99999999)), HasSubstr("g = 0.99999999"));
+  EXPECT_THAT(error_of(with_g(-.99999999)), HasSubstr("g = -0.99999999"));
+  EXPECT_EQ(error_of(with_g(.9999)), "");
+  EXPECT_EQ(error_of(with_g(1 - 0x1p-24)), "");
+}
+
+TEST(World, RefusesExtinctionsBeyondFloat32) {
+  EXPECT_THAT(error_of(with_medium([](SceneKit& k) {
+                return k.homogeneous({1e31, 1, 1}, {1, 1, 1});
+              })),
+              HasSubstr("extinction reaches 1e+31 per scene unit"));
+  const auto with_density = [](float density, double scale) {
+    return with_medium([&](SceneKit& k) {
+      return k.heterogeneous(k.grid({2, 2, 2}, std::vector<float>(8, density), kBox), {1, 1, 1}, scale);
+    });
+  };
+  EXPECT_THAT(error_of(with_density(1e38f, 1)), HasSubstr("extinction"));
+  EXPECT_THAT(error_of(with_density(1e20f, 1e20)), HasSubstr("extinction"));
+  EXPECT_EQ(error_of(with_density(1e10f, 1e10)), "");
+}
+
+TEST(World, LoadsNothingOfAMediumThatNothingContains) {
+  SceneKit kit = room();
+  kit.heterogeneous(kit.grid({2, 2, 2}, std::vector<float>(8, 1), kBox), {1, 1, 1});
+  const auto bytes_of_grids = [](const SceneKit& k) {
+    std::uint64_t bytes = 0;
+    for (const auto& [name, n] : describe(*test::world_of(k)).bytes) bytes += name == "grids" ? n : 0;
+    return bytes;
+  };
+  EXPECT_EQ(bytes_of_grids(kit), 0u);
+  kit.files.clear();
+  EXPECT_EQ(error_of(kit), "");
+  EXPECT_GT(bytes_of_grids(scenes()[3].kit), 0u);
+}
+
 TEST(World, NamesAFileThatWasNotBrought) {
   SceneKit kit = scenes()[3].kit;
   kit.files.clear();
@@ -272,6 +311,23 @@ TEST(World, CountsAlbedosOfAGridThatAreAboveOne) {
     });
     EXPECT_EQ(describe(*test::world_of(kit)).clamped_inputs, 2u);
   }
+}
+
+TEST(World, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
+  for (const double radiance : {1e30, 2e38}) {  // of the second even two are more than a float32 holds
+    SceneKit kit({2, 2});
+    kit.environment(radiance);
+    const auto world = test::world_of(kit);
+    const TileResult r = render_tile(*world, {0, 0, 2, 2}, {0, 16}, nullptr, nullptr);
+    for (const float s : r.sums) EXPECT_EQ(s, 0.f) << radiance;
+    EXPECT_EQ(r.health.nonfinite, 4u * 16) << radiance;
+    EXPECT_FALSE(render_sample(*world, 0, 0, 0).finite) << radiance;
+  }
+  SceneKit kit({2, 2});
+  kit.environment(1e28);
+  const TileResult r = render_tile(*test::world_of(kit), {0, 0, 2, 2}, {0, 16}, nullptr, nullptr);
+  for (const float s : r.sums) EXPECT_FLOAT_EQ(s, 8e28f);
+  EXPECT_EQ(r.health.nonfinite, 0u);
 }
 
 TEST(World, AnEmptySceneIsItsSky) {
