@@ -75,7 +75,7 @@ def test_the_coordinators_refusal_is_readable(rendering, tmp_path):
 
     assert "LIGHTSHAFT_TOKEN" in call(rendering, "jobs", code=1, LIGHTSHAFT_TOKEN="wrong").stderr
     assert "no job" in call(rendering, "show", "j-0", code=1).stderr
-    assert "1000000000 samples" in call(rendering, "submit", scene, "--spp", "1000000000", code=2).stderr
+    assert "use larger tiles or fewer samples" in call(rendering, "submit", scene, "--spp", 10**7, "--size", "8192x8192", code=2).stderr
     assert "cannot be reached" in lightshaft("jobs", "--to", "http://127.0.0.1:9", code=1).stderr
     assert "http://" in lightshaft("jobs", "--to", "farm.example", code=2).stderr
     without = {k: v for k, v in os.environ.items() if k != "LIGHTSHAFT_URL"}
