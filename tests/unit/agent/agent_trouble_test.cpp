@@ -1,0 +1,115 @@
+// An agent whose machine or backend is in trouble.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <new>
+
+#include "tests/unit/agent/agent_rig.h"
+
+namespace ls::worker {
+namespace {
+
+using testing::HasSubstr;
+using AgentInTrouble = AgentTest;
+
+TEST_F(AgentInTrouble, GivesUnitsBackThatAFullDiskKeepsFromBeingLoadedAndTriesAgain) {
+  start();
+  coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
+  coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
+  wait_while_time_passes([](auto& c) {
+    return c.returned.size() == 1 && !c.progress.empty() &&
+           c.progress.back().activity.find("no space left on the disk") != std::string::npos;
+  });
+  coordinator_.fail_fetches_with({});
+  coordinator_.tell(assign("l-2", "j-1", tiles_up_to(10)));
+  wait_while_time_passes([](auto& c) { return c.results.size() == 10; });
+
+  EXPECT_TRUE(drain());
+  EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 10U);
+  EXPECT_TRUE(coordinator_.failures.empty());
+}
+
+TEST_F(AgentInTrouble, DoesNotAskAFullDiskAgainAtOnce) {
+  start();
+  coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  coordinator_.tell(assign("l-2", "j-1", {0}));
+  coordinator_.tell(assign("l-3", "j-2", {0}, 2));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // of the other job
+
+  EXPECT_EQ(coordinator_.returned[1].lease, LeaseId{"l-3"});
+  EXPECT_EQ(coordinator_.fetches, 2);
+}
+
+// A backend that runs out of memory wherever it is told to.
+class Exhausted final : public RenderBackend {
+ public:
+  explicit Exhausted(bool at_loading) : at_loading_(at_loading) {}
+  Digest numeric_class() const override { return {}; }
+  tl::expected<void, UnitFailure> prepare(const LocalJob&) override {
+    if (at_loading_) throw std::bad_alloc();
+    return {};
+  }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob&, const LeaseUnit&,
+                                                 const std::atomic<bool>&) override {
+    throw std::bad_alloc();
+  }
+  void forget(const JobId&) override {}
+  std::uint64_t rss_bytes() const override { return 0; }
+
+ private:
+  const bool at_loading_;
+};
+
+TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
+  for (const bool at_loading : {true, false}) {
+    start_with(std::make_unique<Exhausted>(at_loading));
+    coordinator_.tell(assign("l-1", "j-1", {0}));
+    coordinator_.wait_for([](auto& c) { return c.failures.size() == 1; });
+
+    EXPECT_TRUE(drain());
+    EXPECT_THAT(coordinator_.failures[0].reason,
+                HasSubstr(at_loading ? "out of memory while loading" : "out of memory while rendering"));
+    coordinator_.failures.clear();
+    coordinator_.hellos.clear();
+  }
+}
+
+// A backend that finds itself unable to go on at its second unit.
+class Broken final : public RenderBackend {
+ public:
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    if (unit.tile == 0) return fake_->render(job, unit, stop);
+    broken_ = true;
+    return tl::unexpected<UnitFailure>(UnitFailure{.reason = "replaced"});
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+  std::optional<Error> broken() const override {
+    return broken_ ? std::optional(Error{Errc::failed_precondition, "the program was replaced"})
+                   : std::nullopt;
+  }
+
+ private:
+  std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+  std::atomic<bool> broken_{false};
+};
+
+TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed) {
+  start_with(std::make_unique<Broken>());
+  coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
+
+  EXPECT_EQ(join().error().message, "the program was replaced");
+  EXPECT_EQ(coordinator_.results.size(), 1U);
+  EXPECT_TRUE(coordinator_.failures.empty());
+  std::size_t returned = 0;
+  for (const LeaseReturned& r : coordinator_.returned) returned += r.unrendered.size();
+  EXPECT_EQ(returned, 9U);
+}
+
+}  // namespace
+}  // namespace ls::worker
