@@ -72,13 +72,20 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
+// Another target error for a job that has one and whose last round is not decided yet (Farm::may_retarget).
+// Looked at when the next round is complete: a smaller target gives the bits of a job that had it from the
+// first, since what was not good enough for the larger one was not for it.
+struct JobRetargeted {
+  JobId job;
+  double target_error = 0;  // relMSE
+};
 // To this new total, of a running, paused or done job. A target error or time already reached no longer
 // applies.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
 };
-// Forget a job that has ended; its id may not come again.
+// Forget a job that has ended; its id may come again with JobRestored only.
 struct JobForgotten {
   JobId job;
 };
@@ -138,8 +145,9 @@ struct UnitFailed {
 // Raised regularly (about once a second): deadlines, speculation, forgiveness, time budgets.
 struct Tick {};
 
-using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped,
-                           JobPriority, JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains,
-                           LeaseProgress, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+using Event =
+    std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
+                 JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains,
+                 LeaseProgress, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -43,12 +43,13 @@ struct WorkerFailures {
   bool blocked = false;
 
   void add(TimePoint now) {
-    if (count > 0 && now - last >= kForgiveAfter) *this = {};
+    if (count > 0 && forgiven_at(now)) *this = {};
     ++count;
     last = now;
     blocked = count >= kWorkerFailuresPerJob;
   }
-  bool blocked_at(TimePoint now) const { return blocked && now - last < kForgiveAfter; }
+  bool forgiven_at(TimePoint now) const { return now - last >= kForgiveAfter; }
+  bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
 // The sentence for the job's owner: unit, pixel, signal, what each worker said, how to replay it.

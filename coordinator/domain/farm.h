@@ -54,6 +54,7 @@ struct JobFigures {
   int priority = 0;
   double core_seconds_left =
       0;  // predicted for what is not done, from measured cost; 0: nothing measured yet
+  double core_seconds_queued = 0;  // of those, predicted for units that no worker has
   double seconds_per_sample = 0;  // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
@@ -94,6 +95,9 @@ class Farm {
   // As it stands: priority and spp as changed, a target or time that no longer applies left out. To be
   // stored.
   std::optional<JobPlan> plan(const JobId& id) const;
+  // Why JobRetargeted or JobExtended would change nothing.
+  Result<void> may_retarget(const JobId& id, double target_error) const;
+  Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::vector<WorkerId> workers() const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;

@@ -24,6 +24,7 @@ void Farm::State::set_state(Job& job, JobState to) {
   if (job.state == to) return;
   effects.emplace_back(JobStateChanged{job.plan.brief.job, job.state, to});
   job.state = to;
+  to == JobState::paused || to == JobState::done ? job.stand_still(now) : job.go_on(now);
 }
 
 void Farm::State::refresh(Job& job) {
@@ -62,9 +63,12 @@ void Farm::State::on(const JobRestored& event) {
   job.state = event.state;
   job.numeric_class = event.numeric_class;
   if (event.elapsed_seconds > 0) job.first_ray = now - from_seconds(event.elapsed_seconds);
+  if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return;
 
-  const bool with_film = event.folded.size() == job.units.tiles();
+  // A done job whose film is lost has no end to read from it: it is folded again from its results.
+  const bool with_film = event.folded.size() == job.units.tiles() &&
+                         std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
     job.stopping = event.stopped;
     if (const auto end = end_of(event.folded)) job.cut_off(*end, event.stopped.value_or(StopReason::spp));
@@ -136,54 +140,14 @@ void Farm::State::on(const JobPriority& event) {
   refresh(*job);
 }
 
-void Farm::State::on(const JobExtended& event) {
-  Job* job = find(event.job);
-  if (job == nullptr || job->state == JobState::failed || job->state == JobState::cancelled) return;
-  const bool cut_short = job->stopping && *job->stopping != StopReason::spp;
-  const UnitCode old_end = job->queue.end();
-  const std::uint64_t now_spp = cut_short ? cut_range(round_of(old_end) - 1, job->spp).s1 : job->spp;
-  const RoundIndex last = tile_of(old_end) > 0 ? round_of(old_end) : round_of(old_end) - 1;
-  const std::uint64_t new_spp = even_spp(event.spp);
-  JobPlan plan = job->plan;
-  plan.spp = new_spp;
-  if (new_spp <= now_spp || !check_plan(plan)) return;
-
-  if (cut_range(last, job->spp) != cut_range(last, new_spp)) {
-    const UnitCode from = unit_code(last, 0);
-    for (const LeaseSeq seq : leases_of(*job)) {
-      const LeaseRecord& lease = *leases.find(seq);
-      const bool concerned =
-          std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode u) { return u >= from; });
-      if (concerned) free_lease(seq, "round is rendered again in full", true);
-    }
-    job->queue.rewind(from);
-    job->units.reopen(last);
-    effects.emplace_back(ReopenRound{event.job, last});
-  }
-  if (job->stopping == StopReason::error) plan.target_error.reset();
-  if (const auto limit = job->time_limit(); limit && now >= *limit) plan.time.reset();
-  job->plan = std::move(plan);
-  job->spp = new_spp;
-  job->stopping.reset();
-  job->frozen = false;
-  work_appeared = true;
-  job->queue.set_end(unit_code(round_count(new_spp), 0));
-  const bool was_done = job->state == JobState::done;
-  if (was_done) set_state(*job, JobState::running);
-  job->move_window(workers.threads());
-  was_done ? decide_stop_again(*job) : decide_stop(*job, job->units.rounds_complete());
-  for (TileIndex t = 0; t < job->units.tiles(); ++t) issue_folds(*job, t);
-  finish_if_complete(*job);
-  refresh(*job);
-}
-
+// What workers did wrong in it stays on their record until it is forgiven: who fails in two jobs is sick,
+// also when the first one has gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
   for (const auto& [index, worker] : workers.all()) {
     worker->briefed.erase(job->seq);
     worker->warmed_up.erase(job->seq);
-    worker->failures.erase(job->seq);
   }
   by_id.erase(event.job);
   jobs.erase(job->seq);

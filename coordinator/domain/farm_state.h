@@ -31,7 +31,7 @@ struct Farm::State {
   bool work_appeared = false;     // units have come (back) that any worker may want
   std::set<WorkerIndex> touched;  // workers that may want more
 
-  // ---- farm_jobs.cpp ----
+  // ---- farm_jobs.cpp, farm_changes.cpp ----
   void on(const JobSubmitted& event);
   void on(const JobRestored& event);
   void on(const JobCancelled& event);
@@ -39,8 +39,11 @@ struct Farm::State {
   void on(const JobResumed& event);
   void on(const JobStopped& event);
   void on(const JobPriority& event);
+  void on(const JobRetargeted& event);
   void on(const JobExtended& event);
   void on(const JobForgotten& event);
+  static Result<void> may_retarget(const Job& job, double target_error);
+  static Result<void> may_extend(const Job& job, std::uint64_t spp);
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
@@ -74,6 +77,7 @@ struct Farm::State {
   // Of a job taken up again with nothing under way: its last round may be folded already, and that it is the
   // last one was known one round before. Asking only now would add a round.
   void decide_stop_again(Job& job);
+  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);  // under which it holds it
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
   // ---- farm_leases.cpp ----

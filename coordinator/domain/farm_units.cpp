@@ -101,6 +101,9 @@ void Farm::State::decide_stop(Job& job, RoundIndex complete) {
   const double channels = 3.0 * static_cast<double>(job.plan.grid.frame.width) * job.plan.grid.frame.height;
   const double relmse = job.units.error_sum(complete - 1) / channels;
   if (!stop_after(complete, relmse, *job.plan.target_error, job.spp)) return;
+  // A larger target given since may be met by a round beyond which folding has begun: then the next one
+  // decides.
+  if (job.units.fold_issued_beyond(complete)) return;
   job.cut_off(end, StopReason::error);
   for (const LeaseSeq seq : leases_of(job)) {
     free_units(*leases.find(seq), "beyond the last round", true, [&](UnitCode code) { return code >= end; });
@@ -114,6 +117,16 @@ void Farm::State::decide_stop_again(Job& job) {
   decide_stop(job, complete);
 }
 
+LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) {
+  const auto it = job.out.find(code);
+  if (it == job.out.end()) return nullptr;
+  for (const LeaseSeq seq : it->second.lease) {
+    LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
+    if (lease != nullptr && lease->worker == &worker) return lease;
+  }
+  return nullptr;
+}
+
 void Farm::State::on(const UnitFailed& event) {
   Worker* worker = workers.find(event.worker);
   Job* job = find(event.failure.unit.job);
@@ -121,22 +134,17 @@ void Farm::State::on(const UnitFailed& event) {
   grown(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
   if (event.failure.unit.tile >= job->units.tiles() || code >= job->queue.end()) return;
+  // Only who holds a unit can have failed at it: no worker has a word on what was never lent to it, and what
+  // was taken back from it is rendered elsewhere.
+  LeaseRecord* lease = lease_of(*job, code, *worker);
+  if (lease == nullptr) return;
   if (event.failure.scene_at_fault) {
     return fail(
         *job,
         fmt::format("the scene cannot be rendered: {} (found by {})", event.failure.reason, worker->name),
         event.failure);
   }
-  if (job->units.accepted(code)) return;
-  if (const auto it = job->out.find(code); it != job->out.end()) {
-    for (const LeaseSeq seq : Holders(it->second).lease) {
-      LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
-      if (lease != nullptr && lease->worker == worker) {
-        free_units(*lease, "failed", false, [&](UnitCode unit) { return unit == code; });
-        break;
-      }
-    }
-  }
+  free_units(*lease, "failed", false, [&](UnitCode unit) { return unit == code; });
   count_failure(*job, code, *worker, event.failure);
 }
 

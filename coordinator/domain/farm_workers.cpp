@@ -104,8 +104,8 @@ void Farm::State::on(const Tick&) {
   expire_leases();
   forgive_and_forget();
   for (const auto& [seq, job] : jobs) {
-    if (job->ended() || job->frozen) continue;
-    const auto limit = job->time_limit();
+    if (!job->leasable() || job->frozen) continue;
+    const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
   }
   work_appeared = true;
@@ -127,6 +127,7 @@ void Farm::State::expire_leases() {
 void Farm::State::forgive_and_forget() {
   std::vector<Worker*> gone;
   for (const auto& [index, worker] : workers.all()) {
+    std::erase_if(worker->failures, [&](const auto& of_job) { return of_job.second.forgiven_at(now); });
     if (worker->pause == Pause::returned) {
       worker->pause = Pause::none;
       touch(*worker);

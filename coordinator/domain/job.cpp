@@ -30,9 +30,20 @@ void Job::cut_off(UnitCode end, StopReason reason) {
   stopping = reason;
 }
 
-std::optional<TimePoint> Job::time_limit() const {
+std::optional<TimePoint> Job::time_limit(TimePoint now) const {
   if (!plan.time || !first_ray) return std::nullopt;
-  return *first_ray + from_seconds(*plan.time);
+  const Duration stood = still_since ? now - std::max(*still_since, *first_ray) : Duration{};
+  return *first_ray + stood + from_seconds(*plan.time);
+}
+
+void Job::stand_still(TimePoint now) {
+  if (!still_since) still_since = now;
+}
+
+void Job::go_on(TimePoint now) {
+  if (!still_since) return;
+  if (first_ray) *first_ray += now - std::max(*still_since, *first_ray);
+  still_since.reset();
 }
 
 }  // namespace ls::coordinator

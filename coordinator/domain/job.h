@@ -40,7 +40,8 @@ struct Job {
       stopping;         // decided, while what is leased or unfolded is awaited; final once done
   bool frozen = false;  // by time or user: what has been leased once is still wanted, nothing else
   std::optional<Digest> numeric_class;
-  std::optional<TimePoint> first_ray;
+  std::optional<TimePoint> first_ray;  // moved on by the time that the job stood still since
+  std::optional<TimePoint> still_since;  // paused or done: its time budget does not run
 
   UnitTable units;
   UnitQueue queue;
@@ -69,7 +70,10 @@ struct Job {
   void move_window(int farm_threads);
   // Ends the job before `end`, or earlier if it ends earlier already. Acceptances beyond are forgotten.
   void cut_off(UnitCode end, StopReason reason);
-  std::optional<TimePoint> time_limit() const;
+  std::optional<TimePoint> time_limit(TimePoint now) const;
+  // Before and after which the state is one in which the job stands still.
+  void stand_still(TimePoint now);
+  void go_on(TimePoint now);
 };
 
 }  // namespace ls::coordinator

@@ -15,7 +15,7 @@ struct LeaseSize {
 
 // Seconds that the worker's threads have until the job's time is up, behind what they hold already.
 double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
-  const auto limit = job.time_limit();
+  const auto limit = job.time_limit(now);
   if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
   return std::max(0.0, seconds(*limit - now) - worker.seconds_out / worker.threads);
 }
@@ -35,7 +35,7 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
 // A job with a time budget leases nothing beyond it, and nothing ahead that would only be begun beyond it.
 // Every tile gets its first round.
 bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
-  const auto limit = job.time_limit();
+  const auto limit = job.time_limit(now);
   if (!limit || job.frozen || round_of(code) == 0) return false;
   if (now >= *limit) return true;
   return worker.covered() && now + from_seconds(worker.seconds_out / worker.threads) >= *limit;

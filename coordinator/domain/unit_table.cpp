@@ -81,6 +81,10 @@ std::optional<RoundIndex> UnitTable::issue_fold(TileIndex tile, RoundIndex limit
   return next;
 }
 
+bool UnitTable::fold_issued_beyond(RoundIndex round) const {
+  return std::any_of(issued_.begin(), issued_.end(), [&](RoundIndex next) { return next > round + 1; });
+}
+
 bool UnitTable::fold(TileIndex tile, RoundIndex index, double rel_error_sum) {
   if (tile >= tiles_ || folded_[tile] != index || index >= issued_[tile]) return false;
   restore_error(index, tile, rel_error_sum);

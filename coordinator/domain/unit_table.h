@@ -47,6 +47,7 @@ class UnitTable {
   // The tile's next round if it is accepted, below `end` and at most `limit`; it counts as issued from now
   // on.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, UnitCode end);
+  bool fold_issued_beyond(RoundIndex round) const;  // of any tile
   // False if this is not the issued round that is next to be folded.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);

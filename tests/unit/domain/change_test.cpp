@@ -1,0 +1,195 @@
+// What users change of a job under way, what time it may take, and what workers may say of it.
+#include "tests/unit/domain/rig.h"
+
+namespace ls::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Failure, OnlyAWorkerThatHoldsTheUnitCanFailIt) {
+  Rig rig;
+  rig.join("holder", 1);
+  rig.join("stranger", 1);
+  JobPlan plan = plan_of("j", 1, 2);
+  rig.submit(plan);
+  const bool first = !rig.held[{"holder"}].empty();
+  const std::string liar = first ? "stranger" : "holder";
+  const UnitKey unit{{"j"}, 0, 0};
+
+  for (int i = 0; i < 5; ++i) {
+    for (const bool scene_at_fault : {false, true})
+      rig.send(UnitFailed{{liar}, {unit, {"t-1"}, scene_at_fault, "I say so", {}, {}, {}}});
+  }
+
+  EXPECT_EQ(rig.job().state, JobState::running);
+  EXPECT_EQ(rig.job().units_leased, 1u) << "its holder keeps it";
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Failure, AForgottenJobStillCountsAgainstTheWorkerThatFailedInIt) {
+  Rig rig;
+  rig.join("bad", 1);
+  rig.join("good", 1);
+  for (const std::string id : {"j", "k"}) {
+    rig.submit(plan_of(id, 40, 2));
+    for (int guard = 0; rig.job(id).state != JobState::done && guard < 1000; ++guard)
+      rig.held[{"bad"}].empty() ? rig.render("good") : rig.fail("bad");
+    rig.send(JobForgotten{{id}});
+  }
+
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::sick);
+  rig.pass(kForgiveAfter);
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::connected);
+}
+
+TEST(Time, PausedDoesNotCountAgainstTheBudget) {
+  Rig rig;
+  rig.join("w", 1);
+  JobPlan plan = plan_of("j", 4, 4096);
+  plan.time = 100;
+  rig.submit(plan);
+  rig.render("w");
+  rig.pass(10s);
+  rig.send(JobPaused{{"j"}});
+  while (!rig.held[{"w"}].empty()) rig.render("w");
+
+  rig.pass(3600s);
+  EXPECT_EQ(rig.job().state, JobState::paused);
+  rig.send(JobResumed{{"j"}});
+  rig.pass(1s);
+
+  EXPECT_FALSE(rig.held[{"w"}].empty()) << "80 s of the budget are left";
+  rig.render("w");
+  rig.pass(200s);
+  rig.render_all();
+  EXPECT_EQ(rig.job().stopped, StopReason::time);
+}
+
+TEST(Time, DoesNotRunWhileAJobIsDone) {
+  Rig rig;
+  rig.join("w", 1);
+  JobPlan plan = plan_of("j", 1, 4);
+  plan.time = 100;
+  rig.submit(plan);
+  rig.render_all();
+  ASSERT_EQ(rig.job().state, JobState::done);
+
+  rig.pass(3600s);
+  rig.send(JobExtended{{"j"}, 64});
+
+  EXPECT_EQ(rig.farm.plan({"j"})->time, 100) << "hours later most of the budget is still there";
+  rig.render_all();
+  EXPECT_EQ(rig.job().stopped, StopReason::spp);
+}
+
+// Error falls as 1/n: relMSE after n samples is 1/n.
+double one_over_n(const UnitKey& unit) { return 8 * 8 * 3 / static_cast<double>(round_range(unit.round).s1); }
+
+std::uint64_t spp_with(double target, std::optional<double> then) {
+  Rig rig;
+  rig.rel_error = one_over_n;
+  rig.join("w", 1);
+  JobPlan plan = plan_of("j", 3, std::nullopt);
+  plan.target_error = target;
+  rig.submit(plan);
+  for (int i = 0; i < 20; ++i) rig.render("w");
+  if (then) rig.send(JobRetargeted{{"j"}, *then});
+  rig.render_all();
+  EXPECT_EQ(rig.job().stopped, StopReason::error);
+  return rig.farm.tile({"j"}, 0)->spp;
+}
+
+TEST(Target, ASmallerOneGivesWhatAJobThatHadItFromTheFirstGives) {
+  const std::uint64_t at_once = spp_with(1 / 1000.0, std::nullopt);
+  EXPECT_GE(at_once, 1000u);
+  EXPECT_EQ(spp_with(1 / 500.0, 1 / 1000.0), at_once);
+}
+
+TEST(Target, ALargerOneStopsTheJobWithTheNextRound) {
+  const std::uint64_t spp = spp_with(1 / 5000.0, 1 / 64.0);
+  EXPECT_GE(spp, 64u);
+  EXPECT_LE(spp, 512u);
+}
+
+TEST(Target, IsKeptByAJobThatHasNoneOrHasDecidedItsLastRound) {
+  Rig rig;
+  rig.rel_error = one_over_n;
+  rig.join("w", 1);
+  rig.submit(plan_of("plain", 1, 4));
+  EXPECT_THAT(rig.farm.may_retarget({"plain"}, .1).error().message, HasSubstr("without a target"));
+  JobPlan plan = plan_of("j", 3, std::nullopt);
+  plan.target_error = 1 / 100.0;
+  rig.submit(plan);
+  EXPECT_EQ(rig.farm.may_retarget({"j"}, -1).error().code, Errc::invalid_argument);
+  EXPECT_TRUE(rig.farm.may_retarget({"j"}, .1).has_value());
+  rig.render_all();
+
+  EXPECT_EQ(rig.farm.may_retarget({"j"}, .001).error().code, Errc::failed_precondition);
+  rig.send(JobRetargeted{{"j"}, .001});
+  EXPECT_EQ(rig.farm.plan({"j"})->target_error, 1 / 100.0);
+}
+
+TEST(Target, ALargerOneIsSafeAcrossARestart) {
+  Rig before;
+  before.rel_error = one_over_n;
+  before.join("w", 1);
+  JobPlan plan = plan_of("j", 3, std::nullopt);
+  plan.target_error = 1 / 5000.0;
+  std::vector<Effect> history = before.submit(plan);
+  while (before.job().rounds_complete < 8 || before.farm.tile({"j"}, 0)->rounds_folded < 9)
+    for (Effect& e : before.render("w")) history.push_back(e);
+  plan.target_error = 1 / 64.0;  // met long ago, while a tile is folded beyond it
+  JobRestored restored{plan, JobState::running, {}, digest_number(1), {}, {}, {}, 1.0};
+  for (const RecordUnit& r : of<RecordUnit>(history))
+    restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
+  for (TileIndex t = 0; t < 3; ++t) restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+  restored.rel_error.resize(12);
+  for (RoundIndex k = 0; k < 12; ++k) restored.rel_error[k].assign(3, one_over_n({{"j"}, 0, k}));
+
+  Rig after;
+  after.rel_error = one_over_n;
+  after.send(restored);
+  after.join("w", 1);
+  after.render_all();
+
+  EXPECT_EQ(after.job().stopped, StopReason::error);
+  EXPECT_EQ(after.job().units_folded, after.job().units_total);
+}
+
+TEST(Restart, ADoneJobWhoseFilmIsLostIsFoldedAgainAndExtended) {
+  const JobPlan plan = plan_of("j", 2, 6);
+  Rig before;
+  before.join("w", 1);
+  before.submit(plan);
+  JobRestored restored{plan, JobState::done, StopReason::spp, digest_number(1), {}, {0, 0}, {}, 1.0};
+  for (const RecordUnit& r : of<RecordUnit>(before.render_all()))
+    restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
+
+  Rig after;
+  const auto effects = after.send(restored);
+  EXPECT_EQ(of<Fold>(effects).size(), 6u);
+  EXPECT_EQ(after.job().state, JobState::done);
+  after.join("w", 1);
+  after.send(JobExtended{{"j"}, 8});
+  after.render_all();
+
+  EXPECT_EQ(after.farm.tile({"j"}, 1)->spp, 8u);
+}
+
+TEST(Figures, TellWhatTheQueueWillCost) {
+  Rig rig;
+  rig.cpu_seconds = 1;  // 2 samples of 64 pixels
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 10, 2));
+  EXPECT_EQ(rig.job().core_seconds_queued, 0) << "nothing is measured";
+  rig.render("w");
+
+  const JobFigures f = rig.job();
+  EXPECT_NEAR(f.core_seconds_left, 9, 1e-9);
+  EXPECT_NEAR(f.core_seconds_queued, static_cast<double>(f.units_queued), 1e-9);
+  EXPECT_LT(f.units_queued, 9u) << "the worker holds some";
+}
+
+}  // namespace
+}  // namespace ls::coordinator
