@@ -53,8 +53,6 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
   // An axis of one node has no neighbour: stepping by 0 reads the node itself.
   step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
            size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
-  for (int i = 0; i < 9; ++i) a_[i] = static_cast<float>(exact_.a[i]);
-  b_ = V3(exact_.b);
   for (float v : values_) max_value_ = std::max(max_value_, v);
   build_macro_cells(density_to_sigma);
 }
@@ -155,48 +153,53 @@ MacroCell Grid::bound_cell(int x, int y, int z) const {
   return m;
 }
 
-CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1)
-    : grid_(grid), lo_(grid.domain_lo()), size_(static_cast<float>(grid.cell_size())) {
-  origin_ = grid.to_index(o);
-  direction_ = grid.linear(d);
-  const Interval part =
-      clip(V3d(grid.domain_lo()), V3d(grid.domain_hi()), V3d(origin_), V3d(direction_), t0, t1);
-  begin_ = end_ = static_cast<float>(part.t0);
-  stop_ = static_cast<float>(part.t1);
-  if (!(begin_ < stop_)) {
-    stop_ = begin_;
-    return;
-  }
-  const V3 start = index(begin_);
-  const auto cells = grid.cells();
+Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, double wanted) const {
+  const V3d o(origin), d(direction);
+  const auto value_at = [&](double t) {
+    const V3 q(o + d * t);
+    return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
+  };
+  // Two-point Gauss-Legendre: exact for the cubic that a trilinear field is along a line.
+  const auto integral = [&](double a, double length) {
+    const double middle = a + length / 2, g = length * .28867513459481288;  // 1 / (2 sqrt 3)
+    return length / 2 * (value_at(middle - g) + value_at(middle + g));
+  };
+  // Planes between the field's patches: through nodes, or half way between them.
+  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
+  double plane[3], exit[3];
   for (int k = 0; k < 3; ++k) {
-    count_[k] = cells[k];
-    at_[k] = std::clamp(static_cast<int>(std::floor((start[k] - lo_[k]) / size_)), 0, cells[k] - 1);
-    // A component too small to cross a cell within the ray counts as parallel.
-    if (std::abs(direction_[k]) < 1e-20f) {
-      step_[k] = 0;
-      exit_[k] = kInf;
-      inverse_[k] = 0;
-    } else {
-      step_[k] = direction_[k] > 0 ? 1 : -1;
-      inverse_[k] = 1 / direction_[k];
-      exit_[k] = boundary(k);
+    exit[k] = std::numeric_limits<double>::infinity();
+    if (std::abs(d[k]) < 1e-20) continue;
+    const double q = o[k] + d[k] * t0 - offset;
+    plane[k] = d[k] > 0 ? std::floor(q) + 1 : std::ceil(q) - 1;
+    exit[k] = (plane[k] + offset - o[k]) / d[k];
+  }
+  Passage p;
+  for (double a = t0; a < t1;) {
+    const int k = exit[0] < exit[1] ? (exit[0] < exit[2] ? 0 : 2) : (exit[1] < exit[2] ? 1 : 2);
+    const double b = std::max(a, std::min<double>(t1, exit[k])), here = integral(a, b - a);
+    if (p.integral + here >= wanted) {
+      const double rest = wanted - p.integral;
+      // Safeguarded Newton: the integral never falls.
+      double lo = 0, hi = b - a, h = here > 0 ? hi * std::min(1., rest / here) : 0;
+      for (int i = 0; i < 32; ++i) {
+        const double excess = integral(a, h) - rest;
+        (excess > 0 ? hi : lo) = h;
+        double next = h - excess / value_at(a + h);
+        if (!(next >= lo && next <= hi)) next = (lo + hi) / 2;
+        if (std::abs(next - h) <= 1e-7 * h) break;
+        h = next;
+      }
+      return {true, static_cast<float>(a + h), wanted};
     }
+    p.integral += here;
+    if (!(exit[k] < t1)) break;
+    a = b;
+    plane[k] += d[k] > 0 ? 1 : -1;
+    exit[k] = (plane[k] + offset - o[k]) / d[k];
   }
-}
-
-bool CellWalk::next() {
-  if (!(end_ < stop_)) return false;
-  if (started_) {
-    const int k = exit_[0] < exit_[1] ? (exit_[0] < exit_[2] ? 0 : 2) : (exit_[1] < exit_[2] ? 1 : 2);
-    at_[k] += step_[k];
-    if (step_[k] == 0 || at_[k] < 0 || at_[k] >= count_[k]) return false;
-    exit_[k] = boundary(k);
-  }
-  started_ = true;
-  begin_ = end_;
-  end_ = std::max(begin_, std::min(stop_, std::min(exit_[0], std::min(exit_[1], exit_[2]))));
-  return true;
+  p.t = t1;
+  return p;
 }
 
 double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) const {

@@ -1,8 +1,12 @@
 // A dense scalar grid, interpolated or not, and macro cells that bound it.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "common/scene/scene.h"
@@ -19,6 +23,14 @@ struct MacroCell {
   float residual = 0;  // >= |value - control|
 };
 
+// What a stretch of a ray meets of the field: its integral, up to the point where that is what was asked for
+// or to the stretch's end.
+struct Passage {
+  bool reached = false;
+  float t = 0;
+  double integral = 0;
+};
+
 class Grid {
  public:
   Grid() = default;
@@ -31,11 +43,9 @@ class Grid {
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
 
-  V3 to_index(const V3& p) const { return linear(p) + b_; }
-  V3 linear(const V3& v) const {
-    return {a_[0] * v.x + a_[1] * v.y + a_[2] * v.z, a_[3] * v.x + a_[4] * v.y + a_[5] * v.z,
-            a_[6] * v.x + a_[7] * v.y + a_[8] * v.z};
-  }
+  // In double: a grid that is small in its world has index coordinates whose parts are large and all but
+  // cancel.
+  V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
   VolumeFilter filter() const { return filter_; }
   // Value at index coordinates inside the domain. The filter is the caller's choice, once for many values; it
   // must be filter().
@@ -54,7 +64,7 @@ class Grid {
     float f[3];
     const float q[3] = {index.x, index.y, index.z};
     for (int k = 0; k < 3; ++k) {
-      const float c = std::min(std::max(q[k], 0.f), top_[k]);
+      const float c = std::min(std::max(0.f, q[k]), top_[k]);  // in this order NaN becomes 0
       cell[k] = std::min(static_cast<int>(c), last_[k]);
       f[k] = c - static_cast<float>(cell[k]);
     }
@@ -71,7 +81,7 @@ class Grid {
   float nearest(const V3& index) const {
     std::size_t i[3];
     const float q[3] = {index.x, index.y, index.z};
-    for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(q[k], 0.f), top_[k]) + .5f);
+    for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(0.f, q[k]), top_[k]) + .5f);
     return values_[(i[2] * size_[1] + i[1]) * size_[0] + i[0]];
   }
 
@@ -88,12 +98,18 @@ class Grid {
   // Values above `limit`, each counted once.
   std::uint64_t count_above(float limit) const;
 
+  // Along origin + t direction in index coordinates, voxel by voxel from t0 to t1, which must be finite;
+  // exact up to rounding to float32. What the trackers do where they would meet more collisions than voxels.
+  Passage pass(const V3& origin, const V3& direction, float t0, float t1,
+               double wanted = std::numeric_limits<double>::infinity()) const;
+
   // Integral of the field along o + t d, t in [t0, t1]: exact up to rounding (within a voxel the field is a
   // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). Zero variance; the
   // truth for tests of the trackers.
   double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
 
  private:
+  friend class CellWalk;
   void repeat_ends();
   V3 wrapped(const V3& index) const;
   void build_macro_cells(double density_to_sigma);
@@ -103,8 +119,7 @@ class Grid {
   std::array<float, 3> top_{};
   std::array<std::size_t, 3> step_{};
   std::vector<float> values_;
-  float a_[9] = {};
-  V3 b_, lo_, hi_;
+  V3 lo_, hi_;
   Affine exact_;  // world to index, unrounded
   VolumeFilter filter_ = VolumeFilter::trilinear;
   Wrap wrap_ = Wrap::clamp;
@@ -116,31 +131,99 @@ class Grid {
 };
 
 // Walks the macro cells along a ray: for (CellWalk w(grid, o, d, t0, t1); w.next();) use w.cell(),
-// [w.begin(), w.end()]. Boundaries are computed from integer cell numbers, never by adding steps up, and
-// intervals never run backwards.
+// [w.begin(), w.end()]. Distances and positions are relative to the point of entry, found in double: a
+// float32 distance from a far origin cannot tell the voxels of a small grid apart (STABILITY N11). Boundaries
+// are computed from integer cell numbers, never by adding steps up, and intervals never run backwards.
+// Nothing is walked along a ray that is not finite.
 class CellWalk {
  public:
   CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1);
-  bool next();
-  const MacroCell& cell() const { return grid_.cell(at_[0], at_[1], at_[2]); }
+  bool next() {
+    if (!(end_ < stop_)) return false;
+    if (started_) {
+      const int k = exit_[0] < exit_[1] ? (exit_[0] < exit_[2] ? 0 : 2) : (exit_[1] < exit_[2] ? 1 : 2);
+      if (--left_[k] < 0) return false;
+      cell_ += stride_[k];
+      plane_[k] += step_[k];
+      exit_[k] = boundary(k);
+    }
+    started_ = true;
+    begin_ = end_;
+    end_ = std::max(begin_, std::min(stop_, std::min(exit_[0], std::min(exit_[1], exit_[2]))));
+    return true;
+  }
+  const MacroCell& cell() const { return *cell_; }
+  // Where the cell begins and ends, from entry() on.
   float begin() const { return begin_; }
   float end() const { return end_; }
-  // Index coordinates of the point at t.
+  // Distance of the point of entry from the ray's origin.
+  double entry() const { return entry_; }
+  // Index coordinates of the point at t, and where t = 0 is and how they grow with t.
   V3 index(float t) const { return origin_ + direction_ * t; }
+  const V3& origin() const { return origin_; }
+  const V3& direction() const { return direction_; }
 
  private:
-  float boundary(int axis) const {
-    const int i = at_[axis] + (step_[axis] > 0 ? 1 : 0);
-    return (lo_[axis] + static_cast<float>(i) * size_ - origin_[axis]) * inverse_[axis];
-  }
+  float boundary(int axis) const { return first_[axis] + plane_[axis] * spacing_[axis]; }
 
-  const Grid& grid_;
-  V3 origin_, direction_, inverse_, lo_;
-  float size_;
-  int at_[3] = {}, step_[3] = {}, count_[3] = {};
-  float exit_[3] = {};
+  const MacroCell* cell_ = nullptr;
+  double entry_ = 0;
+  V3 origin_, direction_;
+  // By axis: boundary i lies at first + i * spacing; cells still ahead; to the next cell of the table.
+  float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
+  int left_[3];
+  std::ptrdiff_t stride_[3];
   float begin_ = 0, end_ = 0, stop_ = 0;
   bool started_ = false;
 };
+
+inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1) {
+  const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
+  if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
+  // A component too small to cross a cell within the ray counts as parallel. Outside of the faces it runs
+  // along it meets nothing.
+  constexpr double kParallel = 1e-20;
+  double from = t0, to = t1, inverse[3];
+  for (int k = 0; k < 3; ++k) {
+    const double lo = grid.lo_[k] - p[k], hi = grid.hi_[k] - p[k];
+    if (std::abs(v[k]) < kParallel) {
+      if (lo > 0 || hi < 0) return;
+      inverse[k] = 0;
+      continue;
+    }
+    inverse[k] = 1 / v[k];
+    const double a = lo * inverse[k], b = hi * inverse[k];
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  }
+  const double length = to - from;
+  if (!(length > 0 && length < std::numeric_limits<float>::max())) return;
+  entry_ = from;
+  stop_ = static_cast<float>(length);
+  origin_ = V3(p + v * from);
+  direction_ = V3(v);
+  const auto size = static_cast<float>(grid.cell_size_), per_size = 1 / size;  // a power of two
+  const std::ptrdiff_t strides[3] = {1, grid.cells_[0], std::ptrdiff_t{grid.cells_[0]} * grid.cells_[1]};
+  cell_ = grid.macro_.data();
+  for (int k = 0; k < 3; ++k) {
+    const int at =
+        std::min(static_cast<int>(std::max(0.f, (origin_[k] - grid.lo_[k]) * per_size)), grid.cells_[k] - 1);
+    cell_ += at * strides[k];
+    if (inverse[k] == 0) {
+      left_[k] = 0;
+      exit_[k] = std::numeric_limits<float>::infinity();
+      continue;
+    }
+    const bool up = inverse[k] > 0;
+    left_[k] = up ? grid.cells_[k] - 1 - at : at;
+    stride_[k] = up ? strides[k] : -strides[k];
+    step_[k] = up ? 1.f : -1.f;
+    plane_[k] = static_cast<float>(up ? at + 1 : at);
+    const auto per_index = static_cast<float>(inverse[k]);
+    first_[k] = (grid.lo_[k] - origin_[k]) * per_index;
+    spacing_[k] = size * per_index;
+    exit_[k] = boundary(k);
+  }
+}
 
 }  // namespace ls::render

@@ -90,116 +90,127 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
   return f;
 }
 
+// Where a tracker would meet more tentative collisions than this in a macro cell, the field's own integral is
+// followed through its voxels instead: a cell of 4 voxels costs as much as about 16 collisions, and however
+// dense it is no tracker can stand still in it (rates of 1e9 and more: STABILITY N10).
+inline constexpr float kExactDepth = 16;
+
 // `depth`: the optical depth of the first tentative collision; the stream gives the rest.
 template <bool kChromatic, VolumeFilter kFilter>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
   const float s = m.sigma_t[hero];
-  if (!(s > 0)) {
-    // The hero sees nothing; other channels may: their transmittance needs the integral of the majorant it
-    // did not track.
-    if constexpr (kChromatic) {
-      float passed = 0;
-      for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) passed += w.cell().hi * (w.end() - w.begin());
-      for (int c = 0; c < 3; ++c)
-        f.weight[c] = f.density[c] = m.sigma_t[c] > 0 ? std::exp(-m.sigma_t[c] * passed) : 1.f;
-    }
-    f.t = t_max;
-    return f;
-  }
-  float passed = 0;  // integral of the majorant density up to here
-  [[maybe_unused]] C3 nulls{1, 1, 1};
-  for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
-    const float hi = w.cell().hi, rate = s * hi;
-    if (!(rate > 0)) continue;
-    float t = w.begin();
-    for (;;) {
-      const float room = rate * (w.end() - t);
-      if (!(depth < room)) {
-        depth -= room;
-        if constexpr (kChromatic) passed += hi * (w.end() - t);
-        break;
-      }
-      const float dt = depth / rate;
-      t = std::min(t + dt, w.end());
-      if constexpr (kChromatic) passed += hi * dt;
-      const float rho = m.density->value<kFilter>(w.index(t));
-      if (rho > hi) ++counters.majorant_violations;
-      if (stream.uniform() * hi < rho) {
-        f.scattered = true;
-        f.t = t;
-        const C3 scattering = m.scattering_at(o + d * t);
-        for (int c = 0; c < 3; ++c) {
-          if constexpr (kChromatic) {
-            const float ratio = transmittance_ratio(m.sigma_t[c], s, passed) * nulls[c];
-            f.weight[c] = ratio * scattering[c] / s;
-            f.density[c] = ratio * m.sigma_t[c] / s;
-          } else {
-            f.weight[c] = scattering[c] / s;
-          }
-        }
-        return f;
-      }
+  // Which cells are followed exactly must not depend on the hero: channels weigh one and the same experiment.
+  const float s_max = kChromatic ? max_component(m.sigma_t) : s;
+  [[maybe_unused]] double passed = 0;  // integral of what was tracked: the majorant, or the density itself
+  [[maybe_unused]] int nulls = 0;
+  // T_c / T_hero times the null collisions' sigma_c / s: one exponential, because the factors on their own
+  // may be beyond float32 where their product is not.
+  [[maybe_unused]] const auto ratio = [&](int c, double integral) {
+    const float sigma = m.sigma_t[c];
+    if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
+    if (!(sigma > 0)) return 0.f;
+    return std::exp(static_cast<float>(nulls * std::log(double{sigma} / s) - (double{sigma} - s) * integral));
+  };
+  const auto scatter = [&](double t, [[maybe_unused]] double integral) {
+    f.scattered = true;
+    f.t = static_cast<float>(t);
+    const C3 scattering = m.scattering_at(o + d * f.t);
+    for (int c = 0; c < 3; ++c) {
       if constexpr (kChromatic) {
-        for (int c = 0; c < 3; ++c) nulls[c] *= m.sigma_t[c] / s;
+        const float r = ratio(c, integral);
+        f.weight[c] = r * scattering[c] / s;
+        f.density[c] = r * m.sigma_t[c] / s;
+      } else {
+        f.weight[c] = scattering[c] / s;
       }
-      depth = stream.exponential();
     }
+    return f;
+  };
+  for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
+    const float hi = w.cell().hi, length = w.end() - w.begin();
+    if (s_max * hi * length > kExactDepth) [[unlikely]] {
+      // A hero that sees nothing gets through; the others need to know what it passed.
+      const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
+                                        s > 0 ? double{depth} / s : std::numeric_limits<double>::infinity());
+      if (p.reached) return scatter(w.entry() + p.t, passed + p.integral);
+      if (s > 0) depth = std::max(0.f, depth - static_cast<float>(s * p.integral));
+      if constexpr (kChromatic) passed += p.integral;
+      continue;
+    }
+    const float rate = s * hi, room = rate * length;
+    if (rate > 0) {
+      float gone = depth;  // of the room: distances from the cell's own beginning, which stay exact
+      for (; gone < room; gone += stream.exponential()) {
+        const float t = std::min(w.begin() + gone / rate, w.end());
+        const float rho = m.density->value<kFilter>(w.index(t));
+        if (rho > hi) ++counters.majorant_violations;
+        if (stream.uniform() * hi < rho) return scatter(w.entry() + t, passed + double{gone} / s);
+        if constexpr (kChromatic) ++nulls;
+      }
+      depth = gone - room;
+    }
+    if constexpr (kChromatic) passed += double{hi} * length;
   }
   f.t = t_max;
   if constexpr (kChromatic) {
-    for (int c = 0; c < 3; ++c)
-      f.weight[c] = f.density[c] = transmittance_ratio(m.sigma_t[c], s, passed) * nulls[c];
+    for (int c = 0; c < 3; ++c) f.weight[c] = f.density[c] = ratio(c, passed);
   }
   return f;
 }
 
-// Where so little light is left, the rest of the way is walked by few: from this optical depth on a tracker
-// survives each further unit of depth with probability 1/e and is weighted by e. Unbiased.
+// Where so little light is left, the rest of the way is walked by few: below e^-4 a tracker survives with the
+// share that is left of that, and goes on with e^-4. It is the estimate so far that decides, not the
+// control's depth alone: a ray that misses the hot voxel of an otherwise empty cell has a deep control there
+// and a transmittance of 1, made up for by its factors (STABILITY N10).
 inline constexpr float kRouletteDepth = 4;
+inline constexpr float kRouletteTransmittance = .018315639f;
 
 template <bool kChromatic, VolumeFilter kFilter>
 C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
-  float s_max = m.sigma_t.x, s_min = m.sigma_t.x;
-  if constexpr (kChromatic) {
-    s_max = max_component(m.sigma_t);
-    s_min = std::min(m.sigma_t.x, std::min(m.sigma_t.y, m.sigma_t.z));
-  }
+  const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
   if (!(s_max > 0)) return {1, 1, 1};
-  float control = 0, factor = 1, roulette = kRouletteDepth;
-  [[maybe_unused]] C3 factors{1, 1, 1};
+  constexpr int kChannels = kChromatic ? 3 : 1;
+  // The estimate is factor * exp(-sigma control). The control's part is folded into the factors once it is
+  // deep, so that neither of them leaves float32.
+  float control = 0, foldable = kRouletteDepth, factor[kChannels];
+  for (float& x : factor) x = 1;
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
     const MacroCell& cell = w.cell();
-    control += cell.control * (w.end() - w.begin());
-    const float rate = s_max * cell.residual;
-    if (rate > 0) {
-      for (float t = w.begin() + stream.exponential() / rate; t < w.end(); t += stream.exponential() / rate) {
-        const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
-        if constexpr (kChromatic) {
-          for (int c = 0; c < 3; ++c) factors[c] *= 1 - r * (m.sigma_t[c] / s_max);
-        } else {
-          factor *= 1 - r;
+    const float length = w.end() - w.begin(), rate = s_max * cell.residual, room = rate * length;
+    if (room > kExactDepth) [[unlikely]] {
+      control += static_cast<float>(m.density->pass(w.origin(), w.direction(), w.begin(), w.end()).integral);
+    } else {
+      control += cell.control * length;
+      if (rate > 0) {
+        for (float gone = stream.exponential(); gone < room; gone += stream.exponential()) {
+          const float t = w.begin() + gone / rate;
+          const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
+          for (int c = 0; c < kChannels; ++c) factor[c] *= 1 - r * (kChromatic ? m.sigma_t[c] / s_max : 1.f);
         }
       }
     }
-    while (s_min * control > roulette) {
-      if (stream.uniform() > .36787944f) return {0, 0, 0};
-      if constexpr (kChromatic) {
-        factors *= 2.71828183f;
-      } else {
-        factor *= 2.71828183f;
+    if (s_max * control > foldable) [[unlikely]] {
+      float largest = 0;
+      for (int c = 0; c < kChannels; ++c) {
+        factor[c] *= std::exp(-m.sigma_t[c] * control);
+        largest = std::max(largest, factor[c]);
       }
-      roulette += 1;
+      control = 0;
+      foldable = 1;
+      if (!(largest > 0)) return {0, 0, 0};
+      if (largest < kRouletteTransmittance) {
+        const float q = largest / kRouletteTransmittance;
+        if (!(stream.uniform() < q)) return {0, 0, 0};
+        for (float& x : factor) x /= q;
+      }
     }
   }
-  if constexpr (kChromatic) {
-    C3 t;
-    for (int c = 0; c < 3; ++c) t[c] = std::exp(-m.sigma_t[c] * control) * factors[c];
-    return t;
-  } else {
-    return C3(std::exp(-s_max * control) * factor);
-  }
+  C3 t;
+  for (int c = 0; c < kChannels; ++c) t[c] = std::exp(-m.sigma_t[c] * control) * factor[c];
+  if constexpr (!kChromatic) t.y = t.z = t.x;
+  return t;
 }
 
 template <bool kChromatic>
