@@ -176,6 +176,8 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   // deep, so that neither of them leaves float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
+  // Of the residuals' depth, up to the next collision: what a cell leaves of it holds for the next one.
+  float left = stream.exponential();
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
     const MacroCell& cell = w.cell();
     const float length = w.end() - w.begin(), rate = s_max * cell.residual, room = rate * length;
@@ -184,11 +186,13 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
     } else {
       control += cell.control * length;
       if (rate > 0) {
-        for (float gone = stream.exponential(); gone < room; gone += stream.exponential()) {
+        float gone = left;
+        for (; gone < room; gone += stream.exponential()) {
           const float t = w.begin() + gone / rate;
           const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
           for (int c = 0; c < kChannels; ++c) factor[c] *= 1 - r * (kChromatic ? m.sigma_t[c] / s_max : 1.f);
         }
+        left = gone - room;
       }
     }
     if (s_max * control > foldable) [[unlikely]] {
