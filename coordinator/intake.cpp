@@ -1,13 +1,14 @@
 #include "coordinator/intake.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 
 #include "common/protocol/limits.h"
+#include "common/scene/integrators.h"
 #include "common/scene/serialize.h"
 #include "coordinator/features.h"
 #include "coordinator/limits.h"
@@ -70,28 +71,24 @@ class UploadedAssets final : public AssetSource {
 
 Error invalid(std::string text) { return {Errc::invalid_argument, std::move(text)}; }
 
-// The dialect's names and ours; docs list them.
-struct IntegratorName {
-  const char* asked;
-  const char* ours;
-};
-constexpr std::array kIntegrators{
-    IntegratorName{"volpath", "volpath"}, IntegratorName{"volpathmis", "volpath"},
-    IntegratorName{"volpath_distant_mis", "volpath"}, IntegratorName{"path", "path"}};
-
-Result<std::string> integrator_of(const Scene& scene, const JobSpec& spec,
-                                  std::vector<std::string>& warnings) {
+// The job's choice before the scene's.
+Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSettings& settings,
+                               std::vector<std::string>& warnings) {
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
-  const auto* known =
-      std::find_if(kIntegrators.begin(), kIntegrators.end(), [&](const auto& i) { return asked == i.asked; });
-  if (known == kIntegrators.end())
-    return tl::unexpected(invalid(fmt::format(
-        "there is no integrator \"{}\"; there are volpath, volpathmis, volpath_distant_mis and path",
-        asked)));
-  if (known->ours == std::string("path") && !scene.media.empty())
+  const scene::IntegratorRow* known = scene::integrator_row(asked);
+  if (!known) {
+    std::vector<std::string_view> names;
+    for (const auto& row : scene::integrators()) names.push_back(row.name);
+    return tl::unexpected(
+        invalid(fmt::format("there is no integrator \"{}\"; there are {}", asked, fmt::join(names, ", "))));
+  }
+  if (known->ours == "path" && !scene.media.empty())
     warnings.push_back("the integrator `path` renders without media: the scene's " +
                        std::to_string(scene.media.size()) + " media are left out");
-  return std::string(known->ours);
+  settings.integrator = known->ours;
+  settings.max_depth = known->max_depth.value_or(scene.integrator.max_depth);
+  settings.rr_depth = scene.integrator.rr_depth;
+  return {};
 }
 
 Result<void> check_size(FrameSize size) {
@@ -128,11 +125,7 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec,
   settings.size = spec.size.value_or(scene.film.size);
   if (auto ok = check_size(settings.size); !ok) return tl::unexpected(ok.error());
   settings.seed = spec.seed.value_or(0);
-  auto integrator = integrator_of(scene, spec, warnings);
-  if (!integrator) return tl::unexpected(integrator.error());
-  settings.integrator = std::move(*integrator);
-  settings.max_depth = scene.integrator.max_depth;
-  settings.rr_depth = scene.integrator.rr_depth;
+  if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
   return settings;
 }
 

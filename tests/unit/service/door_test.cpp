@@ -3,7 +3,10 @@
 
 #include <cmath>
 
+#include "common/image/render_limits.h"
 #include "common/protocol/limits.h"
+#include "common/scene/integrators.h"
+#include "coordinator/intake.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -106,6 +109,40 @@ TEST(Service, RefusesASceneOfMoreFilesThanAWorkerCanBeToldOf) {
 
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().error.message.find("4096"), std::string::npos) << refused.error().error.message;
+}
+
+TEST(Service, TakesEveryIntegratorThatASceneMaySay) {
+  auto coordinator = open_at({});
+  for (const auto& row : scene::integrators()) {
+    JobSpec spec;
+    spec.integrator = std::string(row.name);
+    const auto taken = take_in({"t.xml", kSceneText, {}, spec}, coordinator->blobs());
+    ASSERT_TRUE(taken) << row.name << ": " << taken.error().error.message;
+    EXPECT_EQ(taken->job.settings.integrator, row.ours);
+    EXPECT_EQ(taken->job.settings.max_depth, row.max_depth.value_or(-1)) << row.name;
+  }
+}
+
+// One limit for scenes and jobs: what is too much is told with its place in the scene.
+TEST(Service, TakesTheLargestFramesAndSampleCountsThatASceneMayHave) {
+  auto coordinator = open_at({});
+  const auto with = [&](std::string from, const std::string& to) {
+    std::string text = kSceneText;
+    text.replace(text.find(from), from.size(), to);
+    return take_in({"t.xml", text, {}, {}}, coordinator->blobs());
+  };
+  const auto side = [](int n) { return std::to_string(n) + "\""; };
+  EXPECT_TRUE(with("40\"", side(kMaxFrameSide)));
+  const auto wide = with("40\"", side(kMaxFrameSide + 1));
+  ASSERT_FALSE(wide);
+  ASSERT_EQ(wide.error().diagnostics.size(), 1u);
+  EXPECT_EQ(wide.error().diagnostics[0].place.line, 4);
+
+  EXPECT_TRUE(with("16\"", std::to_string(kMaxSpp) + "\""));
+  const auto many = with("16\"", std::to_string(kMaxSpp + 1) + "\"");
+  ASSERT_FALSE(many);
+  ASSERT_EQ(many.error().diagnostics.size(), 1u);
+  EXPECT_EQ(many.error().diagnostics[0].place.line, 5);
 }
 
 TEST(Service, RefusesSpecsBeyondItsLimits) {
