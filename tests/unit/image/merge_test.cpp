@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/image/final_image.h"
+#include "common/image/render_limits.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -54,9 +55,8 @@ TEST(Merge, GivesTheFilmOfTheCoordinatorWhateverTheOrderOfFiles) {
 }
 
 TEST(Merge, RefusesAFrameOfMoreTilesThanThereMayBe) {
-  // 65536 x 65536 tiles of one pixel: their number wraps around to 0 in 32 bits.
-  const TileGrid vast{{65536, 65536}, 1};
-  EXPECT_THAT(refusal({source_of(make_round(vast, 0, 0, 2), "", vast.frame)}), HasSubstr("4294967296 tiles"));
+  const TileGrid vast{{kMaxFrameSide, kMaxFrameSide}, 1};
+  EXPECT_THAT(refusal({source_of(make_round(vast, 0, 0, 2), "", vast.frame)}), HasSubstr("1073741824 tiles"));
 }
 
 TEST(Merge, DropsEqualDuplicatesAndCountsThem) {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "common/image/render_limits.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -226,10 +227,14 @@ TEST(PartialGate, DoesNotAllocateForAHugeTile) {
   std::string huge = json;
   huge.replace(huge.find("8,8]"), 4, "9,9]");
   std::memcpy(exr.data() + at, huge.data(), huge.size());
-  const std::int32_t window[4] = {0, 0, 65534, 65534};
+  const std::int32_t window[4] = {0, 0, kMaxFrameSide - 2, kMaxFrameSide - 2};
   std::memcpy(exr.data() + find(exr, "dataWindow") + 21, window, sizeof window);
 
   EXPECT_THAT(refusal(exr, partial.header), HasSubstr("is not the unit's tile"));
+
+  const std::int32_t beyond[4] = {0, 0, kMaxFrameSide, 0};  // inclusive
+  std::memcpy(exr.data() + find(exr, "dataWindow") + 21, beyond, sizeof beyond);
+  EXPECT_THAT(refusal(exr, partial.header), HasSubstr("is out of range"));
 }
 
 }  // namespace
