@@ -24,12 +24,14 @@ struct Case {
   bool complement = false;
 };
 
-// One function a subject; the order is the order of the report.
+// One function a subject; the order is the order of the report, and a case's number is its seed: new cases go
+// to the end.
 void add_attenuation(std::vector<Case>& cases);
 void add_furnaces(std::vector<Case>& cases);
 void add_single_scattering(std::vector<Case>& cases);
 void add_slabs(std::vector<Case>& cases);
 void add_surfaces(std::vector<Case>& cases);
+void add_extremes(std::vector<Case>& cases);
 
 inline std::array<double, 3> grey(double v) { return {v, v, v}; }
 inline Rgb rgb(double v) { return {v, v, v}; }

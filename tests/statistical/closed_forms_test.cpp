@@ -31,6 +31,7 @@ const std::vector<Case>& table() {
     add_single_scattering(c);
     add_slabs(c);
     add_surfaces(c);
+    add_extremes(c);
     return c;
   }();
   return cases;

@@ -46,15 +46,6 @@ void direct(std::vector<Case>& cases) {
     add("direct_sphere", kit, kPi * .25 / 4);
   }
   {
-    // Quarters of two colours: from below as much is seen of one as of the other.
-    SceneKit kit = floor();
-    area(kit, SphereShape{}, translate({0, 0, 2}) * scale(.5));
-    const TextureIndex dark = kit.texture(rgb(.25)), bright = kit.texture(rgb(1.5));
-    kit.scene.textures.push_back(CheckerboardTexture{dark, bright, {}});
-    kit.scene.shapes.back().emitter->radiance = {static_cast<std::uint32_t>(kit.scene.textures.size() - 1)};
-    add("direct_checkered_sphere", kit, .875 * kPi * .25 / 4);
-  }
-  {
     SceneKit kit = floor();  // 8e-5 sr
     area(kit, SphereShape{}, translate({0, 0, 1000}) * scale(5));
     add("direct_distant_sphere", kit, kPi * 25 / 1e6);
