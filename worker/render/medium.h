@@ -105,8 +105,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
   const float s_max = kChromatic ? max_component(m.sigma_t) : s;
   [[maybe_unused]] double passed = 0;  // integral of what was tracked: the majorant, or the density itself
   [[maybe_unused]] int nulls = 0;
-  // T_c / T_hero times the null collisions' sigma_c / s: one exponential, because the factors on their own
-  // may be beyond float32 where their product is not.
+  // T_c / T_hero times the null collisions' sigma_c / s, whose factors on their own may be beyond float32.
   [[maybe_unused]] const auto ratio = [&](int c, double integral) {
     const float sigma = m.sigma_t[c];
     if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
@@ -129,7 +128,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
     return f;
   };
   for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
-    const float hi = w.cell().hi, length = w.end() - w.begin();
+    const float hi = w.cell().hi, length = w.end() - w.begin(), rate = s * hi, room = rate * length;
     if (s_max * hi * length > kExactDepth) [[unlikely]] {
       // A hero that sees nothing gets through; the others need to know what it passed.
       const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
@@ -139,7 +138,6 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       if constexpr (kChromatic) passed += p.integral;
       continue;
     }
-    const float rate = s * hi, room = rate * length;
     if (rate > 0) {
       float gone = depth;  // of the room: distances from the cell's own beginning, which stay exact
       for (; gone < room; gone += stream.exponential()) {
