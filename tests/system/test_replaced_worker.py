@@ -19,7 +19,7 @@ def test_a_new_render_child_is_the_program_that_the_worker_was_started_as(farm, 
     program = farm.bin / "lightshaft-worker"
     shutil.copy(real / program.name, program)
     worker = farm.add_worker("--fake-delay", 10)
-    job = farm.submit(SCENE, spp=256)
+    job = farm.submit(SCENE, spp=2048)
     farm.wait_for_progress(job, 1)
 
     upgrade = farm.bin / "upgrade"
@@ -28,6 +28,7 @@ def test_a_new_render_child_is_the_program_that_the_worker_was_started_as(farm, 
     os.replace(upgrade, program)
     [child] = wait_until(lambda: render_children(worker), "the worker has a render child")
     os.kill(child, signal.SIGKILL)
+    assert farm.job(job)["state"] == "running"
 
     farm.wait_for_job(job)
     assert worker.alive()
