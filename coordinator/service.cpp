@@ -58,7 +58,7 @@ Service::Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_
       store_(std::move(store)),
       lock_(std::move(lock)),
       start_(start),
-      farm_(Farm::Options{fmt::format("l{}", start)}),
+      farm_(Farm::Options{lease_prefix()}),
       last_epoch_(start << 32),
       hub_(std::make_unique<EventHub>([this](std::uint64_t n) { return store_->reserve("events", n); })) {}
 

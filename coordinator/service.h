@@ -52,9 +52,18 @@ struct JobView {
   int tile = 32;
   int priority = 0;
   std::uint64_t units_done = 0, units_total = 0;
+  double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
   double elapsed_seconds = 0, core_seconds = 0;
   double submitted_unix = 0;  // wall clock, for people
   UnitHealth health;
+};
+
+// What a user wants changed of a job: all of it or, when something is refused, nothing.
+struct JobChange {
+  std::optional<JobState> state;  // paused, running or cancelled
+  std::optional<int> priority;
+  std::optional<std::uint64_t> spp;    // the new total
+  std::optional<double> target_error;  // of a job that has one and whose end is not decided yet
 };
 
 struct TileView {
@@ -114,6 +123,12 @@ class WorkerSession {
  public:
   virtual ~WorkerSession() = default;
   virtual void receive(FromWorker message) = 0;
+  // The same without waiting: `next` is called when there is room for another message, at once or later on
+  // another thread; never, if the coordinator closes first.
+  virtual void receive(FromWorker message, std::function<void()> next) {
+    receive(std::move(message));
+    next();
+  }
   virtual void disconnected() = 0;
 };
 
@@ -153,6 +168,9 @@ class Coordinator {
   virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
   virtual std::vector<JobView> jobs() const = 0;
   virtual Result<JobView> job(const JobId& id) const = 0;
+  virtual Result<void> change(const JobId& id, const JobChange& change) = 0;
+  // A job that has ended goes with all that was rendered of it; one that has not is cancelled, and stays.
+  virtual Result<void> remove(const JobId& id) = 0;
   virtual Result<void> cancel(const JobId& id) = 0;
   virtual Result<void> pause(const JobId& id) = 0;
   virtual Result<void> resume(const JobId& id) = 0;

@@ -112,13 +112,23 @@ void Service::on(const DigestMismatch& e, Todo&) {
   log_job(e.unit.job, text);
 }
 
-void Service::on(const JobPinned& e, Todo&) {
+void Service::on(const JobPinned& e, Todo& todo) {
   const auto entry = find_locked(e.job);
   if (!entry) return;
   entry->stored.numeric_class = e.numeric_class;
   for (const auto& [id, worker] : workers_)
     if (worker.hello.numeric_class == e.numeric_class) entry->stored.build = worker.hello.build;
-  persist_locked(*entry);
+  entry->pin_unsaved = true;
+  if (!save_pin_locked(*entry)) todo.push_back(JobPaused{e.job});
+}
+
+// A restart would forget a class that is not stored and could pin the job to another one: until it is, the
+// job waits and none of its results is taken.
+Result<void> Service::save_pin_locked(JobEntry& entry) {
+  if (!entry.pin_unsaved || persist_locked(entry)) return {};
+  entry.trouble =
+      fmt::format("the job's numeric class cannot be stored: {}; then resume the job", store_trouble_);
+  return fail(Errc::unavailable, entry.trouble);
 }
 
 // `done` is shown and stored when the final image is written: see finish().
@@ -129,7 +139,12 @@ void Service::on(const JobStateChanged& e, Todo&) {
   entry->stored.stopped.reset();
   log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
   log_job(e.job, fmt::format("{}", to_string(e.to)));
-  if (e.to == JobState::running) entry->trouble.clear();
+  if (e.to == JobState::running && !entry->pin_unsaved) entry->trouble.clear();
+  if (e.to == JobState::paused) entry->still_since = now();
+  if (e.from == JobState::paused) {
+    if (const auto since = std::exchange(entry->still_since, std::nullopt); since && entry->clock_zero)
+      *entry->clock_zero += now() - std::max(*since, *entry->clock_zero);
+  }
   if (e.to == JobState::cancelled || e.to == JobState::failed) {
     entry->stored.totals.render_seconds = entry->fold_seconds;
     entry->clock_zero.reset();
@@ -189,14 +204,25 @@ void Service::on(const JobFailed& e, Todo&) {
   publish_job_locked(*entry);
 }
 
-void Service::persist_locked(const JobEntry& entry) {
+bool Service::persist_locked(JobEntry& entry) {
+  if (entry.removed) return true;
   if (const auto put = store_->put_job(entry.stored); !put) {
     store_trouble_ = put.error().message;
     log_error(fmt::format("job={}", entry.stored.id.value), put.error().message);
+    return false;
   }
+  entry.pin_unsaved = false;
+  return true;
 }
 
 void Service::log_job(const JobId& id, std::string text) {
+  if (!entries_.contains(id)) return;
+  if (chores_.size() >= kMaxLogChores) {  // a slow disk and a talkative farm
+    ++log_lines_left_out_;
+    return;
+  }
+  if (const auto lost = std::exchange(log_lines_left_out_, 0))
+    text += fmt::format(" (before it {} lines of this and other logs were left out: the disk is slow)", lost);
   chores_.push([this, id, line = LogLine{unix_now(), std::move(text)}] {
     if (const auto added = store_->add_log(id, line); !added)
       log_warn(fmt::format("job={}", id.value), added.error().message);
@@ -204,7 +230,8 @@ void Service::log_job(const JobId& id, std::string text) {
 }
 
 double Service::elapsed_locked(const JobEntry& entry) const {
-  return entry.clock_zero ? std::max(0.0, seconds(now() - *entry.clock_zero)) : entry.fold_seconds;
+  const TimePoint until = entry.still_since.value_or(now());
+  return entry.clock_zero ? std::max(0.0, seconds(until - *entry.clock_zero)) : entry.fold_seconds;
 }
 
 void Service::publish_job_locked(JobEntry& entry) {

@@ -49,25 +49,25 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   entry->assembly->folds_since_snapshot = 0;
   entry->last_snapshot = now();
   chores_.push([this, entry, film = entry->assembly->film(), errors = entry->assembly->errors()] {
-    write_snapshot(entry, film, errors);
+    if (const auto written = write_snapshot(entry, film, errors); !written)
+      log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
     const std::lock_guard lock(mutex_);
     entry->snapshot_running = false;
   });
 }
 
-void Service::write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors) {
-  const auto path = folder(entry->stored.id) / "film.snap";
-  if (const auto written = write_atomically(path, save_snapshot(film, errors, snapshot_format())); !written)
-    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+Result<void> Service::write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors) {
+  return write_atomically(folder(entry->stored.id) / "film.snap",
+                          save_snapshot(film, errors, snapshot_format()));
 }
 
-void Service::write_snapshot_now(const EntryPtr& entry) {
+Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   std::unique_lock lock(mutex_);
-  if (!entry->assembly) return;
+  if (!entry->assembly || entry->removed) return {};
   const Film film = entry->assembly->film();
   const RoundErrors errors = entry->assembly->errors();
   lock.unlock();
-  write_snapshot(entry, film, errors);
+  return write_snapshot(entry, film, errors);
 }
 
 void Service::load_folded(JobEntry& entry) const {
@@ -81,9 +81,12 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   std::unique_lock lock(mutex_);
   if (entry->finishing != number || !entry->assembly) return;
   const Film film = entry->assembly->film();
+  const RoundErrors errors = entry->assembly->errors();
   ReportFacts facts = facts_locked(*entry);
   facts.job.state = JobState::done;
-  facts.job.totals.units = farm_.job(entry->stored.id).value_or(JobFigures{}).units_done;
+  const JobFigures figures = farm_.job(entry->stored.id).value_or(JobFigures{});
+  facts.job.totals.units = figures.units_done;
+  facts.job.totals.units_planned = figures.units_total;
   lock.unlock();
 
   if (on_disk()) {
@@ -94,11 +97,15 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
       facts.clamped_values = image->clamped;
       facts.pixels = pixels_sha256(film);
       if (auto done = write_atomically(where / "image.exr", image->exr); !done) return done;
-      return write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
+      if (auto done = write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
+          !done)
+        return done;
+      // Last and not to be missed: an extension goes on from it.
+      return write_snapshot(entry, film, errors);
     }();
-    write_snapshot_now(entry);
     if (!written) {
       lock.lock();
+      if (entry->finishing != number) return;  // extended or removed meanwhile
       entry->trouble =
           "the final image cannot be written: " + written.error().message + "; then resume the job";
       log_error(fmt::format("job={}", facts.job.id.value), entry->trouble);
@@ -107,14 +114,15 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
     }
   }
   lock.lock();
-  if (entry->finishing != number) return;  // extended meanwhile
+  if (entry->finishing != number) return;
   entry->finishing = 0;
   entry->trouble.clear();
   entry->stored.state = JobState::done;
   entry->stored.totals.spp_done = facts.job.totals.spp_done;
   entry->stored.totals.units = facts.job.totals.units;
-  if (on_disk()) entry->assembly.reset();
+  entry->stored.totals.units_planned = facts.job.totals.units_planned;
   persist_locked(*entry);
+  forget_locked(*entry);
   log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
            facts.job.name);
   publish_job_locked(*entry);
@@ -124,13 +132,33 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
 // A job that failed or was cancelled: what there is of it goes to the disk and out of memory.
 void Service::retire(const EntryPtr& entry) {
   if (!on_disk()) return;
-  write_snapshot_now(entry);
+  const auto written = write_snapshot_now(entry);
   const std::lock_guard lock(mutex_);
-  if (!entry->assembly) return;
+  if (!entry->assembly || entry->removed) return;
+  if (!written) {  // its image stays in memory
+    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+    return;
+  }
   entry->stored.totals.spp_done = facts_locked(*entry).job.totals.spp_done;
-  entry->stored.totals.units = farm_.job(entry->stored.id).value_or(JobFigures{}).units_done;
-  entry->assembly.reset();
+  const JobFigures figures = farm_.job(entry->stored.id).value_or(JobFigures{});
+  entry->stored.totals.units = figures.units_done;
+  entry->stored.totals.units_planned = figures.units_total;
   persist_locked(*entry);
+  forget_locked(*entry);
+}
+
+// From here on the job is its files and its record; the farm's books and the film go. Results that still come
+// for it are dropped.
+void Service::forget_locked(JobEntry& entry) {
+  const auto figures = farm_.job(entry.stored.id);
+  if (!on_disk() || !figures || entry.dormant) return;
+  if (figures->state != JobState::done && figures->state != JobState::failed &&
+      figures->state != JobState::cancelled)
+    return;
+  entry.dormant = true;
+  entry.assembly.reset();
+  entry.log.reset();
+  run_locked(JobForgotten{entry.stored.id});
 }
 
 }  // namespace ls::coordinator

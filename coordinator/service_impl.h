@@ -34,6 +34,10 @@
 
 namespace ls::coordinator {
 
+inline constexpr const char* kRemovedExtension = ".removed";  // of the folder of a job that goes
+inline constexpr std::size_t kMaxChores = 4096;     // that wait for the disk; then results wait, too
+inline constexpr std::size_t kMaxLogChores = 1024;  // then log lines are left out
+
 struct JobEntry {
   StoredJob stored;
   Digest settings_digest;
@@ -41,14 +45,18 @@ struct JobEntry {
   std::shared_ptr<PartialLog> log;   // none in memory
   std::optional<Assembly> assembly;  // none once an ended job is on disk
   std::vector<ConvergencePoint> points;
-  bool dormant = false;         // ended in an earlier run: the farm does not know it
+  bool dormant = false;         // has ended and is on the disk: the farm does not know it
+  bool removed = false;         // by its user; nothing of it is stored any more
+  bool pin_unsaved = false;     // its numeric class is not stored yet: no result of it may be
+  std::string broken;           // why it could not be taken up at the start
   std::uint64_t finishing = 0;  // number of the final image being made; 0: none
   bool snapshot_running = false;
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
-  std::optional<TimePoint> clock_zero;  // of the job's seconds, while it runs
-  double fold_seconds = 0;              // job seconds at the last fold
-  std::string trouble;                  // why it waits
+  std::optional<TimePoint> clock_zero;   // of the job's seconds, while it runs
+  std::optional<TimePoint> still_since;  // paused: its clock stands
+  double fold_seconds = 0;               // job seconds at the last fold
+  std::string trouble;                   // why it waits
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;  // for people
   // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
   std::vector<std::pair<double, double>> replay;
@@ -83,6 +91,8 @@ class Service final : public Coordinator {
   tl::expected<JobId, Rejected> submit(SubmitRequest request) override;
   std::vector<JobView> jobs() const override;
   Result<JobView> job(const JobId& id) const override;
+  Result<void> change(const JobId& id, const JobChange& change) override;
+  Result<void> remove(const JobId& id) override;
   Result<void> cancel(const JobId& id) override;
   Result<void> pause(const JobId& id) override;
   Result<void> resume(const JobId& id) override;
@@ -106,7 +116,7 @@ class Service final : public Coordinator {
   void tick() override;
 
   // ---- from sessions (service_workers.cpp) ----
-  void receive(const std::shared_ptr<Connection>& from, FromWorker message);
+  void receive(const std::shared_ptr<Connection>& from, FromWorker message, std::function<void()> next);
   void disconnected(const std::shared_ptr<Connection>& connection);
 
  private:
@@ -132,6 +142,19 @@ class Service final : public Coordinator {
 
   // ---- restart (service_restore.cpp) ----
   Result<EntryPtr> make_entry(StoredJob stored, bool with_log);
+  Result<void> take_up_locked(JobEntry& entry, JobState state);
+  void set_aside_locked(JobEntry& entry, const Error& why);
+  void remove_leftovers() const;
+
+  // ---- changes (service_jobs.cpp) ----
+  Result<EntryPtr> usable_locked(const JobId& id) const;
+  Result<void> may_become_locked(const JobEntry& entry, JobState asked, bool extended) const;
+  Result<void> become_locked(const EntryPtr& entry, JobState asked);
+  Result<void> set_priority_locked(JobEntry& entry, int priority);
+  Result<void> extend_locked(JobEntry& entry, std::uint64_t spp);
+  Result<void> set_target_locked(JobEntry& entry, double target_error);
+  Result<void> wake_locked(JobEntry& entry);  // tells the farm of a dormant job again
+  void forget_locked(JobEntry& entry);        // makes an ended job dormant
   Result<JobRestored> restored_locked(JobEntry& entry, JobState state);
   void load_folded(JobEntry& entry) const;
   void take_up_records(JobEntry& entry, JobRestored& event);
@@ -159,7 +182,8 @@ class Service final : public Coordinator {
   void on(const WorkerForgotten& e, Todo& todo);
   Result<WaitingPartial> partial_for_locked(JobEntry& entry, const Fold& e);
   void snapshot_if_due_locked(const EntryPtr& entry);
-  void persist_locked(const JobEntry& entry);
+  bool persist_locked(JobEntry& entry);
+  Result<void> save_pin_locked(JobEntry& entry);
   void log_job(const JobId& id, std::string text);
   double elapsed_locked(const JobEntry& entry) const;
   void note_leased_locked(JobEntry& entry, const Lease& lease, const WorkerId& worker);
@@ -170,13 +194,13 @@ class Service final : public Coordinator {
   // ---- final images and snapshots (service_finish.cpp), on the keeper thread ----
   void finish(const EntryPtr& entry, std::uint64_t number);
   void retire(const EntryPtr& entry);
-  void write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors);
-  void write_snapshot_now(const EntryPtr& entry);
+  Result<void> write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors);
+  Result<void> write_snapshot_now(const EntryPtr& entry);
   ReportFacts facts_locked(const JobEntry& entry) const;
   Provenance provenance_of(const StoredJob& job) const;
 
   // ---- results (service_results.cpp) ----
-  void receive_result(const std::shared_ptr<Connection>& from, UnitResult result);
+  void receive_result(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
   void verify_loop(const std::stop_token& token);
   void commit_loop(const std::stop_token& token);
   void commit(std::vector<Checked> batch);
@@ -186,6 +210,8 @@ class Service final : public Coordinator {
   void acknowledge_locked(const Arrived& arrived, std::optional<Error> refused);
 
   // ---- workers ----
+  void receive_locked(const std::shared_ptr<Connection>& from, FromWorker message);
+  std::string lease_prefix() const { return "l" + std::to_string(start_); }
   void on_message_locked(const std::shared_ptr<Connection>& from, const WorkerProgress& m);
 
   // ---- views (service_views.cpp) ----
@@ -219,6 +245,7 @@ class Service final : public Coordinator {
   std::string store_trouble_;     // the last result that could not be stored
   std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
   bool restoring_ = false;
+  std::uint64_t log_lines_left_out_ = 0;
   std::shared_ptr<std::atomic<bool>> alive_ = std::make_shared<std::atomic<bool>>(true);
 
   ByteBudget budget_{limits::kMaxResultsWaiting};

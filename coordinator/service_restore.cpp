@@ -26,37 +26,78 @@ Result<Service::EntryPtr> Service::make_entry(StoredJob stored, bool with_log) {
   return entry;
 }
 
+// A job that cannot be taken up is told of and left as it is on the disk; the others go on.
 Result<void> Service::restore() {
   const std::lock_guard lock(mutex_);
+  remove_leftovers();
   auto jobs = store_->jobs();
   if (!jobs) return tl::unexpected(jobs.error());
   restoring_ = true;
   for (StoredJob& job : *jobs) {
     const JobState state = job.state;
     const bool ended = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-    auto entry = make_entry(std::move(job), !ended);
-    if (!entry) return tl::unexpected(entry.error());
-    const JobId id = (*entry)->stored.id;
-    auto points = store_->points(id);
-    if (!points) return tl::unexpected(points.error());
-    (*entry)->points = std::move(*points);
-    (*entry)->dormant = ended;
-    entries_.emplace(id, *entry);
-    order_.push_back(id);
-    if (ended) continue;
-    load_folded(**entry);
-    auto event = restored_locked(**entry, state);
-    if (!event) return tl::unexpected(event.error());
-    log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()),
-             "restored");
-    const double elapsed = event->elapsed_seconds;
-    if (elapsed > 0) (*entry)->clock_zero = now() - from_seconds(elapsed);
-    run_locked(std::move(*event));
-    (*entry)->replay.clear();
-    (*entry)->replay_at.clear();
+    const auto entry = make_entry(std::move(job), false).value();  // fails with a log only
+    entry->dormant = ended;
+    entries_.emplace(entry->stored.id, entry);
+    order_.push_back(entry->stored.id);
+    if (entry->stored.damaged)
+      set_aside_locked(*entry, {Errc::internal, entry->stored.error});
+    else if (auto taken = take_up_locked(*entry, state); !taken)
+      set_aside_locked(*entry, taken.error());
   }
   restoring_ = false;
   return {};
+}
+
+Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
+  const JobId& id = entry.stored.id;
+  auto points = store_->points(id);
+  if (!points) return tl::unexpected(points.error());
+  entry.points = std::move(*points);
+  if (entry.dormant) return {};
+  if (on_disk()) {
+    auto log = PartialLog::open(folder(id));
+    if (!log) return tl::unexpected(log.error());
+    entry.log = std::move(*log);
+  }
+  load_folded(entry);
+  auto event = restored_locked(entry, state);
+  if (!event) return tl::unexpected(event.error());
+  if (auto sound = check_plan(event->plan); !sound) return sound;
+  log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()),
+           "restored");
+  if (event->elapsed_seconds > 0) entry.clock_zero = now() - from_seconds(event->elapsed_seconds);
+  if (state == JobState::paused) entry.still_since = now();
+  run_locked(std::move(*event));
+  entry.replay.clear();
+  entry.replay_at.clear();
+  return {};
+}
+
+void Service::set_aside_locked(JobEntry& entry, const Error& why) {
+  entry.broken =
+      entry.stored.damaged
+          ? why.message
+          : fmt::format(
+                "the job could not be taken up: {}; repair this and restart the coordinator, or delete "
+                "the job",
+                why.message);
+  entry.stored.state = JobState::failed;  // as shown; its record stays as it is
+  entry.stored.error = entry.broken;
+  entry.dormant = true;
+  entry.assembly.reset();
+  entry.log.reset();
+  log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
+}
+
+// Of jobs whose removal a crash has cut short.
+void Service::remove_leftovers() const {
+  if (!on_disk()) return;
+  std::error_code error;
+  std::vector<std::filesystem::path> left;
+  for (const auto& found : std::filesystem::directory_iterator(options_.data / "jobs", error))
+    if (found.path().extension() == kRemovedExtension) left.push_back(found.path());
+  for (const auto& path : left) std::filesystem::remove_all(path, error);
 }
 
 Result<JobRestored> Service::restored_locked(JobEntry& entry, JobState state) {

@@ -10,29 +10,35 @@
 
 namespace ls::coordinator {
 
-void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult result) {
+// `next` is called where another message may come: this one was dropped, or there is room for it.
+void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult result,
+                             std::function<void()> next) {
   Arrived arrived{from, std::move(result), nullptr, {}, false, 0};
   {
     const std::lock_guard lock(mutex_);
-    if (!from->open) return;  // it comes again over the newer stream
+    if (!from->open) return next();  // it comes again over the newer stream
     const UnitKey& unit = arrived.result.unit;
     arrived.job = find_locked(unit.job);
     const Wanted wanted = farm_.wanted(unit);
     if (!arrived.job || wanted.verdict == Wanted::Verdict::no)
-      return acknowledge_locked(arrived, std::nullopt);
+      return acknowledge_locked(arrived, std::nullopt), next();
     const Digest numeric_class = wanted.numeric_class.value_or(from->numeric_class);
     if (numeric_class != from->numeric_class)
-      return acknowledge_locked(
-          arrived,
-          Error{Errc::failed_precondition, "the job is pinned to another numeric class than this worker's"});
+      return acknowledge_locked(arrived,
+                                Error{Errc::failed_precondition,
+                                      "the job is pinned to another numeric class than this worker's"}),
+             next();
     arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, numeric_class, wanted.rect,
                         wanted.samples};
     arrived.duplicate = wanted.verdict == Wanted::Verdict::duplicate;
   }
-  // Bytes of the message and of its decoded floats. Waiting here holds back this one stream.
+  // Bytes of the message and of its decoded floats. Without room this one stream is held back, no thread.
   arrived.bytes = 2 * arrived.result.exr.size();
-  if (!budget_.acquire(arrived.bytes)) return;
-  arrived_.push(std::move(arrived));
+  const std::size_t bytes = arrived.bytes;
+  budget_.ask(bytes, [this, waiting = std::make_shared<Arrived>(std::move(arrived)), next = std::move(next)] {
+    arrived_.push(std::move(*waiting));
+    next();
+  });
 }
 
 void Service::verify_loop(const std::stop_token& token) {
@@ -45,6 +51,7 @@ void Service::verify_loop(const std::stop_token& token) {
 
 void Service::commit_loop(const std::stop_token& token) {
   while (!token.stop_requested()) {
+    if (!chores_.wait_for_room(kMaxChores, token)) return;
     auto batch = checked_.pop(limits::kMaxCommitBatch, token);
     if (!batch.empty()) commit(std::move(batch));
   }
@@ -69,11 +76,13 @@ void Service::commit(std::vector<Checked> batch) {
       batch[i].arrived.duplicate = farm_.wanted(a.result.unit).verdict != Wanted::Verdict::yes;
       at[i] = elapsed_locked(*a.job);
       logs[i] = a.job->log;
+      if (const auto saved = save_pin_locked(*a.job); !saved) stored[i].error = saved.error();
     }
   }
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const Arrived& a = batch[i].arrived;
-    if (a.duplicate || !logs[i] || !std::holds_alternative<Partial>(batch[i].verified)) continue;
+    if (a.duplicate || !logs[i] || stored[i].error || !std::holds_alternative<Partial>(batch[i].verified))
+      continue;
     const UnitResult& r = a.result;
     auto place = logs[i]->append({r.unit.tile, r.unit.round, a.expected.samples, r.digest, a.from->worker,
                                   r.cpu_seconds, at[i], r.health},
@@ -88,7 +97,7 @@ void Service::commit(std::vector<Checked> batch) {
       for (std::size_t i = 0; i < batch.size(); ++i)
         if (logs[i] == log && stored[i].place) stored[i].error = synced.error();
 
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     Checked& item = batch[i];
     if (stored[i].error)
@@ -99,8 +108,9 @@ void Service::commit(std::vector<Checked> batch) {
       acknowledge_locked(item.arrived, std::nullopt);
     else
       accept_locked(item, stored[i].place);
-    budget_.release(item.arrived.bytes);
   }
+  lock.unlock();  // what is granted now may go on at once, on this thread
+  for (const Checked& item : batch) budget_.release(item.arrived.bytes);
 }
 
 void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> place) {

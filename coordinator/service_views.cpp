@@ -21,6 +21,13 @@ Result<Service::EntryPtr> Service::entry_locked(const JobId& id) const {
   return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
 }
 
+// One that was taken up at the start: of another only the reason why not is known, and it may be removed.
+Result<Service::EntryPtr> Service::usable_locked(const JobId& id) const {
+  auto entry = entry_locked(id);
+  if (entry && !(*entry)->broken.empty()) return fail(Errc::failed_precondition, (*entry)->broken);
+  return entry;
+}
+
 JobState Service::shown_state(const JobEntry& entry) const {
   return entry.stored.state;  // stays `running` until finish() has written the image
 }
@@ -83,7 +90,9 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.health = job.totals.health;
   v.spp = even_spp(job.spp.value_or(kMaxSppWithoutLimit));
   v.spp_done = job.totals.spp_done;
-  v.units_done = v.units_total = job.totals.units;
+  v.units_done = job.totals.units;
+  v.units_total = std::max(job.totals.units, job.totals.units_planned);
+  if (v.units_total > 0) v.progress = static_cast<double>(v.units_done) / static_cast<double>(v.units_total);
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
   if (entry.assembly)
     v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
@@ -92,6 +101,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
     v.spp = figures->spp;
     v.units_done = figures->units_done;
     v.units_total = figures->units_total;
+    v.queued_core_seconds = figures->core_seconds_queued;
     const Outlook out = outlook(entry, *figures, v.elapsed_seconds, farm_.threads_connected());
     v.progress = out.progress;
     if (v.state == JobState::running || v.state == JobState::queued) v.eta_seconds = out.eta_seconds;
@@ -119,7 +129,7 @@ Result<JobView> Service::job(const JobId& id) const {
 // The film as it is, copied under the lock or read from the disk outside of it.
 Result<Service::Picture> Service::picture(const JobId& id) const {
   std::unique_lock lock(mutex_);
-  const auto entry = entry_locked(id);
+  const auto entry = usable_locked(id);
   if (!entry) return tl::unexpected(entry.error());
   if ((*entry)->assembly) return Picture{(*entry)->assembly->film(), facts_locked(**entry).job, false};
   JobEntry copy;
@@ -133,7 +143,7 @@ Result<Service::Picture> Service::picture(const JobId& id) const {
 Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
   {
     std::unique_lock lock(mutex_);
-    const auto entry = entry_locked(id);
+    const auto entry = usable_locked(id);
     if (!entry) return tl::unexpected(entry.error());
     const bool final_image = on_disk() && (*entry)->stored.state == JobState::done;
     lock.unlock();
@@ -154,7 +164,7 @@ Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposu
 
 Result<std::string> Service::report_json(const JobId& id) const {
   std::unique_lock lock(mutex_);
-  const auto entry = entry_locked(id);
+  const auto entry = usable_locked(id);
   if (!entry) return tl::unexpected(entry.error());
   if (on_disk() && (*entry)->stored.state == JobState::done) {
     lock.unlock();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <future>
 #include <random>
 
 #include "common/base/log.h"
@@ -21,7 +22,14 @@ class Session final : public WorkerSession {
       : service_(service), connection_(std::move(connection)) {}
   ~Session() override { disconnected(); }
   void receive(FromWorker message) override {
-    if (*connection_->service_lives) service_.receive(connection_, std::move(message));
+    // Waits for room, or for the coordinator's end: then the promise is broken.
+    auto room = std::make_shared<std::promise<void>>();
+    const auto granted = room->get_future();
+    receive(std::move(message), [room = std::move(room)] { room->set_value(); });
+    granted.wait();
+  }
+  void receive(FromWorker message, std::function<void()> next) override {
+    if (*connection_->service_lives) service_.receive(connection_, std::move(message), std::move(next));
   }
   void disconnected() override {
     if (*connection_->service_lives) service_.disconnected(connection_);
@@ -59,10 +67,10 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// n of "PREFIX-n".
-std::optional<std::uint64_t> lease_number(const LeaseId& id) {
-  const auto dash = id.value.rfind('-');
-  if (dash == std::string::npos) return std::nullopt;
+// n of "PREFIX-n"; nothing for one of another start, whatever its number.
+std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& prefix) {
+  const std::size_t dash = prefix.size();
+  if (!id.value.starts_with(prefix) || id.value.size() <= dash || id.value[dash] != '-') return std::nullopt;
   std::uint64_t n = 0;
   const char* end = id.value.data() + id.value.size();
   const auto parsed = std::from_chars(id.value.data() + dash + 1, end, n);
@@ -114,15 +122,23 @@ void Service::disconnected(const std::shared_ptr<Connection>& connection) {
   run_locked(WorkerLost{connection->worker, connection->epoch});
 }
 
-void Service::receive(const std::shared_ptr<Connection>& from, FromWorker message) {
+void Service::receive(const std::shared_ptr<Connection>& from, FromWorker message,
+                      std::function<void()> next) {
   if (auto* result = std::get_if<UnitResult>(&message)) {
     {
       const std::lock_guard lock(mutex_);
       if (const auto w = workers_.find(from->worker); w != workers_.end()) w->second.last_seen = now();
     }
-    return receive_result(from, std::move(*result));
+    return receive_result(from, std::move(*result), std::move(next));
   }
-  const std::lock_guard lock(mutex_);
+  {
+    const std::lock_guard lock(mutex_);
+    receive_locked(from, std::move(message));
+  }
+  next();
+}
+
+void Service::receive_locked(const std::shared_ptr<Connection>& from, FromWorker message) {
   const auto found = workers_.find(from->worker);
   if (!from->open || found == workers_.end()) return;
   found->second.last_seen = now();
@@ -156,7 +172,7 @@ void Service::on_message_locked(const std::shared_ptr<Connection>& from, const W
   }
   // Leases of an earlier stream were given to others when that stream broke.
   for (const auto& lease : m.leases) {
-    const auto n = lease_number(lease.lease);
+    const auto n = lease_number(lease.lease, lease_prefix());
     const bool ours = n && from->first_lease && *n >= *from->first_lease;
     if (!ours && from->open) from->sink->send(CancelLease{lease.lease});
   }
@@ -170,7 +186,7 @@ void Service::on(const Send& e, Todo&) {
   Connection& connection = *found->second.connection;
   if (const auto* assign = std::get_if<AssignLease>(&e.message)) {
     const Lease& lease = assign->lease;
-    if (!connection.first_lease) connection.first_lease = lease_number(lease.id);
+    if (!connection.first_lease) connection.first_lease = lease_number(lease.id, lease_prefix());
     found->second.last_job = lease.job;
     if (const auto entry = find_locked(lease.job)) note_leased_locked(*entry, lease, e.worker);
   }

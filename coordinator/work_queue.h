@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -19,7 +20,16 @@ class WorkQueue {
   void push(T item) {
     const std::lock_guard lock(mutex_);
     items_.push_back(std::move(item));
-    changed_.notify_one();
+    changed_.notify_all();
+  }
+  std::size_t size() const {
+    const std::lock_guard lock(mutex_);
+    return items_.size();
+  }
+  // Holds the caller back while more than `most` items wait. False: a stop was asked for.
+  bool wait_for_room(std::size_t most, const std::stop_token& token) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait(lock, token, [&] { return items_.size() <= most; }) && !token.stop_requested();
   }
   // Waits for at least one item; none: a stop was asked for.
   std::vector<T> pop(std::size_t most, const std::stop_token& token) {
@@ -30,11 +40,12 @@ class WorkQueue {
       taken.push_back(std::move(items_.front()));
       items_.pop_front();
     }
+    changed_.notify_all();
     return taken;
   }
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<T> items_;
 };
@@ -44,27 +55,49 @@ class ByteBudget {
  public:
   explicit ByteBudget(std::size_t bytes) : room_(bytes) {}
   // False once closed. A single item larger than everything passes when nothing else is in.
-  bool acquire(std::size_t bytes) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || used_ == 0 || used_ + bytes <= room_; });
-    if (closed_) return false;
-    used_ += bytes;
-    return true;
+  // `granted` is called once there is room, in the order of asking: at once on this thread, or later on one
+  // that releases. Never after close(). Whoever waits must not be many: each of them is kept.
+  void ask(std::size_t bytes, std::function<void()> granted) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_) return;
+      if (!waiting_.empty() || !fits(bytes)) {
+        waiting_.push_back({bytes, std::move(granted)});
+        return;
+      }
+      used_ += bytes;
+    }
+    granted();
   }
   void release(std::size_t bytes) {
-    const std::lock_guard lock(mutex_);
-    used_ -= bytes;
-    changed_.notify_all();
+    std::vector<std::function<void()>> granted;
+    {
+      const std::lock_guard lock(mutex_);
+      used_ -= bytes;
+      while (!closed_ && !waiting_.empty() && fits(waiting_.front().bytes)) {
+        used_ += waiting_.front().bytes;
+        granted.push_back(std::move(waiting_.front().granted));
+        waiting_.pop_front();
+      }
+    }
+    for (const auto& go_on : granted) go_on();
   }
   void close() {
+    std::deque<Waiting> dropped;
     const std::lock_guard lock(mutex_);
     closed_ = true;
-    changed_.notify_all();
+    dropped.swap(waiting_);
   }
 
  private:
+  struct Waiting {
+    std::size_t bytes;
+    std::function<void()> granted;
+  };
+  bool fits(std::size_t bytes) const { return used_ == 0 || used_ + bytes <= room_; }
+
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::deque<Waiting> waiting_;
   std::size_t room_, used_ = 0;
   bool closed_ = false;
 };

@@ -23,7 +23,7 @@ std::optional<std::span<const std::byte>> take_part(std::span<const std::byte>& 
   std::memcpy(&length, in.data(), sizeof length);
   in = in.subspan(sizeof length);
   if (length > in.size()) return std::nullopt;
-  const auto part = in.first(static_cast<std::size_t>(length));
+  const std::optional part(in.first(static_cast<std::size_t>(length)));
   in = in.subspan(static_cast<std::size_t>(length));
   return part;
 }

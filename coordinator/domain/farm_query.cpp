@@ -118,15 +118,20 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   const RoundIndex rounds = round_of(job->queue.end());
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
-  double samples = 0;
-  std::uint64_t undone = f.units_total - f.units_done;
-  for (RoundIndex r = rounds; undone > 0 && r-- > 0;) {  // the last rounds are what is missing
-    const std::uint64_t units = std::min<std::uint64_t>(undone, job->units.tiles());
-    samples +=
-        static_cast<double>(units) / left * pixels * static_cast<double>(cut_range(r, job->spp).count());
-    undone -= units;
+  const auto samples_of_last = [&](std::uint64_t undone) {  // the last rounds are what is missing
+    double samples = 0;
+    for (RoundIndex r = rounds; undone > 0 && r-- > 0;) {
+      const std::uint64_t units = std::min<std::uint64_t>(undone, job->units.tiles());
+      samples +=
+          static_cast<double>(units) / left * pixels * static_cast<double>(cut_range(r, job->spp).count());
+      undone -= units;
+    }
+    return samples;
+  };
+  if (!job->ended()) {
+    f.core_seconds_left = samples_of_last(f.units_total - f.units_done) * f.seconds_per_sample;
+    f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
   }
-  f.core_seconds_left = job->ended() ? 0 : samples * f.seconds_per_sample;
   f.first_ray = job->first_ray;
   f.numeric_class = job->numeric_class;
   return f;

@@ -27,7 +27,8 @@ struct JobTotals {
   double load_seconds = 0;
   std::uint64_t peak_rss_bytes = 0;
   double spp_done = 0;
-  std::uint64_t units = 0;
+  std::uint64_t units = 0;          // done
+  std::uint64_t units_planned = 0;  // 0: as many
   UnitHealth health;
   bool operator==(const JobTotals&) const = default;
 };
@@ -49,6 +50,7 @@ struct StoredJob {
   std::optional<Digest> numeric_class;
   std::string build;  // of the worker that the job was pinned with
   JobTotals totals;
+  bool damaged = false;  // its record can't be read: id, `failed` and `error` are all that is known
   bool operator==(const StoredJob&) const = default;
 };
 std::string to_json(const StoredJob& job);
@@ -62,8 +64,11 @@ struct LogLine {
 class JobStore {
  public:
   virtual ~JobStore() = default;
-  virtual Result<void> put_job(const StoredJob& job) = 0;   // inserts or replaces
-  virtual Result<std::vector<StoredJob>> jobs() const = 0;  // in order of first put
+  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
+  // In order of first put. One whose record is damaged comes as such, and keeps no other from coming.
+  virtual Result<std::vector<StoredJob>> jobs() const = 0;
+  // With its points and log; of an unknown one nothing is removed.
+  virtual Result<void> remove_job(const JobId& job) = 0;
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;

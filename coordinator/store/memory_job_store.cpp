@@ -24,6 +24,13 @@ class MemoryJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     return jobs_;
   }
+  Result<void> remove_job(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(jobs_, [&](const StoredJob& known) { return known.id == job; });
+    points_.erase(job);
+    log_.erase(job);
+    return {};
+  }
   Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
     const std::lock_guard lock(mutex_);
     points_[job].push_back(point);

@@ -87,6 +87,21 @@ class Statement {
   int bound_ = 0;
 };
 
+Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
+  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
+    return tl::unexpected(db_error(db, what));
+  return {};
+}
+
+StoredJob damaged_job(std::string id, const Error& why) {
+  StoredJob job;
+  job.id.value = std::move(id);
+  job.state = JobState::failed;
+  job.error = why.message + "; take the database from a backup, or delete the job and submit it again";
+  job.damaged = true;
+  return job;
+}
+
 class SqliteJobStore final : public JobStore {
  public:
   explicit SqliteJobStore(Db db) : db_(std::move(db)) {}
@@ -105,15 +120,28 @@ class SqliteJobStore final : public JobStore {
   Result<std::vector<StoredJob>> jobs() const override {
     const std::lock_guard lock(mutex_);
     std::vector<StoredJob> all;
-    Statement rows(db_.get(), "SELECT record FROM jobs ORDER BY ordinal");
+    Statement rows(db_.get(), "SELECT record, id FROM jobs ORDER BY ordinal");
     auto row = rows.step("read the jobs");
     for (; row && *row; row = rows.step("read the jobs")) {
       auto job = parse_stored_job(rows.text(0));
-      if (!job) return tl::unexpected(job.error());
-      all.push_back(std::move(*job));
+      all.push_back(job ? std::move(*job) : damaged_job(rows.text(1), job.error()));
     }
     if (!row) return tl::unexpected(row.error());
     return all;
+  }
+
+  Result<void> remove_job(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    if (auto begun = execute(db_.get(), "BEGIN IMMEDIATE", "remove a job"); !begun) return begun;
+    for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
+                            "DELETE FROM log WHERE job = ?"})
+      if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) {
+        (void)execute(db_.get(), "ROLLBACK", "take back the removal of a job");
+        return done;
+      }
+    auto done = execute(db_.get(), "COMMIT", "remove a job");
+    if (!done) (void)execute(db_.get(), "ROLLBACK", "take back the removal of a job");
+    return done;
   }
 
   Result<void> add_point(const JobId& job, const ConvergencePoint& p) override {
@@ -200,12 +228,6 @@ class SqliteJobStore final : public JobStore {
   Db db_;
   std::uint64_t log_lines_ = 0;
 };
-
-Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
-  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
-    return tl::unexpected(db_error(db, what));
-  return {};
-}
 
 }  // namespace
 

@@ -16,6 +16,7 @@ json to_value(const JobTotals& t) {
           {"peak_rss_bytes", t.peak_rss_bytes},
           {"spp_done", t.spp_done},
           {"units", t.units},
+          {"units_planned", t.units_planned},
           {"nonfinite", t.health.nonfinite},
           {"negative", t.health.negative},
           {"majorant_violations", t.health.majorant_violations}};
@@ -29,6 +30,7 @@ JobTotals totals_of(const json& j) {
   t.peak_rss_bytes = j.at("peak_rss_bytes");
   t.spp_done = j.at("spp_done");
   t.units = j.at("units");
+  t.units_planned = j.value("units_planned", std::uint64_t{0});
   t.health = {j.at("nonfinite"), j.at("negative"), j.at("majorant_violations")};
   return t;
 }

@@ -1,0 +1,199 @@
+// What users do to jobs: every change is checked as a whole before anything of it is done.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "common/base/log.h"
+#include "coordinator/service_impl.h"
+
+namespace ls::coordinator {
+namespace {
+
+std::string_view done_to_become(JobState asked) {
+  if (asked == JobState::paused) return "paused";
+  return asked == JobState::running ? "resumed" : "cancelled";
+}
+
+bool is_end(JobState state) {
+  return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+}
+
+Result<void> check_priority(int priority) {
+  if (std::abs(std::int64_t{priority}) > limits::kMaxPriority)
+    return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", limits::kMaxPriority));
+  return {};
+}
+
+}  // namespace
+
+Result<void> Service::change(const JobId& id, const JobChange& change) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = usable_locked(id);
+  if (!entry) return tl::unexpected(entry.error());
+  if (change.priority)
+    if (auto ok = check_priority(*change.priority); !ok) return ok;
+  if (change.state)
+    if (auto ok = may_become_locked(**entry, *change.state, change.spp.has_value()); !ok) return ok;
+  if (change.target_error) {
+    if ((*entry)->dormant || (*entry)->finishing)
+      return fail(
+          Errc::failed_precondition,
+          fmt::format("job {} has ended: its target error can no longer be changed; extend its samples "
+                      "(spp), or submit it again",
+                      id.value));
+    if (auto ok = farm_.may_retarget(id, *change.target_error); !ok) return ok;
+  }
+  // The only one whose checks are its own; when it says no, nothing has been done.
+  if (change.spp)
+    if (auto done = extend_locked(**entry, *change.spp); !done) return done;
+  if (change.target_error)
+    if (auto done = set_target_locked(**entry, *change.target_error); !done) return done;
+  if (change.priority)
+    if (auto done = set_priority_locked(**entry, *change.priority); !done) return done;
+  return change.state ? become_locked(*entry, *change.state) : Result<void>{};
+}
+
+Result<void> Service::cancel(const JobId& id) { return change(id, {JobState::cancelled, {}, {}, {}}); }
+Result<void> Service::pause(const JobId& id) { return change(id, {JobState::paused, {}, {}, {}}); }
+Result<void> Service::resume(const JobId& id) { return change(id, {JobState::running, {}, {}, {}}); }
+Result<void> Service::set_priority(const JobId& id, int priority) {
+  return change(id, {{}, priority, {}, {}});
+}
+Result<void> Service::extend(const JobId& id, std::uint64_t spp) { return change(id, {{}, {}, spp, {}}); }
+
+Result<void> Service::may_become_locked(const JobEntry& entry, JobState asked, bool extended) const {
+  JobState state = shown_state(entry);
+  const bool finishing = entry.finishing != 0 && !extended;
+  if (extended && state == JobState::done) state = JobState::running;
+  if (state == asked && !finishing) return {};
+  const bool possible =
+      asked == JobState::running ? !is_end(state) || finishing : !is_end(state) && !finishing;
+  if (possible) return {};
+  return fail(Errc::failed_precondition,
+              fmt::format("job {} is {}: it cannot be {}", entry.stored.id.value,
+                          to_string(finishing ? JobState::done : state), done_to_become(asked)));
+}
+
+Result<void> Service::become_locked(const EntryPtr& entry, JobState asked) {
+  const JobId& id = entry->stored.id;
+  const JobState state = shown_state(*entry);
+  if (asked == JobState::cancelled) {
+    if (state != asked) run_locked(JobCancelled{id});
+  } else if (asked == JobState::paused) {
+    if (state != asked) run_locked(JobPaused{id});
+  } else if (entry->finishing) {  // its image could not be written
+    entry->finishing = ++last_final_;
+    entry->trouble.clear();
+    chores_.push([this, entry, number = last_final_] { finish(entry, number); });
+  } else if (state == JobState::paused) {
+    if (auto saved = save_pin_locked(*entry); !saved) return saved;
+    entry->trouble.clear();
+    run_locked(JobResumed{id});
+  }
+  return {};
+}
+
+Result<void> Service::set_priority_locked(JobEntry& entry, int priority) {
+  const int before = std::exchange(entry.stored.spec.priority, priority);
+  if (auto put = store_->put_job(entry.stored); !put) {
+    entry.stored.spec.priority = before;
+    return put;
+  }
+  if (!entry.dormant) run_locked(JobPriority{entry.stored.id, priority});
+  publish_job_locked(entry);
+  return {};
+}
+
+Result<void> Service::set_target_locked(JobEntry& entry, double target_error) {
+  const auto before = std::exchange(entry.stored.spec.target_error, target_error);
+  if (auto put = store_->put_job(entry.stored); !put) {
+    entry.stored.spec.target_error = before;
+    return put;
+  }
+  run_locked(JobRetargeted{entry.stored.id, target_error});
+  log_job(entry.stored.id, fmt::format("target error {} from now on", target_error));
+  publish_job_locked(entry);
+  return {};
+}
+
+Result<void> Service::wake_locked(JobEntry& entry) {
+  if (!entry.dormant) return {};
+  auto log = PartialLog::open(folder(entry.stored.id));
+  if (!log) return tl::unexpected(log.error());
+  entry.log = std::move(*log);
+  load_folded(entry);
+  auto restored = restored_locked(entry, JobState::done);
+  if (!restored) return tl::unexpected(restored.error());
+  entry.dormant = false;
+  restoring_ = true;  // where the film is lost it is folded again, which is no news
+  run_locked(std::move(*restored));
+  restoring_ = false;
+  entry.replay.clear();
+  entry.replay_at.clear();
+  return {};
+}
+
+Result<void> Service::extend_locked(JobEntry& entry, std::uint64_t spp) {
+  if (spp == 0 || spp > limits::kMaxSpp)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} samples per pixel: it must be 1 to {}", spp, limits::kMaxSpp));
+  const JobId id = entry.stored.id;
+  const JobState state = shown_state(entry);
+  if (state == JobState::failed || state == JobState::cancelled)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} is {}: it cannot be extended", id.value, to_string(state)));
+  const bool at_end = entry.finishing != 0 || state == JobState::done;
+  const auto cut_by = [&](StopReason reason) { return at_end && entry.stored.stopped == reason; };
+  const bool by_error = cut_by(StopReason::error), by_time = cut_by(StopReason::time);
+  const double render_seconds = entry.stored.totals.render_seconds;
+  if (auto woken = wake_locked(entry); !woken) return woken;
+  if (auto possible = farm_.may_extend(id, spp); !possible) {
+    if (state == JobState::done) forget_locked(entry);
+    return possible;
+  }
+  entry.finishing = 0;
+  if (at_end) entry.clock_zero = now() - from_seconds(render_seconds);
+  run_locked(JobExtended{id, spp});
+  if (by_error) entry.stored.spec.target_error.reset();
+  if (by_time) entry.stored.spec.time.reset();
+  entry.stored.spp = entry.stored.spec.spp = even_spp(spp);
+  log_job(id, fmt::format("extended to {} samples per pixel", spp));
+  if (const auto put = store_->put_job(entry.stored); !put) return put;
+  publish_job_locked(entry);
+  return {};
+}
+
+Result<void> Service::remove(const JobId& id) {
+  const std::lock_guard lock(mutex_);
+  const auto found = entry_locked(id);
+  if (!found) return tl::unexpected(found.error());
+  const EntryPtr entry = *found;
+  if (!is_end(shown_state(*entry)) && entry->finishing == 0) {
+    run_locked(JobCancelled{id});
+    return {};
+  }
+  if (auto removed = store_->remove_job(id); !removed) return removed;
+  entry->removed = true;
+  entry->finishing = 0;
+  if (!entry->dormant) run_locked(JobForgotten{id});
+  entries_.erase(id);
+  std::erase(order_, id);
+  log_info(fmt::format("job={}", id.value), "removed");
+  // Chores of the job may still stand in the queue; what they leave behind goes with the folder.
+  chores_.push([this, id] {
+    (void)store_->remove_job(id);
+    if (!on_disk()) return;
+    auto gone = folder(id);
+    gone += kRemovedExtension;
+    std::error_code error;
+    std::filesystem::rename(folder(id), gone, error);
+    if (!error) std::filesystem::remove_all(gone, error);
+    if (error && error != std::errc::no_such_file_or_directory)
+      log_warn(fmt::format("job={}", id.value), "its folder cannot be removed: " + error.message());
+  });
+  return {};
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,282 @@
+// What users change, what is removed, and what a damaged folder or store does to one job and not to others.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "coordinator/work_queue.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+void sql(const fs::path& data, const std::string& text) {
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open((data / "jobs.sqlite").c_str(), &db), SQLITE_OK);
+  sqlite3_busy_timeout(db, 5000);
+  EXPECT_EQ(sqlite3_exec(db, text.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db);
+  sqlite3_close(db);
+}
+
+JobId finished(Coordinator& coordinator, JobSpec spec = {}) {
+  const JobId job = submit(coordinator, std::move(spec));
+  FakeFarm farm(coordinator, 1);
+  EXPECT_TRUE(farm.finish(job));
+  return job;
+}
+
+TEST(Restore, ADamagedRecordFailsItsJobAloneUntilItIsRemoved) {
+  TempFolder dir;
+  JobId good, bad;
+  {
+    auto coordinator = open_at(dir.path());
+    bad = submit(*coordinator);
+    good = submit(*coordinator);
+  }
+  sql(dir.path(), "UPDATE jobs SET record = 'no JSON' WHERE id = '" + bad.value + "'");
+
+  auto coordinator = open_at(dir.path());
+
+  ASSERT_TRUE(coordinator->job(bad));
+  EXPECT_EQ(coordinator->job(bad)->state, JobState::failed);
+  EXPECT_THAT(coordinator->job(bad)->error, HasSubstr("damaged"));
+  EXPECT_FALSE(coordinator->image_png(bad, 0));
+  EXPECT_FALSE(coordinator->tiles(bad));
+  EXPECT_FALSE(coordinator->set_priority(bad, 3));
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(good));
+  EXPECT_EQ(pixels(*coordinator, good), reference_pixels());
+  ASSERT_TRUE(coordinator->remove(bad));
+  EXPECT_EQ(coordinator->job(bad).error().code, Errc::not_found);
+}
+
+TEST(Restore, AnUnreadableFolderFailsItsJobAloneUntilItIsRepaired) {
+  TempFolder dir;
+  JobId good, bad;
+  {
+    auto coordinator = open_at(dir.path());
+    bad = submit(*coordinator);
+    good = submit(*coordinator);
+  }
+  const fs::path folder = dir.path() / "jobs" / bad.value;
+  fs::rename(folder, dir.path() / "aside");
+  std::ofstream(folder) << "not a folder";
+  {
+    auto coordinator = open_at(dir.path());
+    EXPECT_EQ(coordinator->job(bad)->state, JobState::failed);
+    EXPECT_THAT(coordinator->job(bad)->error, HasSubstr("restart the coordinator"));
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(good));
+  }
+  fs::remove(folder);
+  fs::rename(dir.path() / "aside", folder);
+
+  auto coordinator = open_at(dir.path());
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(bad)) << "it goes on as if nothing had been";
+  EXPECT_EQ(pixels(*coordinator, bad), reference_pixels());
+}
+
+TEST(Pin, AClassThatCannotBeStoredHoldsTheJobUntilItIs) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  sql(dir.path(),
+      "CREATE TRIGGER broken BEFORE UPDATE ON jobs BEGIN SELECT RAISE(ABORT, 'the disk is broken'); END");
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return !farm.refusals.empty(); }));
+
+  EXPECT_EQ(coordinator->job(job)->units_done, 0u) << "a restart could pin the job to another class";
+  EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
+  EXPECT_THAT(coordinator->job(job)->error, HasSubstr("the disk is broken"));
+  EXPECT_FALSE(coordinator->resume(job));
+
+  sql(dir.path(), "DROP TRIGGER broken");
+  farm.sessions()[0]->disconnected();
+  ASSERT_TRUE(coordinator->resume(job));
+  FakeFarm other(*coordinator, 1);
+  ASSERT_TRUE(other.finish(job));
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
+}
+
+TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  JobSpec spec;
+  spec.spp = 11;
+  const JobId job = finished(*coordinator, spec);
+  EXPECT_EQ(coordinator->job(job)->units_done, 8u);
+  EXPECT_EQ(coordinator->extend(job, 12).error().code, Errc::invalid_argument);
+  ASSERT_TRUE(coordinator->extend(job, 70));
+
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70));
+  EXPECT_EQ(report(*coordinator, job)["core_seconds"], (8 + farm.results_sent) * .125);
+}
+
+TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {
+  for (const bool results_too : {false, true}) {
+    TempFolder dir;
+    JobId job;
+    {
+      auto coordinator = open_at(dir.path());
+      job = finished(*coordinator);
+    }
+    fs::remove(dir.path() / "jobs" / job.value / "film.snap");
+    if (results_too) fs::remove(dir.path() / "jobs" / job.value / "partials-000.seg");
+    auto coordinator = open_at(dir.path());
+    ASSERT_TRUE(coordinator->extend(job, 70));
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job));
+    EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70)) << results_too;
+  }
+}
+
+TEST(Done, WaitsForASnapshotThatCannotBeWritten) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  const fs::path in_the_way = dir.path() / "jobs" / job.value / "film.snap" / "full";
+  fs::create_directories(in_the_way);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == 8; }));
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (coordinator->job(job)->error.empty() && std::chrono::steady_clock::now() < patience)
+    std::this_thread::yield();
+
+  EXPECT_EQ(coordinator->job(job)->state, JobState::running);
+  EXPECT_THAT(coordinator->job(job)->error, HasSubstr("then resume the job"));
+  fs::remove_all(in_the_way.parent_path());
+  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(coordinator->wait(job));
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
+}
+
+TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId done = finished(*coordinator), running = submit(*coordinator);
+  EXPECT_EQ(coordinator->job(done)->state, JobState::done);
+
+  ASSERT_TRUE(coordinator->remove(done));
+  EXPECT_EQ(coordinator->job(done).error().code, Errc::not_found);
+  ASSERT_TRUE(coordinator->remove(running));
+  EXPECT_EQ(coordinator->job(running)->state, JobState::cancelled);
+  ASSERT_TRUE(coordinator->remove(running));
+  EXPECT_EQ(coordinator->remove(running).error().code, Errc::not_found);
+  EXPECT_TRUE(coordinator->jobs().empty());
+
+  // The keeper does its work in order: this job's end comes after the removals.
+  const JobId last = finished(*coordinator);
+  EXPECT_FALSE(fs::exists(dir.path() / "jobs" / done.value));
+  EXPECT_FALSE(fs::exists(dir.path() / "jobs" / running.value));
+  coordinator.reset();
+  fs::create_directories(dir.path() / "jobs" / "j-1.removed" / "x");
+  coordinator = open_at(dir.path());
+  ASSERT_EQ(coordinator->jobs().size(), 1u);
+  EXPECT_EQ(coordinator->jobs()[0].id, last);
+  EXPECT_FALSE(fs::exists(dir.path() / "jobs" / "j-1.removed")) << "what a crash left of a removal";
+}
+
+TEST(Change, IsDoneAsAWholeOrNotAtAll) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator);
+  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 64, .001}));  // it has no target
+  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 4, {}}));     // it has 16 samples already
+  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 2'000'000, 64, {}}));
+
+  const JobView before = coordinator->job(job).value();
+  EXPECT_EQ(before.priority, 0);
+  EXPECT_EQ(before.spp, 16u);
+  EXPECT_EQ(before.state, JobState::queued);
+
+  ASSERT_TRUE(coordinator->change(job, {JobState::paused, 5, 64, {}}));
+  const JobView after = coordinator->job(job).value();
+  EXPECT_EQ(after.priority, 5);
+  EXPECT_EQ(after.spp, 64u);
+  EXPECT_EQ(after.state, JobState::paused);
+}
+
+TEST(Change, ATargetSurvivesARestart) {
+  TempFolder dir;
+  JobId job;
+  JobSpec spec;
+  spec.target_error = .01;
+  {
+    auto coordinator = open_at(dir.path());
+    job = submit(*coordinator, spec);
+    ASSERT_TRUE(coordinator->change(job, {{}, {}, {}, .003}));
+  }
+  auto coordinator = open_at(dir.path());
+  EXPECT_EQ(coordinator->job(job)->target_error, .003);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_LE(report(*coordinator, job)["relmse"].get<double>(), .003);
+}
+
+TEST(Lease, OfAnotherStartIsNotTakenForOneOfThis) {
+  auto coordinator = open_at({});
+  submit(*coordinator);
+  auto mail = std::make_shared<Mailbox>();
+  WorkerHello hello;
+  hello.name = "w";
+  auto session = coordinator->connect(hello, std::make_shared<MailSink>(mail, 0)).value();
+  WorkerProgress progress;
+  progress.leases = {{{"l77-1000"}, 0}};
+  session->receive(progress);
+
+  std::optional<CancelLease> cancelled;
+  while (!cancelled) {
+    const auto letter = mail->take();
+    ASSERT_TRUE(letter);
+    if (const auto* c = std::get_if<CancelLease>(&letter->second)) cancelled = *c;
+  }
+  EXPECT_EQ(cancelled->lease.value, "l77-1000");
+}
+
+TEST(Budget, HoldsNoThreadBackAndGrantsInOrder) {
+  ByteBudget budget(10);
+  std::string granted;
+  const auto ask = [&](std::size_t bytes, char name) { budget.ask(bytes, [&, name] { granted += name; }); };
+  ask(20, 'a');  // alone it may be larger than everything
+  ask(6, 'b');
+  ask(6, 'c');
+  ask(1, 'd');  // there would be room, but others came first
+  EXPECT_EQ(granted, "a");
+  budget.release(20);
+  EXPECT_EQ(granted, "ab");
+  budget.release(6);
+  EXPECT_EQ(granted, "abcd");
+  ask(100, 'e');
+  budget.close();
+  budget.release(7);
+  EXPECT_EQ(granted, "abcd");
+}
+
+TEST(Queue, HoldsBackWhoeverFillsItUntilThereIsRoom) {
+  WorkQueue<int> queue;
+  for (int i = 0; i < 3; ++i) queue.push(i);
+  std::atomic<bool> through = false;
+  std::jthread producer([&](const std::stop_token& token) { through = queue.wait_for_room(1, token); });
+  EXPECT_FALSE(through);
+  EXPECT_EQ(queue.pop(2, {}).size(), 2u);
+  producer.join();
+  EXPECT_TRUE(through);
+  queue.push(1);
+  std::jthread stopped([&](const std::stop_token& token) { through = queue.wait_for_room(1, token); });
+  stopped.request_stop();
+  stopped.join();
+  EXPECT_FALSE(through);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
