@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/job/limits.h"
 #include "coordinator/http/api.h"
 #include "coordinator/http/handlers.h"
 #include "coordinator/http/json_read.h"
@@ -88,30 +89,25 @@ Result<SubmitRequest> from_xml(const Request& request) {
 }
 
 // What a PATCH asks for, read as a whole before anything is changed.
-struct Change {
-  std::optional<std::string> state;
-  std::optional<int> priority;
-  std::optional<std::uint64_t> spp;
-};
-
-Result<Change> read_change(std::string_view text) {
+Result<coordinator::JobChange> read_change(std::string_view text) {
+  using coordinator::JobState;
   const auto body = read_object(text, {"state", "priority", "spp", "target_error"});
   if (!body) return tl::unexpected(body.error());
-  if (body->empty()) return bad("the body changes nothing; possible: state, priority, spp");
-  Change change;
-  if (body->contains("target_error"))
-    return fail(
-        Errc::failed_precondition,
-        "the target error of a submitted job can't be changed: tiles that have stopped were stopped by it. "
-        "Raise its samples (spp), or submit it again");
+  if (body->empty()) return bad("the body changes nothing; possible: state, priority, spp, target_error");
+  coordinator::JobChange change;
+  if (const auto target = body->find("target_error"); target != body->end()) {
+    if (!target->is_number() || !(target->get<double>() > 0))
+      return bad("'target_error' must be a positive number");
+    change.target_error = target->get<double>();
+  }
   if (const auto state = body->find("state"); state != body->end()) {
-    if (*state != "paused" && *state != "running" && *state != "cancelled")
-      return bad("'state' must be \"paused\", \"running\" or \"cancelled\"");
-    change.state = state->get<std::string>();
+    for (const JobState possible : {JobState::paused, JobState::running, JobState::cancelled})
+      if (*state == std::string(to_string(possible))) change.state = possible;
+    if (!change.state) return bad("'state' must be \"paused\", \"running\" or \"cancelled\"");
   }
   if (const auto priority = body->find("priority"); priority != body->end()) {
-    if (!priority->is_number_integer() || std::abs(priority->get<double>()) > 1000)
-      return bad("'priority' must be a whole number from -1000 to 1000");
+    if (!priority->is_number_integer() || std::abs(priority->get<double>()) > kMaxPriority)
+      return bad(fmt::format("'priority' must be a whole number from -{0} to {0}", kMaxPriority));
     change.priority = priority->get<int>();
   }
   if (const auto spp = body->find("spp"); spp != body->end()) {
@@ -120,17 +116,6 @@ Result<Change> read_change(std::string_view text) {
     change.spp = spp->get<std::uint64_t>();
   }
   return change;
-}
-
-Result<void> apply(coordinator::Coordinator& coordinator, const JobId& id, const Change& change) {
-  if (change.spp)
-    if (auto done = coordinator.extend(id, *change.spp); !done) return done;
-  if (change.priority)
-    if (auto done = coordinator.set_priority(id, *change.priority); !done) return done;
-  if (!change.state) return {};
-  if (*change.state == "paused") return coordinator.pause(id);
-  if (*change.state == "running") return coordinator.resume(id);
-  return coordinator.cancel(id);
 }
 
 Response no_such_job() { return problem(404, "there is no such job"); }
@@ -176,13 +161,13 @@ Response patch_job(Api& api, const Request& request, const Params& params) {
   if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
   const auto change = read_change(request.body);
   if (!change) return problem(change.error());
-  if (const auto done = apply(api.coordinator(), id, *change); !done) return problem(done.error());
+  if (const auto done = api.coordinator().change(id, *change); !done) return problem(done.error());
   return get_job(api, request, params);
 }
 
 Response delete_job(Api& api, const Request&, const Params& params) {
   if (!plausible_id(params[0])) return no_such_job();
-  if (const auto done = api.coordinator().cancel(JobId{params[0]}); !done) return problem(done.error());
+  if (const auto done = api.coordinator().remove(JobId{params[0]}); !done) return problem(done.error());
   Response response;
   response.status = 204;
   return response;

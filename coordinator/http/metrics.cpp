@@ -29,7 +29,7 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
                                          JobState::done,   JobState::failed,  JobState::cancelled};
   std::map<JobState, std::uint64_t> by_state;
   std::uint64_t done = 0, planned = 0;
-  double core_seconds = 0, eta = 0;
+  double core_seconds = 0, eta = 0, queued = 0;
   UnitHealth health;
   for (const auto& job : jobs) {
     ++by_state[job.state];
@@ -40,6 +40,7 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
     done += job.units_done;
     planned += job.units_total;
     eta += job.eta_seconds.value_or(0);
+    if (job.state != JobState::paused) queued += job.queued_core_seconds;
   }
   head(out, "lightshaft_jobs", "gauge", "Jobs by state.");
   for (const JobState state : kStates)
@@ -47,6 +48,8 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
                    by_state[state]);
   single(out, "lightshaft_units_planned", "gauge", "Units of unfinished jobs.", planned);
   single(out, "lightshaft_units_done", "gauge", "Units of unfinished jobs that are folded.", done);
+  single(out, "lightshaft_queued_core_seconds", "gauge",
+         "Predicted CPU seconds of units that wait for a worker, of jobs that are not paused.", queued);
   single(out, "lightshaft_eta_seconds", "gauge",
          "Predicted wall seconds to finish all jobs whose rate is known.", eta);
   single(out, "lightshaft_core_seconds", "gauge", "CPU seconds that workers spent on the jobs kept here.",

@@ -127,6 +127,16 @@ TEST_F(Jobs, ArePausedResumedExtendedAndCancelled) {
   EXPECT_EQ(ask(Method::del, url).status, 204);
   EXPECT_EQ(json_of(ask(Method::get, url))["state"], "cancelled");
   EXPECT_EQ(ask(Method::patch, url, R"({"spp":64})").status, 409);
+  EXPECT_EQ(ask(Method::del, url).status, 204);
+  EXPECT_EQ(ask(Method::get, url).status, 404) << "it had ended, so it was removed";
+  EXPECT_EQ(ask(Method::del, url).status, 404);
+}
+
+TEST_F(Jobs, TakeAnotherTargetAndAnyPriorityThatTheCommandLineTakes) {
+  const std::string url = "/api/v1/jobs/" + submit();
+  const json job = json_of(ask(Method::patch, url, R"({"target_error":0.25,"priority":-1000000})"));
+  EXPECT_EQ(job["target_error"], 0.25);
+  EXPECT_EQ(job["priority"], -1'000'000);
 }
 
 TEST_F(Jobs, AreNotChangedByAWrongPatch) {
@@ -135,9 +145,9 @@ TEST_F(Jobs, AreNotChangedByAWrongPatch) {
 
   for (const char* body :
        {R"({"state":"done"})", R"({"spp":32,"priority":"high"})", R"({"priority":18446744073709551611})",
+        R"({"priority":1000001})", R"({"target_error":0})", R"({"target_error":"small","spp":64})",
         R"({"spp":-1})", R"({"spp":2.5})", R"({"state":null})", R"({"colour":1})", "{}", "null"})
     EXPECT_EQ(ask(Method::patch, url, body).status, 400) << body;
-  EXPECT_EQ(ask(Method::patch, url, R"({"target_error":0.1,"spp":64})").status, 409);
   EXPECT_EQ(text(ask(Method::get, url)), before);
 }
 
@@ -309,6 +319,7 @@ TEST_F(Routes, ShowMetrics) {
   const std::string metrics = text(ask(Method::get, "/metrics"));
 
   EXPECT_NE(metrics.find("lightshaft_jobs{state=\"queued\"} 1\n"), std::string::npos) << metrics;
+  EXPECT_NE(metrics.find("\nlightshaft_queued_core_seconds 0\n"), std::string::npos) << metrics;
   EXPECT_NE(metrics.find("lightshaft_http_requests_total{method=\"GET\",code=\"200\"} 1\n"),
             std::string::npos);
   EXPECT_NE(metrics.find("# TYPE lightshaft_workers gauge\n"), std::string::npos);

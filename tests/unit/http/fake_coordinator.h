@@ -105,6 +105,23 @@ class FakeCoordinator final : public Coordinator {
     if (found == jobs_.end()) return fail(Errc::not_found, "there is no job '" + id.value + "'");
     return found->second;
   }
+  Result<void> change(const JobId& id, const JobChange& wanted) override {
+    return change(id, [&](JobView& job) {
+      if (wanted.state) job.state = *wanted.state;
+      if (wanted.priority) job.priority = *wanted.priority;
+      if (wanted.spp) job.spp = *wanted.spp;
+      if (wanted.target_error) job.target_error = *wanted.target_error;
+    });
+  }
+  Result<void> remove(const JobId& id) override {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto found = jobs_.find(id);
+      if (found != jobs_.end() && found->second.state == JobState::cancelled)
+        return jobs_.erase(id), Result<void>{};
+    }
+    return set_state(id, JobState::cancelled);
+  }
   Result<void> cancel(const JobId& id) override { return set_state(id, JobState::cancelled); }
   Result<void> pause(const JobId& id) override { return set_state(id, JobState::paused); }
   Result<void> resume(const JobId& id) override { return set_state(id, JobState::running); }
