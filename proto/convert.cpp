@@ -332,6 +332,9 @@ pb::ToWorker to_wire(const ToWorker& message) {
   return out;
 }
 
+bool known(const pb::FromWorker& in) { return in.message_case() != pb::FromWorker::MESSAGE_NOT_SET; }
+bool known(const pb::ToWorker& in) { return in.message_case() != pb::ToWorker::MESSAGE_NOT_SET; }
+
 Result<FromWorker> from_wire(const pb::FromWorker& in) {
   switch (in.message_case()) {
     case pb::FromWorker::kHello:

@@ -20,6 +20,10 @@ namespace pb = ::lightshaft::farm::v1;
 pb::FromWorker to_wire(const FromWorker& message);
 pb::ToWorker to_wire(const ToWorker& message);
 
+// False for a kind of message that a newer peer may send and this version passes over.
+bool known(const pb::FromWorker& message);
+bool known(const pb::ToWorker& message);
+
 Result<FromWorker> from_wire(const pb::FromWorker& message);
 Result<ToWorker> from_wire(const pb::ToWorker& message);
 

@@ -73,6 +73,10 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
+  if (greeted_ && !wire::known(incoming_)) {  // of a newer worker; it must be able to do without
+    StartRead(&incoming_);
+    return;
+  }
   auto message = wire::from_wire(incoming_);
   if (!message) {
     log_warn("peer=" + context_->peer(), message.error().message);
@@ -81,11 +85,17 @@ void WorkStream::OnReadDone(bool ok) {
   }
   if (!session_) {
     greet(std::move(*message));
-    if (!session_) return;
-  } else {
-    session_->receive(std::move(*message));
+    if (session_) StartRead(&incoming_);
+    return;
   }
-  StartRead(&incoming_);
+  // The outlet outlives this stream, which may be gone when there is room again.
+  session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
+}
+
+// No thread waits meanwhile. Until Finish is called the stream lives.
+void Outlet::read_on() {
+  const std::lock_guard lock(mutex_);
+  if (stream_ && !finished_) stream_->StartRead(&stream_->incoming_);
 }
 
 void WorkStream::greet(FromWorker message) {

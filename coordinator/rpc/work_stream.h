@@ -26,6 +26,7 @@ class Outlet final : public WorkerSink {
   explicit Outlet(WorkStream* stream) : stream_(stream) {}
   void send(ToWorker message) override;
   void close() override;
+  void read_on();  // from any thread: the next message may come
 
  private:
   friend class WorkStream;

@@ -61,6 +61,10 @@ void WorkCall::OnReadDone(bool ok) {
     if (!writing_) release_hold_locked();
     return;
   }
+  if (!wire::known(incoming_)) {  // of a newer coordinator; it must be able to do without
+    StartRead(&incoming_);
+    return;
+  }
   auto message = wire::from_wire(incoming_);
   if (!message) {
     const std::lock_guard lock(mutex_);

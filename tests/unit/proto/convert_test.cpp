@@ -219,6 +219,19 @@ TEST(Convert, SendsOnlyValidUtf8) {
   EXPECT_TRUE(over_the_wire(FromWorker{failure}, pb::FromWorker{}));
 }
 
+TEST(FromWire, AKindOfMessageThatThisVersionLacksIsKnownAsSuch) {
+  pb::FromWorker from;
+  pb::ToWorker to;
+  const std::string newer("\x9a\x06\x02hi", 5);  // field 99: two bytes
+  ASSERT_TRUE(from.ParseFromString(newer));
+  ASSERT_TRUE(to.ParseFromString(newer));
+
+  EXPECT_FALSE(known(from));
+  EXPECT_FALSE(known(to));
+  EXPECT_TRUE(known(to_wire(FromWorker{WorkerDraining{}})));
+  EXPECT_TRUE(known(to_wire(ToWorker{DrainNow{}})));
+}
+
 TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
   EXPECT_EQ(text_from("a\x1b[31mb", 100, "f").value(), "a [31mb");
 }
