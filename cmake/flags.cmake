@@ -1,8 +1,10 @@
-# Flags that every target shares. The numerical ones are part of the law of determinism: no contraction, no fast-math.
+# Flags that every target shares. The numerical ones are part of the law of determinism: no contraction, no fast-math. Nobody
+# reads errno or traps of arithmetic (after -fno-fast-math, which would reset it). GCC 12's superword vectoriser forgets the
+# rounding of double -> float -> double within a function, so that two compilations of one formula may differ: it stays off.
 add_library(ls_flags INTERFACE)
 target_include_directories(ls_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(ls_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-math-errno -fno-fast-math)
+  -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-fast-math -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize)
 if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3")
   # The loader, not a SIGILL in a static initialiser, tells the user that the CPU is too old.
   add_link_options(-Wl,-z,x86-64-v3)
@@ -11,6 +13,11 @@ if(LIGHTSHAFT_SANITIZE)
   target_compile_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE})
 endif()
+
+# For the renderer's inner loops: no symbol is replaced at load time, so that calls within a file may be inlined although
+# the code is position independent.
+add_library(ls_hot_flags INTERFACE)
+target_compile_options(ls_hot_flags INTERFACE -fno-semantic-interposition -fvisibility=hidden)
 
 # ls_library(NAME DIR... [LINK libs...]): a static library of all .cpp files right under this folder.
 function(ls_library name)

@@ -2,6 +2,7 @@
 // SIGINT.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/resource.h>
@@ -106,6 +107,13 @@ Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   return {};
 }
 
+// Partials and films of 100 KB to some MB come and go many times a second: given back to the system each
+// time, every one of them would be paid for with page faults again.
+void keep_freed_memory() {
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
+}
+
 sigset_t block_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -186,6 +194,7 @@ int main(int argc, char** argv) {
     return kUsage;
   }
   raise_file_limit();
+  keep_freed_memory();
   const sigset_t signals = block_signals();  // before any thread starts
   if (const auto served = serve(flags, signals); !served) {
     fmt::print(stderr, "lightshaft-coordinator: error: {}\n", served.error().message);

@@ -27,6 +27,7 @@ struct LocalJob {
 struct RenderedUnit {
   Partial partial;
   double cpu_seconds = 0;
+  double wall_seconds = 0;  // from the first sample to the last
   UnitHealth health;
 };
 

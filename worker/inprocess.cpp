@@ -8,6 +8,7 @@
 #include <iterator>
 #include <mutex>
 
+#include "common/base/clock.h"
 #include "common/scene/serialize.h"
 #include "worker/resident.h"
 
@@ -59,6 +60,7 @@ class InProcessBackend final : public LocalBackend {
     const auto ready = world(job.brief.job);
     if (!ready) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "the job was not prepared"});
     const double start = thread_cpu_seconds();
+    const TimePoint begin = clock_.now();
     render::Breadcrumb own;
     render::TileResult tile =
         render::render_tile(*ready, unit.rect, unit.samples, &stop, where ? where : &own);
@@ -68,6 +70,7 @@ class InProcessBackend final : public LocalBackend {
     out.partial.header = {brief.scene, brief.settings_digest, numeric_class(), unit.rect, unit.samples};
     out.partial.sums = std::move(tile.sums);
     out.cpu_seconds = thread_cpu_seconds() - start;
+    out.wall_seconds = seconds(clock_.now() - begin);
     out.health = {tile.health.nonfinite, tile.health.negative, tile.health.majorant_violations};
     return out;
   }
@@ -91,6 +94,7 @@ class InProcessBackend final : public LocalBackend {
   }
 
   const int threads_;
+  const SystemClock clock_;
   mutable std::mutex mutex_;
   std::map<JobId, std::shared_ptr<const render::World>> worlds_;
 };

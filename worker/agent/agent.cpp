@@ -61,6 +61,7 @@ void Agent::Impl::end_threads() {
   link.close();
   backend.shutdown();
   threads.clear();
+  if (gaps.count() > 0) log_info(fmt::format("worker={}", id.value), gaps.text());
 }
 
 void Agent::Impl::handle(Arrival& arrival) {

@@ -14,6 +14,7 @@
 
 #include "worker/agent/agent.h"
 #include "worker/agent/backoff.h"
+#include "worker/agent/gap_meter.h"
 #include "worker/agent/inbox.h"
 #include "worker/agent/lease_book.h"
 #include "worker/agent/outbox.h"
@@ -37,6 +38,9 @@ struct Agent::Impl {
   struct RenderSlot {
     std::atomic<bool> stop{false};
     std::optional<UnitKey> unit;  // being rendered; guarded by mutex
+    // Of its own thread: when its last unit was rendered, and of which job.
+    JobId last_job;
+    TimePoint last_end{};
   };
   enum class Connection { down, opening, up };
 
@@ -72,6 +76,11 @@ struct Agent::Impl {
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<LeaseBook::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                            std::shared_ptr<const LocalJob>& job);
+  void note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
+  tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
+                                                      const LeaseBook::Held& held);
+  tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
+                                               const LeaseBook::Held& held);
   void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome);
 
   const AgentOptions options;
@@ -107,6 +116,7 @@ struct Agent::Impl {
   std::uint64_t uses = 0;
   double cpu_seconds = 0;
   double load_seconds = 0;
+  GapMeter gaps;
   Backoff trouble_backoff;
   std::string loading;  // name of what is being fetched or built; empty: nothing
 

@@ -24,12 +24,17 @@ std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
                             unit.rect.width(), unit.rect.height(), bytes, limits::kPartialBytes)};
 }
 
-tl::expected<UnitResult, UnitFailure> rendered_unit(RenderBackend& backend, const LocalJob& job,
-                                                    const LeaseBook::Held& held,
-                                                    const std::atomic<bool>& stop) {
+}  // namespace
+
+tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slot, const LocalJob& job,
+                                                                 const LeaseBook::Held& held) {
   if (auto failure = too_large(held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
-  auto rendered = backend.render(job, held.unit, stop);
-  if (!rendered) return tl::unexpected<UnitFailure>(std::move(rendered.error()));
+  auto rendered = backend.render(job, held.unit, slot.stop);
+  if (!rendered) {
+    slot.last_job = {};
+    return tl::unexpected<UnitFailure>(std::move(rendered.error()));
+  }
+  note_gap(slot, held.key.job, rendered->wall_seconds);
   auto exr = encode_partial(rendered->partial, job.brief.settings.size);
   if (!exr)
     return tl::unexpected<UnitFailure>(
@@ -44,11 +49,11 @@ tl::expected<UnitResult, UnitFailure> rendered_unit(RenderBackend& backend, cons
 }
 
 // A backend in this process may run out of memory: that costs the unit, not the process.
-tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const LocalJob& job,
-                                             const LeaseBook::Held& held, const std::atomic<bool>& stop) {
+tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
+                                                          const LeaseBook::Held& held) {
   UnitFailure failure;
   try {
-    return rendered_unit(backend, job, held, stop);
+    return rendered_unit(slot, job, held);
   } catch (const std::bad_alloc&) {
     failure.reason = "out of memory while rendering";
   } catch (const std::exception& e) {
@@ -57,12 +62,20 @@ tl::expected<UnitResult, UnitFailure> render(RenderBackend& backend, const Local
   return tl::unexpected<UnitFailure>(std::move(failure));
 }
 
-}  // namespace
+void Agent::Impl::note_gap(RenderSlot& slot, const JobId& job, double wall_seconds) {
+  const TimePoint now = clock.now();
+  if (slot.last_job == job) {
+    const std::lock_guard lock(mutex);
+    gaps.add(seconds(now - slot.last_end) - wall_seconds);
+  }
+  slot.last_job = job;
+  slot.last_end = now;
+}
 
 void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   std::shared_ptr<const LocalJob> job;
   while (const auto held = next_unit(slot, token, job)) {
-    finished(slot, held->key, render(backend, *job, *held, slot.stop));
+    finished(slot, held->key, render(slot, *job, *held));
     job.reset();
   }
 }

@@ -306,6 +306,7 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   out.partial.header = {brief.scene, brief.settings_digest, numeric_class_, unit.rect, unit.samples};
   out.partial.sums.assign(slot.sums, slot.sums + unit.rect.pixels() * kPartialChannels);
   out.cpu_seconds = reply.cpu_seconds;
+  out.wall_seconds = reply.wall_seconds;
   out.health = {reply.nonfinite, reply.negative, reply.majorant_violations};
   return {std::move(out), false};
 }

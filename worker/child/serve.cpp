@@ -154,6 +154,7 @@ class Server {
     if (sums.size() > kSlotPixels * 6) return refused(reply, UnitFailure{.reason = "the tile is too large"});
     std::copy(sums.begin(), sums.end(), slot.sums);
     reply.cpu_seconds = rendered->cpu_seconds;
+    reply.wall_seconds = rendered->wall_seconds;
     reply.nonfinite = rendered->health.nonfinite;
     reply.negative = rendered->health.negative;
     reply.majorant_violations = rendered->health.majorant_violations;

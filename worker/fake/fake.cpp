@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <mutex>
@@ -36,6 +37,7 @@ class FakeBackend final : public LocalBackend {
                                                         const std::atomic<bool>& stop,
                                                         render::Breadcrumb* where) override {
     const double start = thread_cpu_seconds();
+    const auto begin = std::chrono::steady_clock::now();
     const JobBrief& brief = job.brief;
     if (where) {
       where->x.store(unit.rect.x0, std::memory_order_relaxed);
@@ -50,6 +52,7 @@ class FakeBackend final : public LocalBackend {
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples});
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
     out.cpu_seconds = thread_cpu_seconds() - start;
+    out.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
   }
 

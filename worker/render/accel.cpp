@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <atomic>
+#include <bit>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 
 namespace ls::render {
@@ -65,18 +68,17 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
 // Geometry ids, the same in every scene they are attached to.
 enum : unsigned { kTriangles = 0, kSpheres = 1, kDisks = 2, kKinds = 3 };
 
-RTCRay make_ray(const V3& o, const V3& d, float t_max) {
-  RTCRay r{};
-  r.org_x = o.x;
-  r.org_y = o.y;
-  r.org_z = o.z;
-  r.dir_x = d.x;
-  r.dir_y = d.y;
-  r.dir_z = d.z;
-  r.tnear = 0;
-  r.tfar = t_max;
-  r.mask = ~0u;
-  return r;
+// Written in the 16-byte words that Embree reads: a load of several smaller stores has to wait for them.
+using F32x4 = float __attribute__((vector_size(16)));
+using U32x4 = std::uint32_t __attribute__((vector_size(16)));
+void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
+  static_assert(offsetof(RTCRay, tnear) == 12 && offsetof(RTCRay, dir_x) == 16 &&
+                offsetof(RTCRay, tfar) == 32 && offsetof(RTCRay, flags) == 44);
+  const F32x4 origin = {o.x, o.y, o.z, 0}, direction = {d.x, d.y, d.z, 0};
+  const U32x4 rest = {std::bit_cast<std::uint32_t>(t_max), ~0u, 0, 0};  // tfar, mask, id, flags
+  std::memcpy(&r.org_x, &origin, sizeof origin);
+  std::memcpy(&r.dir_x, &direction, sizeof direction);
+  std::memcpy(&r.tfar, &rest, sizeof rest);
 }
 
 bool traceable(const V3& o, const V3& d) {  // Embree's behaviour on NaN is undefined
@@ -161,7 +163,7 @@ std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V
                                  float t_max) {
   if (!traceable(o, d)) return std::nullopt;
   RTCRayHit rh;
-  rh.ray = make_ray(o, d, t_max);
+  set_ray(rh.ray, o, d, t_max);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -227,7 +229,8 @@ std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, flo
 
 bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
   if (!traceable(o, d)) return true;
-  RTCRay ray = make_ray(o, d, t_max);
+  RTCRay ray;
+  set_ray(ray, o, d, t_max);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(state_->opaque, &context, &ray);

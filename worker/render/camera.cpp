@@ -44,7 +44,8 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale) {
   focus_ = static_cast<float>(s.focus_distance);
   near_ = static_cast<float>(s.near_clip * scale);
   far_ = static_cast<float>(s.far_clip * scale);
-  lens_scale_ = static_cast<float>(scale);
+  lens_x_ = V3(axis_x_ * scale);
+  lens_y_ = V3(axis_y_ * scale);
 }
 
 CameraRay Camera::ray(double fx, double fy, V2 lens) const {
@@ -55,12 +56,13 @@ CameraRay Camera::ray(double fx, double fy, V2 lens) const {
     const V2 p = concentric_disk(lens) * aperture_;
     // The point in focus is unmoved by the choice of the lens point.
     local = V3d(x * focus_ - p.x, y * focus_ - p.y, focus_);
-    o = origin_ + V3((axis_x_ * p.x + axis_y_ * p.y) * lens_scale_);
+    o = origin_ + lens_x_ * p.x + lens_y_ * p.y;
   }
   const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
-  const V3 d = V3(along.normalized());
+  const double length = along.length();
+  const V3 d(along * (1 / length));
   // Clip planes are measured along the axis; the ray starts at the near one.
-  const auto per_depth = static_cast<float>(local.length() / local.z);
+  const auto per_depth = static_cast<float>(length / local.z);
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
 }
 

@@ -27,11 +27,11 @@ class Camera {
  private:
   V3d axis_x_, axis_y_, axis_z_;  // of the camera, in the world; columns of to_world, lengths as given
   V3 origin_;
+  V3 lens_x_, lens_y_;  // the same axes in world units
   double x0_ = 0, dx_ = 0, y0_ = 0,
          dy_ = 0;                   // camera-space direction (x, y, 1) of film position: x = x0 + dx * fx
   float aperture_ = 0, focus_ = 1;  // scene units
   float near_ = 0, far_ = 0;        // world units
-  float lens_scale_ = 1;
 };
 
 }  // namespace ls::render

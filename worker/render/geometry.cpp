@@ -19,7 +19,8 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
   if (det == 0) return false;
   const V3d s = o - v0;
   const V3d q = s.cross(e1);
-  b = {e2.dot(q) / det, s.dot(p) / det, d.dot(q) / det};
+  const double inverse = 1 / det;
+  b = {e2.dot(q) * inverse, s.dot(p) * inverse, d.dot(q) * inverse};
   return std::isfinite(b.t) && std::isfinite(b.u) && std::isfinite(b.v);
 }
 
@@ -48,19 +49,22 @@ bool complete_triangle(const Geometry& g, std::uint32_t i, const V3& o, const V3
   const V3d n = e1.cross(e2);
   hit.ng = V3(n * (s.orientation / n.length()));
   const auto u = static_cast<float>(b.u), v = static_cast<float>(b.v), w = 1 - u - v;
-  V3 tangent(e1);
-  if (s.uvs) {
-    const V2 a = g.uvs[idx[0]], du = g.uvs[idx[1]] - a, dv = g.uvs[idx[2]] - a;
-    hit.uv = a + du * u + dv * v;
-    const float det = du.x * dv.y - du.y * dv.x;
-    if (det != 0) tangent = V3(e1 * (dv.y / det) - e2 * (du.y / det));
-  } else {
-    hit.uv = {u, v};
-  }
+  hit.uv = {u, v};
+  if (s.uvs && s.wants_uv) hit.uv = g.uvs[idx[0]] * w + g.uvs[idx[1]] * u + g.uvs[idx[2]] * v;
   V3 ns = hit.ng;
   if (s.normals) {
     const V3 m = g.normals[idx[0]] * w + g.normals[idx[1]] * u + g.normals[idx[2]] * v;
     if (dot(m, m) > 0) ns = normalize(m) * s.orientation;
+  }
+  if (!s.wants_tangent) {
+    hit.shading = Frame(ns);
+    return true;
+  }
+  V3 tangent(e1);
+  if (s.uvs) {
+    const V2 du = g.uvs[idx[1]] - g.uvs[idx[0]], dv = g.uvs[idx[2]] - g.uvs[idx[0]];
+    const float det = du.x * dv.y - du.y * dv.x;
+    if (det != 0) tangent = V3(e1 * (dv.y / det) - e2 * (du.y / det));
   }
   hit.shading = Frame::from_tangent(ns, tangent);
   return true;
@@ -91,8 +95,12 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& 
   n /= l;
   hit.p = V3(s.center + n * s.radius);
   hit.surface = s.surface;
-  const float sign = g.surfaces[s.surface].orientation;
-  hit.ng = V3(n) * sign;
+  const SurfaceInfo& info = g.surfaces[s.surface];
+  hit.ng = V3(n) * info.orientation;
+  if (!info.wants_uv && !info.wants_tangent) {
+    hit.shading = Frame(hit.ng);
+    return true;
+  }
   const auto* r = s.to_local;
   const V3d q = local_direction(s, n);
   hit.uv = uv_of(q);
@@ -146,12 +154,13 @@ bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hi
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max) {
   // Relative to the point nearest to the centre: no cancellation for distant or grazing rays.
   const V3d f = o - s.center;
-  const double a = d.dot(d), b = -f.dot(d);
+  const double a = d.dot(d), b = -f.dot(d), outside = f.dot(f) - s.radius * s.radius;
+  if (b < 0 && outside > 0) return kInf;  // leaves it behind
   const V3d foot = f + d * (b / a);
   const double disc = s.radius * s.radius - foot.dot(foot);
   if (!(disc >= 0)) return kInf;
-  const double c = f.dot(f) - s.radius * s.radius, q = b + std::copysign(std::sqrt(a * disc), b);
-  double t0 = q != 0 ? c / q : 0, t1 = q / a;
+  const double q = b + std::copysign(std::sqrt(a * disc), b);
+  double t0 = q != 0 ? outside / q : 0, t1 = q / a;
   if (t0 > t1) std::swap(t0, t1);
   if (t0 > t_min && t0 < t_max) return t0;
   if (t1 > t_min && t1 < t_max) return t1;

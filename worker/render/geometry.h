@@ -24,6 +24,11 @@ struct SurfaceInfo {  // one per scene shape
   bool transition = false;                           // crossing it changes the medium
   bool null = false;                                 // index-matched: rays pass
   bool normals = false, uvs = false;                 // triangles: per-vertex data
+  // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
+  // frame.
+  bool wants_uv = true, wants_tangent = true;
+  // Of its material: next-event estimation makes sense; light crosses it.
+  bool smooth = true, transmits = true;
   float orientation = 1;  // -1: normals are flipped against winding or the outward direction
 };
 

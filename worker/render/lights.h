@@ -51,11 +51,6 @@ class Lights {
   bool can_sample() const { return !lights_.empty(); }  // any light that next-event estimation can reach
   bool any_with_place() const { return any_with_place_; }
   LightChoice choose(const LightNumbers& numbers) const;
-  // The same from numbers in [0, 1).
-  LightChoice choose(float u_select, V2 u) const {
-    const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
-    return choose({bits(u_select), bits(u.x), bits(u.y)});
-  }
   // Light arriving at x from the chosen light; nothing if none can (behind, outside the cone, zero solid
   // angle).
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;

@@ -53,15 +53,16 @@ class PathTracer {
     float length = 0, t = 0, flight_pdf = 0;
   };
 
-  bool scatter_in_medium(const Medium& medium, float t_max);
+  std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
   void focus_on_light(const Medium& medium, float t_max);
-  bool scatter_on_surface(const SurfaceHit& hit);
+  std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   void pass_boundary(const SurfaceHit& hit);
   void light_surface(const SurfaceHit& hit, const V3& wo);
   void light_medium(const Medium& medium, const V3& p, const V3& d);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
-  C3 unoccluded(const V3& p, const LightSample& light, std::uint32_t medium, RandomStream stream) const;
+  C3 unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
+                RandomStream stream);
   bool survives(float u);
 
   void add(const C3& weighted) {
@@ -92,15 +93,23 @@ class PathTracer {
     if (!last_.focused) return 0;
     return EquiAngular(last_.o, last_.d, last_.length, pivot).pdf(last_.t) / last_.flight_pdf;
   }
+  // What a point at this distance from a surface along the ray lacks of the offset that keeps it clear of it.
+  V3 clear_of(const V3& offset, float distance) const {
+    const float share = distance * std::abs(dot(offset, d_)) / dot(offset, offset);
+    return share < 1 ? offset * (1 - share) : V3(0);
+  }
   std::uint32_t medium_beyond(const SurfaceHit& hit, const V3& w, std::uint32_t current) const {
     const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
-    if (!s.transition) return current;
+    if (!s.transition || !world_.use_media) return current;
     return dot(w, hit.ng) > 0 ? s.exterior : s.interior;
   }
 
   const World& world_;
   const SampleStream& stream_;
-  V3 o_{0, 0, 0}, d_{0, 0, 1};
+  // Where the path stands, and where its next ray is sent from: moved off a surface, so that it does not meet
+  // it again. A medium fills the way between them too (over a mean free path of a medium of optical depth
+  // 1e6).
+  V3 start_{0, 0, 0}, o_{0, 0, 0}, d_{0, 0, 1};
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
   float eta_scale_ = 1;  // undoes the radiance scaling of refraction in roulette decisions
   int hero_ = 0;
@@ -114,7 +123,8 @@ class PathTracer {
 
 template <Features F>
 SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
-  o_ = ray.o;
+  if (!world_.depth_allows(0)) return outcome_;
+  start_ = o_ = ray.o;
   d_ = ray.d;
   last_.p = o_;
   if constexpr (F.media) medium_ = world_.use_media ? world_.camera_medium : kNone;
@@ -126,15 +136,16 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
     const bool met = primitive && world_.geometry.complete(*primitive, o_, d_, hit);
     if constexpr (F.media) {
       if (medium_ != kNone) {
-        if (scatter_in_medium(world_.media[medium_], met ? hit.t : kInfinity)) {
-          if (!survives(stream_.group(depth_, Purpose::direction).u(3))) break;
+        if (const auto u = scatter_in_medium(world_.media[medium_], met ? &hit : nullptr)) {
+          if (!survives(*u)) break;
           continue;
         }
         if (!world_.depth_allows(depth_) || is_black(beta_)) break;
       }
     }
     if (!met) {
-      add_environment();
+      outcome_.cut_off = !is_finite(d_);  // a direction that is none meets nothing: a rejected sample
+      if (!outcome_.cut_off) add_environment();
       break;
     }
     add_emission(hit);
@@ -142,39 +153,43 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
       pass_boundary(hit);
       continue;
     }
-    if (!scatter_on_surface(hit) || !survives(stream_.group(depth_, Purpose::direction).u(3))) break;
+    const auto u = scatter_on_surface(hit);
+    if (!u || !survives(*u)) break;
   }
-  outcome_.cut_off = segment_ == kMaxSegments;
+  outcome_.cut_off = outcome_.cut_off || segment_ == kMaxSegments;
   outcome_.majorant_violations = counters_.majorant_violations;
   return outcome_;
 }
 
-// True: the path goes on from a vertex in the medium (or has ended there, with beta black). False: it reached
-// t_max.
+// A number for roulette: the path goes on from a vertex in the medium. Nothing: it reached the end of the
+// segment, if there is one, or has ended on the way, with beta black.
 template <Features F>
-bool PathTracer<F>::scatter_in_medium(const Medium& medium, float t_max) {
+std::optional<float> PathTracer<F>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
+  const float lead = dot(o_ - start_, d_), t_max = end ? end->t + lead : kInfinity;
   const bool may_scatter = world_.depth_allows(depth_ + 1);
   const bool focused = world_.equiangular && !medium.grid && std::isfinite(t_max) && may_scatter;
   if (focused) focus_on_light(medium, t_max);
   const Group numbers = stream_.group(segment_, Purpose::flight);
-  Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], o_, d_, t_max,
-                                 stream_.stream(segment_, Purpose::track_flight), counters_);
+  const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], start_, d_, t_max,
+                                       stream_.stream(segment_, Purpose::track_flight), counters_);
   if (!flight.scattered) {
     apply(flight);
-    return false;
+    return std::nullopt;
   }
   if (!may_scatter) {
     beta_ = C3(0);
-    return false;
+    return std::nullopt;
   }
-  // Not onto or through the surface that ends the segment.
-  flight.t = std::min(flight.t, t_max * (1 - 0x1p-20f));
   last_ = Vertex{};
-  last_.p = o_ + d_ * flight.t;
+  last_.p = start_ + d_ * flight.t;
+  // A vertex keeps as far from the surfaces at both ends as rays that leave them: rounding must not put it on
+  // the other side, where the medium has no end.
+  if (lead > 0) last_.p += clear_of(o_ - start_, flight.t);
+  if (end) last_.p += clear_of(offset_point(end->p, end->ng, -d_) - end->p, t_max - flight.t);
   last_.delta = false;
   if (focused) {
     last_.focused = true;
-    last_.o = o_;
+    last_.o = start_;
     last_.d = d_;
     last_.length = t_max;
     last_.t = flight.t;
@@ -187,18 +202,18 @@ bool PathTracer<F>::scatter_in_medium(const Medium& medium, float t_max) {
   const Group direction = stream_.group(depth_, Purpose::direction);
   const PhaseSample s = medium.phase.sample(d_, {direction.u(0), direction.u(1)});
   last_.pdf = s.pdf;
-  o_ = last_.p;
+  start_ = o_ = last_.p;
   d_ = s.w;
-  return true;
+  return direction.u(3);
 }
 
 // Strategy (3): light scattered once, from a vertex near the light.
 template <Features F>
 void PathTracer<F>::focus_on_light(const Medium& medium, float t_max) {
   const Group g = stream_.group(segment_, Purpose::segment);
-  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
   if (!choice.has_place || !(t_max > 0)) return;
-  const EquiAngular::Sample s = EquiAngular(o_, d_, t_max, choice.pivot).sample(g.u(3));
+  const EquiAngular::Sample s = EquiAngular(start_, d_, t_max, choice.pivot).sample(g.u(3));
   const auto light = world_.lights.sample(choice, s.p);
   if (!light || !(s.pdf > 0)) return;
   const float phase = medium.phase.value(d_, light->direction);
@@ -206,7 +221,7 @@ void PathTracer<F>::focus_on_light(const Medium& medium, float t_max) {
   const float share = light->delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
   const float weight = light->delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f)
                                     : (std::isfinite(ratio) ? share : 1.f);
-  const C3 arriving = unoccluded(s.p, *light, medium_, stream_.stream(segment_, Purpose::track_segment));
+  const C3 arriving = unoccluded(s.p, s.p, *light, medium_, stream_.stream(segment_, Purpose::track_segment));
   if (is_black(arriving)) return;
   C3 in_scattered;
   for (int c = 0; c < 3; ++c) in_scattered[c] = medium.sigma_s[c] * std::exp(-medium.sigma_t[c] * s.t);
@@ -218,69 +233,71 @@ template <Features F>
 void PathTracer<F>::light_medium(const Medium& medium, const V3& p, const V3& d) {
   if (!world_.lights.can_sample()) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
   const auto light = world_.lights.sample(choice, p);
   if (!light) return;
   const float phase = medium.phase.value(d, light->direction);
   const float with_focus = 1 + (choice.has_place ? focus(choice.pivot) : 0.f);
   const float weight = light->delta ? 1 / with_focus : light->pdf / (light->pdf * with_focus + phase);
-  const C3 arriving = unoccluded(p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
+  const C3 arriving = unoccluded(p, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
 }
 
 // Strategy (1) at a surface.
 template <Features F>
 void PathTracer<F>::light_surface(const SurfaceHit& hit, const V3& wo) {
-  const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
-  if (!world_.lights.can_sample() || !world_.bsdfs.has_smooth(bsdf)) return;
+  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+  if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose(g.u(0), {g.u(1), g.u(2)});
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // The shading normal must not let light through a surface that the geometric one closes.
-  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0) && !world_.bsdfs.transmits(bsdf)) return;
-  const BsdfEval f = world_.bsdfs.eval(bsdf, hit.uv, wo, wi);
+  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0) && !surface.transmits) return;
+  const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv, wo, wi);
   if (is_black(f.f_cos)) return;
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
   const V3 p = offset_point(hit.p, hit.ng, light->direction);
   std::uint32_t medium = kNone;
   if constexpr (F.media) medium = medium_beyond(hit, light->direction, medium_);
-  const C3 arriving = unoccluded(p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
+  const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
 }
 
-// False: absorbed, or too deep.
+// A number for roulette, or nothing: absorbed, or too deep.
 template <Features F>
-bool PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
-  if (!world_.depth_allows(depth_ + 1)) return false;
+std::optional<float> PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
+  if (!world_.depth_allows(depth_ + 1)) return std::nullopt;
   ++depth_;
   const V3 wo = hit.shading.to_local(-d_);
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
   const auto s =
       world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv, wo, g.u(2), {g.u(0), g.u(1)});
-  if (!s) return false;
+  if (!s) return std::nullopt;
   const V3 w = normalize(hit.shading.to_world(s->wi));
-  if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return false;  // through the true surface: no such light
+  if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return std::nullopt;  // through the true surface: no such light
   beta_ *= s->weight;
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;
   last_ = Vertex{};
   last_.p = hit.p;
   last_.pdf = s->pdf;
   last_.delta = s->delta;
+  start_ = hit.p;
   o_ = offset_point(hit.p, hit.ng, w);
   d_ = w;
-  if constexpr (F.media) {
-    if (s->transmitted) medium_ = medium_beyond(hit, w, medium_);
-  }
-  return true;
+  // Reflected rays too: what lies on either side of a surface is the scene's word (as for next-event
+  // estimation).
+  if constexpr (F.media) medium_ = medium_beyond(hit, w, medium_);
+  return g.u(3);
 }
 
 template <Features F>
 void PathTracer<F>::pass_boundary(const SurfaceHit& hit) {
+  start_ = hit.p;
   o_ = offset_point(hit.p, hit.ng, d_);
-  if constexpr (F.media) medium_ = world_.use_media ? medium_beyond(hit, d_, medium_) : kNone;
+  if constexpr (F.media) medium_ = medium_beyond(hit, d_, medium_);
 }
 
 template <Features F>
@@ -302,12 +319,12 @@ void PathTracer<F>::add_environment() {
   add(beta_ * world_.lights.environment());
 }
 
-// Light that gets from the sampled light to p, through null boundaries and media. p may have been moved off
-// its surface after the light was sampled from it: the ray is aimed anew, so that it ends in front of the
-// light and not on it.
+// Light that gets from the sampled light to `start`, through null boundaries and media. p is `start`, moved
+// off its surface after the light was sampled: the ray is aimed anew, so that it ends in front of the light
+// and not on it.
 template <Features F>
-C3 PathTracer<F>::unoccluded(const V3& p, const LightSample& light, std::uint32_t medium,
-                             RandomStream stream) const {
+C3 PathTracer<F>::unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
+                             RandomStream stream) {
   V3 d = light.direction;
   float left = light.distance;
   if (std::isfinite(left)) {
@@ -320,23 +337,25 @@ C3 PathTracer<F>::unoccluded(const V3& p, const LightSample& light, std::uint32_
   C3 value = light.radiance;
   if constexpr (F.media) {
     if (!world_.use_media || (medium == kNone && !world_.accel.has_boundaries())) return value;
-    V3 o = p;
+    V3 from = start, o = p;
     for (int i = 0; i < kMaxSegments; ++i) {
       SurfaceHit hit;
       const auto primitive = world_.accel.nearest_boundary(o, d, left);
       const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
       if (medium != kNone) {
-        const float t = met ? std::min(hit.t, left) : left;
-        value *= transmittance<F>(world_.media[medium], o, d, 0, t, RandomStream(stream.next()));
+        const float t = (met ? std::min(hit.t, left) : left) + dot(o - from, d);
+        value *= transmittance<F>(world_.media[medium], from, d, 0, t, RandomStream(stream.next()));
         if (is_black(value)) return value;
       }
       if (!met) return value;
       medium = medium_beyond(hit, d, medium);
       const V3 next = offset_point(hit.p, hit.ng, d);
       if (std::isfinite(left)) left -= dot(next - o, d);
+      from = hit.p;
       o = next;
       if (!(left > 0)) return value;
     }
+    outcome_.cut_off = true;
     return {0, 0, 0};
   }
   return value;

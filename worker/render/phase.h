@@ -27,9 +27,9 @@ struct HenyeyGreenstein {
     const float sine =
         2 * (1 - a) * (1 + a) * std::sqrt(xi * (1 - xi) * (1 + a * xi) * ((1 - a) + a * xi)) * inv2;
     const float cosine = g >= 0 ? 1 - x : x - 1;
-    const float angle = kTwoPi * u.y;
+    const V2 c = unit_circle(u.y) * sine;
     const Frame frame(w);
-    const V3 w1 = frame.to_world({sine * std::cos(angle), sine * std::sin(angle), cosine});
+    const V3 w1 = frame.to_world({c.x, c.y, cosine});
     return {normalize(w1), from_x(x)};
   }
 

@@ -39,13 +39,14 @@ class SampleStream {
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
       : index_(sample >> 1),
         sequence_(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1)),
-        sample_(combine(sequence_, index_)) {}
+        sample_(combine(sequence_, index_)),
+        reversed_(reverse_bits(static_cast<std::uint32_t>(index_))) {}
 
   Group group(int vertex, Purpose purpose) const {
     const auto slot = (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose);
     // A Sobol sequence of 32-bit points has 2^32 members; samples beyond are drawn by hash.
     if (vertex < kSobolVertices && index_ >> 32 == 0) {
-      return {sobol4(static_cast<std::uint32_t>(index_), combine(sequence_, slot))};
+      return {sobol4_reversed(reversed_, combine(sequence_, slot))};
     }
     const std::uint64_t a = combine(sample_, slot), b = mix64(a + 0x9e3779b97f4a7c15ull);
     return {{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a >> 32),
@@ -61,6 +62,7 @@ class SampleStream {
   std::uint64_t index_;     // within the half
   std::uint64_t sequence_;  // names the half of the pixel
   std::uint64_t sample_;    // names the sample
+  std::uint32_t reversed_;  // the index, its bits reversed
 };
 
 }  // namespace ls::render

@@ -18,8 +18,9 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) {
 }
 
 // An Owen scramble in bit-reversed order: bit i of the result depends on bits 0..i only (Laine and Karras
-// 2011, with the constants of Vegdahl 2021).
-constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t seed) {
+// 2011, with the constants of Vegdahl 2021). Of one word, or of a vector of words.
+template <class U>
+constexpr U scramble_reversed(U x, U seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
   x *= (seed >> 16) | 1u;
@@ -51,22 +52,36 @@ constexpr std::array<std::array<std::uint32_t, 32>, 3> direction_numbers() {
   return v;
 }
 
-// XOR of direction numbers for each value of each byte of the index, already bit-reversed: point bits in
-// reversed order are what the scramble wants.
+using U32x4 = std::uint32_t __attribute__((vector_size(16)));
+using U8x16 = std::uint8_t __attribute__((vector_size(16)));
+
+// In all four lanes; half bytes are looked up.
+inline U32x4 reverse_bits(U32x4 x) {
+  constexpr U8x16 kNibble = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15};
+  constexpr U8x16 kBytes = {3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12};
+  const auto bytes = __builtin_shuffle(reinterpret_cast<U8x16>(x), kBytes);
+  return reinterpret_cast<U32x4>((__builtin_shuffle(kNibble, bytes & 15) << 4) |
+                                 __builtin_shuffle(kNibble, bytes >> 4));
+}
+
+// For each value of each byte of the bit-reversed index: what it adds (XOR) to the four coordinates,
+// themselves bit-reversed, as the scramble wants them.
 struct SobolTables {
-  std::uint32_t value[3][4][256];
+  alignas(16) std::uint32_t value[4][256][4];
 };
 constexpr SobolTables sobol_tables() {
   const auto v = direction_numbers();
   SobolTables t{};
-  for (int d = 0; d < 3; ++d) {
-    for (int byte = 0; byte < 4; ++byte) {
-      for (unsigned k = 0; k < 256; ++k) {
+  for (int byte = 0; byte < 4; ++byte) {
+    for (std::uint32_t k = 0; k < 256; ++k) {
+      const std::uint32_t index = ls::render::reverse_bits(k << (8 * byte));
+      t.value[byte][k][0] = index;  // the first coordinate is the reversed index
+      for (int d = 0; d < 3; ++d) {
         std::uint32_t x = 0;
-        for (int bit = 0; bit < 8; ++bit) {
-          if ((k >> bit) & 1) x ^= v[d][8 * byte + bit];
+        for (int bit = 0; bit < 32; ++bit) {
+          if ((index >> bit) & 1) x ^= v[d][bit];
         }
-        t.value[d][byte][k] = reverse_bits(x);
+        t.value[byte][k][d + 1] = ls::render::reverse_bits(x);
       }
     }
   }
@@ -74,23 +89,28 @@ constexpr SobolTables sobol_tables() {
 }
 inline constexpr SobolTables kSobol = sobol_tables();
 
-inline std::uint32_t sobol_reversed(std::uint32_t index, int d) {
-  const auto& t = kSobol.value[d];
-  return t[0][index & 255] ^ t[1][(index >> 8) & 255] ^ t[2][(index >> 16) & 255] ^ t[3][index >> 24];
+inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
+  const auto row = [&](int byte) {
+    return *reinterpret_cast<const U32x4*>(kSobol.value[byte][(reversed_index >> (8 * byte)) & 255]);
+  };
+  return row(0) ^ row(1) ^ row(2) ^ row(3);
 }
 
 }  // namespace detail
 
-// Four coordinates of point `index` of the sequence named by `key`, as 32-bit fractions.
-inline std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
-  const auto shuffle_seed = static_cast<std::uint32_t>(key);
-  const std::uint32_t i = reverse_bits(scramble_reversed(reverse_bits(index), shuffle_seed));
+// Four coordinates of a point of the sequence named by `key`, as 32-bit fractions. `reversed_index` is the
+// point's index with its bits reversed.
+inline std::array<std::uint32_t, 4> sobol4_reversed(std::uint32_t reversed_index, std::uint64_t key) {
+  using detail::U32x4;
+  const std::uint32_t i = scramble_reversed(reversed_index, static_cast<std::uint32_t>(key));
   const std::uint64_t k1 = mix64(key), k2 = mix64(key + 1);
-  return {
-      reverse_bits(scramble_reversed(i, static_cast<std::uint32_t>(k1))),
-      reverse_bits(scramble_reversed(detail::sobol_reversed(i, 0), static_cast<std::uint32_t>(k1 >> 32))),
-      reverse_bits(scramble_reversed(detail::sobol_reversed(i, 1), static_cast<std::uint32_t>(k2))),
-      reverse_bits(scramble_reversed(detail::sobol_reversed(i, 2), static_cast<std::uint32_t>(k2 >> 32)))};
+  const U32x4 seeds = {static_cast<std::uint32_t>(k1), static_cast<std::uint32_t>(k1 >> 32),
+                       static_cast<std::uint32_t>(k2), static_cast<std::uint32_t>(k2 >> 32)};
+  const U32x4 x = detail::reverse_bits(scramble_reversed(detail::sobol_reversed(i), seeds));
+  return {x[0], x[1], x[2], x[3]};
+}
+inline std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
+  return sobol4_reversed(reverse_bits(index), key);
 }
 
 }  // namespace ls::render

@@ -154,6 +154,18 @@ Features needs_of(const World& w) {
   return f;
 }
 
+// What hits on each surface must carry.
+void note_surface_needs(const Scene& scene, World& w) {
+  for (std::size_t i = 0; i < w.geometry.surfaces.size(); ++i) {
+    SurfaceInfo& s = w.geometry.surfaces[i];
+    const auto& emitter = scene.shapes[i].emitter;
+    s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
+    s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
+    s.smooth = w.bsdfs.has_smooth(s.bsdf);
+    s.transmits = w.bsdfs.transmits(s.bsdf);
+  }
+}
+
 Result<void> check_indices(const Scene& scene) {
   const auto bad = [](std::uint32_t i, std::size_t n) { return i >= n; };
   for (const Shape& s : scene.shapes) {
@@ -201,6 +213,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!bsdfs) return tl::unexpected(bsdfs.error());
   w.bsdfs = std::move(*bsdfs);
   w.clamped_inputs += w.textures.clamped_texels() + w.bsdfs.clamped_inputs();
+  note_surface_needs(scene, w);
   if (w.use_media) {
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;

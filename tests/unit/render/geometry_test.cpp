@@ -151,9 +151,22 @@ ls::Geometry named(const std::string& name) {
   return SphereShape{};
 }
 
+// A material that wants all that a hit can say.
+BsdfIndex brushed_and_textured(SceneKit& kit) {
+  const TextureIndex grey = kit.texture({.5, .5, .5}), white = kit.texture({1, 1, 1});
+  RoughConductorBsdf b;
+  b.alpha_u = kit.texture({.1, .1, .1});
+  b.alpha_v = kit.texture({.3, .3, .3});
+  b.specular_reflectance =
+      SceneKit::push<TextureTag>(kit.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
+  return SceneKit::push<BsdfTag>(kit.scene.bsdfs, Bsdf(b));
+}
+
 TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
   for (const Seen& s : kSeen) {
-    const SurfaceHit h = hit_from(*one(named(s.shape), {}, false), s.from, s.to);
+    SceneKit kit;
+    kit.shape(named(s.shape), {}, brushed_and_textured(kit));
+    const SurfaceHit h = hit_from(*test::world_of(kit), s.from, s.to);
     expect_near(h.shading.n, s.normal, s.shape);
     expect_near({h.uv.x, h.uv.y, 0}, {s.uv.x, s.uv.y, 0}, s.shape);
     expect_near(h.shading.s, s.along_u, s.shape);

@@ -17,6 +17,12 @@ using test::SceneKit;
 using test::operator*;
 using test::translate;
 
+// From numbers in [0, 1).
+LightNumbers numbers(float light, float x, float y) {
+  const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
+  return {bits(light), bits(x), bits(y)};
+}
+
 // A scene of one light; its world, and points given in scene coordinates.
 struct Bench {
   std::shared_ptr<const World> world;
@@ -33,7 +39,7 @@ struct Bench {
     for (int i = 0; i < side * side; ++i) {
       const float u = (static_cast<float>(i % side) + r.uniform()) / static_cast<float>(side);
       const float v = (static_cast<float>(i / side) + r.uniform()) / static_cast<float>(side);
-      const auto s = world->lights.sample(world->lights.choose(r.uniform(), {u, v}), at(x));
+      const auto s = world->lights.sample(world->lights.choose(numbers(r.uniform(), u, v)), at(x));
       const double e = s ? s->radiance.x * std::max(0.f, dot(n, s->direction)) / s->pdf : 0;
       sum += e;
       square += e * e;
@@ -153,7 +159,7 @@ TEST(Lights, DensityOfAHitIsThatOfItsSample) {
     int hits = 0;
     for (int i = 0; i < 2000; ++i) {
       const float u = r.uniform(), v = r.uniform();
-      const auto s = b.world->lights.sample(b.world->lights.choose(0, {u, v}), x);
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
       if (!s) continue;
       const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
       SurfaceHit hit;
@@ -195,7 +201,7 @@ TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
     int same = 0, count = 0;
     for (int i = 0; i < 2000; ++i) {
       const float u = r.uniform(), v = r.uniform();
-      const auto s = b.world->lights.sample(b.world->lights.choose(0, {u, v}), x);
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
       SurfaceHit hit;
       if (!s || !b.world->geometry.complete({PrimitiveId::Kind::sphere, 0}, x, s->direction, hit)) continue;
       ++count;
@@ -277,9 +283,9 @@ TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
   SurfaceHit hit;
   const V3 from_out = outside.at({0, 0, -3}), from_in = inside.at({0, 0, .5});
   ASSERT_TRUE(outside.world->geometry.complete({PrimitiveId::Kind::sphere, 0}, from_out, {0, 0, 1}, hit));
-  EXPECT_FALSE(outside.world->lights.sample(outside.world->lights.choose(0, {.3f, .4f}), from_out));
+  EXPECT_FALSE(outside.world->lights.sample(outside.world->lights.choose(numbers(0, .3f, .4f)), from_out));
   EXPECT_EQ(outside.world->lights.pdf(hit, from_out, {0, 0, 1}), 0.f);
-  EXPECT_FALSE(inside.world->lights.sample(inside.world->lights.choose(0, {.3f, .4f}), from_in));
+  EXPECT_FALSE(inside.world->lights.sample(inside.world->lights.choose(numbers(0, .3f, .4f)), from_in));
   EXPECT_EQ(inside.world->lights.pdf(hit, from_in, {0, 0, 1}), 0.f);
 }
 

@@ -51,6 +51,8 @@ class BsdfTable {
   bool is_null(BsdfIndex i) const;     // index-matched boundary: light passes unchanged
   bool has_smooth(BsdfIndex i) const;  // any lobe that is not a delta: next-event estimation makes sense
   bool transmits(BsdfIndex i) const;   // light can cross the surface (null, dielectric)
+  bool reads_uv(BsdfIndex i) const;     // some value of it is a texture
+  bool anisotropic(BsdfIndex i) const;  // the tangents of the local frame matter
   std::size_t size() const;
   std::uint64_t bytes() const;
   std::uint64_t clamped_inputs() const;  // reflectances above 1 or below 0 brought into [0, 1]

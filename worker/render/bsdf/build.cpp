@@ -205,5 +205,17 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
       return false;
   }
 }
+bool BsdfTable::reads_uv(BsdfIndex i) const {
+  const Material& m = materials_[i.value];
+  if (m.kind == MaterialKind::two_sided) return reads_uv({m.front}) || reads_uv({m.back});
+  return !(m.specular_slot.constant && m.second_slot.constant && m.alpha_u.constant && m.alpha_v.constant);
+}
+bool BsdfTable::anisotropic(BsdfIndex i) const {
+  const Material& m = materials_[i.value];
+  if (m.kind == MaterialKind::two_sided) return anisotropic({m.front}) || anisotropic({m.back});
+  const bool same = m.alpha_u.constant ? m.alpha_v.constant && m.alpha_u.value == m.alpha_v.value
+                                       : !m.alpha_v.constant && m.alpha_u.texture == m.alpha_v.texture;
+  return m.kind == MaterialKind::rough_conductor && !same;
+}
 
 }  // namespace ls::render

@@ -42,8 +42,9 @@ inline float pdf_over_D(const V3& wo, float ax, float ay) {
 inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
   const float b = bound_k(wo, ax, ay) * i.z;
-  const float z = (1 - u.y) * (1 + b) - b, r = safe_sqrt((1 - z) * (1 + z)), angle = kTwoPi * u.x;
-  const V3 m = V3(r * std::cos(angle), r * std::sin(angle), z) + i;
+  const float z = (1 - u.y) * (1 + b) - b, r = safe_sqrt((1 - z) * (1 + z));
+  const V2 c = unit_circle(u.x) * r;
+  const V3 m = V3(c.x, c.y, z) + i;
   return normalize(V3(ax * m.x, ay * m.y, std::max(m.z, 0.f)));
 }
 }  // namespace ggx

@@ -1,5 +1,4 @@
-// eval() and sample(). Both take the values of a material's textures once, as a Lobes value, so that value,
-// density and sampling of one vertex can't disagree.
+// eval() and sample(): the lobes of each kind of material.
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
 

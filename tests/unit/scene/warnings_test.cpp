@@ -1,0 +1,97 @@
+// What is read and means nothing here: warnings, and errors with --strict.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/diagnostic.h"
+#include "tests/unit/scene/scene_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string shape(const std::string& inside) { return "<shape type=\"sphere\">" + inside + "</shape>"; }
+
+TEST(Warnings, MeaninglessParametersAreWarningsAndErrorsWhenStrict) {
+  const std::string text =
+      with_sensor("<bsdf type=\"roughplastic\"><boolean name=\"sample_visible\" value=\"true\"/></bsdf>");
+  const auto r = read(text);
+  ASSERT_TRUE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), 1u);
+  EXPECT_EQ(r.diagnostics[0].severity, Diagnostic::Severity::warning);
+  EXPECT_THAT(r.diagnostics[0].text,
+              HasSubstr("'sample_visible' of bsdf \"roughplastic\" has no effect here"));
+
+  const auto strict = read(text, {.strict = true});
+  EXPECT_FALSE(strict.scene);
+  EXPECT_EQ(strict.diagnostics.at(0).severity, Diagnostic::Severity::error);
+}
+
+TEST(Warnings, FieldsWithoutEffectAreToldOf) {
+  const struct {
+    std::string sensor, objects, said;
+  } rows[] = {
+      {"<float name=\"focus_distance\" value=\"3\"/>", "",
+       "'focus_distance' of sensor \"perspective\" has no effect here"},
+      {"<string name=\"fov_axis\" value=\"y\"/>", "",
+       "'fov_axis' of sensor \"perspective\" has no effect here"},
+      {"", "<emitter type=\"constant\"><transform name=\"to_world\"/></emitter>",
+       "'to_world' of emitter \"constant\" has no effect here"},
+      {"", "<volume type=\"constvolume\"><transform name=\"to_world\"/></volume>",
+       "'to_world' of volume \"constvolume\" has no effect here"},
+  };
+  for (const auto& row : rows) {
+    const auto r = read("<scene version=\"3.0.0\">" + row.objects + "<sensor type=\"perspective\">" +
+                        row.sensor + "</sensor></scene>");
+    EXPECT_TRUE(r.scene) << messages(r);
+    ASSERT_EQ(r.diagnostics.size(), 1u) << row.said;
+    EXPECT_THAT(r.diagnostics[0].text, HasSubstr(row.said));
+  }
+  // With a fov, its axis does mean something.
+  EXPECT_TRUE(read("<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>"
+                   "<string name=\"fov_axis\" value=\"y\"/></sensor></scene>")
+                  .diagnostics.empty());
+}
+
+TEST(Warnings, WhatADefinePutsInMustBeText) {
+  const std::string text = with_sensor("<default name=\"f\" value=\"b\"/><bsdf type=\"null\" id=\"$f\"/>");
+  EXPECT_TRUE(read(text, {.defines = {{"f", "ä b"}}}).scene);
+  for (const char* bad : {"\xff", "a\x1b[2J", "\xed\xa0\x80"}) {
+    const auto r = read(text, {.defines = {{"f", bad}}});
+    EXPECT_FALSE(r.scene);
+    EXPECT_EQ(r.diagnostics.at(0).place, (SourcePlace{"test.xml", 2, 52}));
+    EXPECT_THAT(r.diagnostics.at(0).text, HasSubstr("no UTF-8 text, or control characters"));
+  }
+}
+
+TEST(Warnings, DefinesThatNothingAsksForAreWarnedAbout) {
+  const std::string used =
+      "<default name=\"radius\" value=\"1\"/>" + shape("<float name=\"radius\" value=\"$radius\"/>");
+  EXPECT_TRUE(read(with_sensor(used), {.defines = {{"radius", "2"}}}).diagnostics.empty());
+
+  const auto r = read(with_sensor(used), {.defines = {{"radus", "2"}}});
+  ASSERT_TRUE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), 1u);
+  EXPECT_EQ(r.diagnostics[0].severity, Diagnostic::Severity::warning);
+  EXPECT_EQ(r.diagnostics[0].place, (SourcePlace{"test.xml", 1, 2}));
+  EXPECT_EQ(r.diagnostics[0].text,
+            "nothing in the scene asks for $radus, which was defined for it; did you mean 'radius'?");
+
+  EXPECT_FALSE(read(with_sensor(used), {.defines = {{"radus", "2"}}, .strict = true}).scene);
+  EXPECT_THAT(messages(read(with_sensor(used), {.defines = {{"z", "2"}}})), HasSubstr("known here: radius"));
+  EXPECT_THAT(messages(read(with_sensor(""), {.defines = {{"z", "2"}}})), HasSubstr("it has no parameters"));
+  // Declared, but in no value: it would change nothing.
+  EXPECT_THAT(messages(read(with_sensor("<default name=\"n\" value=\"1\"/>"), {.defines = {{"n", "2"}}})),
+              HasSubstr("asks for $n"));
+}
+
+TEST(Warnings, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
+  const auto r =
+      read(with_sensor("<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" "
+                       "id=\"m\"/></shape>"));
+  ASSERT_TRUE(r.scene);
+  EXPECT_THAT(r.diagnostics.at(0).text, HasSubstr("<bsdf type=\"null\"/>"));
+}
+
+}  // namespace
+}  // namespace ls

@@ -1,0 +1,29 @@
+// How long render threads stand still between two units of one job: from the last sample of one to the first
+// of the next. A histogram of eight steps an octave from a microsecond on, so that quantiles are good to 10
+// %.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+namespace ls::worker {
+
+class GapMeter {
+ public:
+  void add(double seconds);
+  std::uint64_t count() const { return count_; }
+  double total() const { return total_; }      // seconds
+  double longest() const { return longest_; }  // seconds
+  // Seconds that a share q of all gaps stays within; 0 if there were none.
+  double quantile(double q) const;
+  std::string text() const;  // for the log
+
+ private:
+  static constexpr int kSteps = 8 * 32;
+  std::array<std::uint64_t, kSteps> counts_{};
+  std::uint64_t count_ = 0;
+  double total_ = 0, longest_ = 0;
+};
+
+}  // namespace ls::worker
