@@ -1,10 +1,9 @@
-#include "proto/convert.h"
-
+// Messages from their wire form: everything is checked, strangers write it.
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "common/base/overloaded.h"
+#include "proto/convert.h"
 #include "proto/convert_check.h"
 
 // Unwraps a Result inside a function that returns one: on an error, returns it.
@@ -22,22 +21,9 @@ Result<void> bounded(int count, std::size_t limit, const char* field) {
   return {};
 }
 
-// ---- parts
-
-void put(const UnitKey& key, pb::UnitKey* out) {
-  out->set_job(key.job.value);
-  out->set_tile(key.tile);
-  out->set_round(key.round);
-}
-
 Result<UnitKey> key_from(const pb::UnitKey& in) {
   LS_TRY(job, id_from(in.job(), "unit.job"));
   return UnitKey{JobId{job}, in.tile(), in.round()};
-}
-
-void put(const Error& error, pb::Problem* out) {
-  out->set_code(std::string(to_string(error.code)));
-  out->set_message(sendable(error.message, limits::kTextBytes));
 }
 
 Result<Error> problem_from(const pb::Problem& in) {
@@ -53,18 +39,6 @@ Result<LeaseUnit> lease_unit_from(const pb::LeaseUnit& in) {
   LS_TRY(rect, rect_from(in.rect(), "units.rect"));
   LS_TRY(samples, range_from(in.s0(), in.s1(), "units.s0,s1"));
   return LeaseUnit{in.tile(), in.round(), rect, samples};
-}
-
-void put(const JobBrief& brief, pb::JobBrief* out) {
-  out->set_job(brief.job.value);
-  out->set_scene(digest_bytes(brief.scene));
-  out->set_settings(canonical_json(brief.settings));
-  for (const BlobRef& asset : brief.assets) {
-    pb::Blob* blob = out->add_assets();
-    blob->set_digest(digest_bytes(asset.digest));
-    blob->set_bytes(asset.bytes);
-    blob->set_name(sendable(asset.name, limits::kNameBytes));
-  }
 }
 
 Result<JobBrief> brief_from(const pb::JobBrief& in) {
@@ -85,22 +59,6 @@ Result<JobBrief> brief_from(const pb::JobBrief& in) {
   brief.settings = settings;
   brief.settings_digest = digest_of(settings);
   return brief;
-}
-
-// ---- worker -> coordinator
-
-void put(const WorkerHello& hello, pb::FromWorker& out) {
-  pb::Hello* h = out.mutable_hello();
-  h->set_protocol(hello.protocol);
-  h->set_name(sendable(hello.name, limits::kNameBytes));
-  h->set_build(sendable(hello.build, limits::kNameBytes));
-  h->set_numeric_class(digest_bytes(hello.numeric_class));
-  h->set_threads(hello.threads);
-  h->set_memory_bytes(hello.memory_bytes);
-  for (const std::string& tag : hello.tags) h->add_tags(sendable(tag, limits::kNameBytes));
-  for (const Digest& blob : hello.blobs_held) h->add_blobs_held(digest_bytes(blob));
-  h->set_join_token(hello.join_token);
-  h->set_previous_id(hello.previous_id.value);
 }
 
 Result<FromWorker> hello_from(const pb::Hello& in) {
@@ -138,19 +96,6 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   return hello;
 }
 
-void put(const WorkerProgress& progress, pb::FromWorker& out) {
-  pb::Progress* p = out.mutable_progress();
-  for (const WorkerProgress::Entry& entry : progress.leases) {
-    pb::Progress::Entry* e = p->add_leases();
-    e->set_lease(entry.lease.value);
-    e->set_units_done(entry.units_done);
-  }
-  p->set_activity(sendable(progress.activity, limits::kNameBytes));
-  p->set_cpu_seconds_total(progress.cpu_seconds_total);
-  p->set_rss_bytes(progress.rss_bytes);
-  p->set_load_seconds(progress.load_seconds);
-}
-
 Result<FromWorker> progress_from(const pb::Progress& in) {
   WorkerProgress progress;
   if (auto ok = bounded(in.leases_size(), limits::kLeasesPerWorker, "progress.leases"); !ok)
@@ -167,18 +112,6 @@ Result<FromWorker> progress_from(const pb::Progress& in) {
   progress.rss_bytes = in.rss_bytes();
   progress.load_seconds = load;
   return progress;
-}
-
-void put(const UnitResult& result, pb::FromWorker& out) {
-  pb::UnitResult* r = out.mutable_result();
-  put(result.unit, r->mutable_unit());
-  r->set_lease(result.lease.value);
-  r->set_exr(result.exr.data(), result.exr.size());
-  r->set_digest(digest_bytes(result.digest));
-  r->set_cpu_seconds(result.cpu_seconds);
-  r->set_nonfinite(result.health.nonfinite);
-  r->set_negative(result.health.negative);
-  r->set_majorant_violations(result.health.majorant_violations);
 }
 
 Result<FromWorker> result_from(const pb::UnitResult& in) {
@@ -198,20 +131,6 @@ Result<FromWorker> result_from(const pb::UnitResult& in) {
                     {in.nonfinite(), in.negative(), in.majorant_violations()}};
 }
 
-void put(const UnitFailure& failure, pb::FromWorker& out) {
-  pb::UnitFailure* f = out.mutable_failure();
-  put(failure.unit, f->mutable_unit());
-  f->set_lease(failure.lease.value);
-  f->set_scene_at_fault(failure.scene_at_fault);
-  f->set_reason(sendable(failure.reason, limits::kTextBytes));
-  if (failure.signal) f->set_signal(*failure.signal);
-  if (failure.pixel) {
-    f->set_pixel_x(failure.pixel->first);
-    f->set_pixel_y(failure.pixel->second);
-  }
-  if (failure.sample) f->set_sample(*failure.sample);
-}
-
 Result<FromWorker> failure_from(const pb::UnitFailure& in) {
   UnitFailure failure;
   LS_TRY(unit, key_from(in.unit()));
@@ -227,11 +146,6 @@ Result<FromWorker> failure_from(const pb::UnitFailure& in) {
   return failure;
 }
 
-void put(const LeaseReturned& returned, pb::FromWorker& out) {
-  out.mutable_returned()->set_lease(returned.lease.value);
-  for (const UnitKey& key : returned.unrendered) put(key, out.mutable_returned()->add_units());
-}
-
 Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
   LeaseReturned returned;
   LS_TRY(lease, id_from(in.lease(), "returned.lease"));
@@ -243,38 +157,6 @@ Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
     returned.unrendered.push_back(key);
   }
   return returned;
-}
-
-void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
-
-// ---- coordinator -> worker
-
-void put(const Welcome& welcome, pb::ToWorker& out) {
-  out.mutable_welcome()->set_worker(welcome.worker.value);
-  out.mutable_welcome()->set_epoch(welcome.epoch);
-}
-
-void put(const Refused& refused, pb::ToWorker& out) {
-  put(refused.error, out.mutable_refused()->mutable_problem());
-  out.mutable_refused()->set_retry(refused.retry);
-}
-
-void put(const AssignLease& assign, pb::ToWorker& out) {
-  pb::AssignLease* a = out.mutable_assign();
-  a->set_lease(assign.lease.id.value);
-  a->set_job(assign.lease.job.value);
-  for (const LeaseUnit& unit : assign.lease.units) {
-    pb::LeaseUnit* u = a->add_units();
-    u->set_tile(unit.tile);
-    u->set_round(unit.round);
-    u->mutable_rect()->set_x0(unit.rect.x0);
-    u->mutable_rect()->set_y0(unit.rect.y0);
-    u->mutable_rect()->set_x1(unit.rect.x1);
-    u->mutable_rect()->set_y1(unit.rect.y1);
-    u->set_s0(unit.samples.s0);
-    u->set_s1(unit.samples.s1);
-  }
-  if (assign.brief) put(*assign.brief, a->mutable_brief());
 }
 
 Result<ToWorker> assign_from(const pb::AssignLease& in) {
@@ -296,11 +178,6 @@ Result<ToWorker> assign_from(const pb::AssignLease& in) {
   return assign;
 }
 
-void put(const ResultAck& ack, pb::ToWorker& out) {
-  put(ack.unit, out.mutable_ack()->mutable_unit());
-  if (ack.refused) put(*ack.refused, out.mutable_ack()->mutable_refused());
-}
-
 Result<ToWorker> ack_from(const pb::ResultAck& in) {
   ResultAck ack;
   LS_TRY(unit, key_from(in.unit()));
@@ -312,25 +189,7 @@ Result<ToWorker> ack_from(const pb::ResultAck& in) {
   return ack;
 }
 
-void put(const CancelJob& cancel, pb::ToWorker& out) { out.mutable_cancel_job()->set_job(cancel.job.value); }
-void put(const CancelLease& cancel, pb::ToWorker& out) {
-  out.mutable_cancel_lease()->set_lease(cancel.lease.value);
-}
-void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
-
 }  // namespace
-
-pb::FromWorker to_wire(const FromWorker& message) {
-  pb::FromWorker out;
-  std::visit([&out](const auto& m) { put(m, out); }, message);
-  return out;
-}
-
-pb::ToWorker to_wire(const ToWorker& message) {
-  pb::ToWorker out;
-  std::visit([&out](const auto& m) { put(m, out); }, message);
-  return out;
-}
 
 bool known(const pb::FromWorker& in) { return in.message_case() != pb::FromWorker::MESSAGE_NOT_SET; }
 bool known(const pb::ToWorker& in) { return in.message_case() != pb::ToWorker::MESSAGE_NOT_SET; }
@@ -383,10 +242,6 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       break;
   }
   return wrong("message", "is empty or of a kind that this version does not know");
-}
-
-std::string digest_bytes(const Digest& digest) {
-  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
 }
 
 Result<Digest> digest_from(const std::string& bytes, const char* field) {

@@ -1,0 +1,151 @@
+// Messages to their wire form.
+#include <utility>
+
+#include "common/base/overloaded.h"
+#include "proto/convert.h"
+#include "proto/convert_check.h"
+
+namespace ls::wire {
+namespace {
+
+void put(const UnitKey& key, pb::UnitKey* out) {
+  out->set_job(key.job.value);
+  out->set_tile(key.tile);
+  out->set_round(key.round);
+}
+
+void put(const Error& error, pb::Problem* out) {
+  out->set_code(std::string(to_string(error.code)));
+  out->set_message(sendable(error.message, limits::kTextBytes));
+}
+
+void put(const JobBrief& brief, pb::JobBrief* out) {
+  out->set_job(brief.job.value);
+  out->set_scene(digest_bytes(brief.scene));
+  out->set_settings(canonical_json(brief.settings));
+  for (const BlobRef& asset : brief.assets) {
+    pb::Blob* blob = out->add_assets();
+    blob->set_digest(digest_bytes(asset.digest));
+    blob->set_bytes(asset.bytes);
+    blob->set_name(sendable(asset.name, limits::kNameBytes));
+  }
+}
+
+void put(const WorkerHello& hello, pb::FromWorker& out) {
+  pb::Hello* h = out.mutable_hello();
+  h->set_protocol(hello.protocol);
+  h->set_name(sendable(hello.name, limits::kNameBytes));
+  h->set_build(sendable(hello.build, limits::kNameBytes));
+  h->set_numeric_class(digest_bytes(hello.numeric_class));
+  h->set_threads(hello.threads);
+  h->set_memory_bytes(hello.memory_bytes);
+  for (const std::string& tag : hello.tags) h->add_tags(sendable(tag, limits::kNameBytes));
+  for (const Digest& blob : hello.blobs_held) h->add_blobs_held(digest_bytes(blob));
+  h->set_join_token(hello.join_token);
+  h->set_previous_id(hello.previous_id.value);
+}
+
+void put(const WorkerProgress& progress, pb::FromWorker& out) {
+  pb::Progress* p = out.mutable_progress();
+  for (const WorkerProgress::Entry& entry : progress.leases) {
+    pb::Progress::Entry* e = p->add_leases();
+    e->set_lease(entry.lease.value);
+    e->set_units_done(entry.units_done);
+  }
+  p->set_activity(sendable(progress.activity, limits::kNameBytes));
+  p->set_cpu_seconds_total(progress.cpu_seconds_total);
+  p->set_rss_bytes(progress.rss_bytes);
+  p->set_load_seconds(progress.load_seconds);
+}
+
+void put(const UnitResult& result, pb::FromWorker& out) {
+  pb::UnitResult* r = out.mutable_result();
+  put(result.unit, r->mutable_unit());
+  r->set_lease(result.lease.value);
+  r->set_exr(result.exr.data(), result.exr.size());
+  r->set_digest(digest_bytes(result.digest));
+  r->set_cpu_seconds(result.cpu_seconds);
+  r->set_nonfinite(result.health.nonfinite);
+  r->set_negative(result.health.negative);
+  r->set_majorant_violations(result.health.majorant_violations);
+}
+
+void put(const UnitFailure& failure, pb::FromWorker& out) {
+  pb::UnitFailure* f = out.mutable_failure();
+  put(failure.unit, f->mutable_unit());
+  f->set_lease(failure.lease.value);
+  f->set_scene_at_fault(failure.scene_at_fault);
+  f->set_reason(sendable(failure.reason, limits::kTextBytes));
+  if (failure.signal) f->set_signal(*failure.signal);
+  if (failure.pixel) {
+    f->set_pixel_x(failure.pixel->first);
+    f->set_pixel_y(failure.pixel->second);
+  }
+  if (failure.sample) f->set_sample(*failure.sample);
+}
+
+void put(const LeaseReturned& returned, pb::FromWorker& out) {
+  out.mutable_returned()->set_lease(returned.lease.value);
+  for (const UnitKey& key : returned.unrendered) put(key, out.mutable_returned()->add_units());
+}
+
+void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
+void put(const Welcome& welcome, pb::ToWorker& out) {
+  out.mutable_welcome()->set_worker(welcome.worker.value);
+  out.mutable_welcome()->set_epoch(welcome.epoch);
+}
+
+void put(const Refused& refused, pb::ToWorker& out) {
+  put(refused.error, out.mutable_refused()->mutable_problem());
+  out.mutable_refused()->set_retry(refused.retry);
+}
+
+void put(const AssignLease& assign, pb::ToWorker& out) {
+  pb::AssignLease* a = out.mutable_assign();
+  a->set_lease(assign.lease.id.value);
+  a->set_job(assign.lease.job.value);
+  for (const LeaseUnit& unit : assign.lease.units) {
+    pb::LeaseUnit* u = a->add_units();
+    u->set_tile(unit.tile);
+    u->set_round(unit.round);
+    u->mutable_rect()->set_x0(unit.rect.x0);
+    u->mutable_rect()->set_y0(unit.rect.y0);
+    u->mutable_rect()->set_x1(unit.rect.x1);
+    u->mutable_rect()->set_y1(unit.rect.y1);
+    u->set_s0(unit.samples.s0);
+    u->set_s1(unit.samples.s1);
+  }
+  if (assign.brief) put(*assign.brief, a->mutable_brief());
+}
+
+void put(const ResultAck& ack, pb::ToWorker& out) {
+  put(ack.unit, out.mutable_ack()->mutable_unit());
+  if (ack.refused) put(*ack.refused, out.mutable_ack()->mutable_refused());
+}
+
+void put(const CancelJob& cancel, pb::ToWorker& out) { out.mutable_cancel_job()->set_job(cancel.job.value); }
+void put(const CancelLease& cancel, pb::ToWorker& out) {
+  out.mutable_cancel_lease()->set_lease(cancel.lease.value);
+}
+
+void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
+
+}  // namespace
+
+pb::FromWorker to_wire(const FromWorker& message) {
+  pb::FromWorker out;
+  std::visit([&out](const auto& m) { put(m, out); }, message);
+  return out;
+}
+
+pb::ToWorker to_wire(const ToWorker& message) {
+  pb::ToWorker out;
+  std::visit([&out](const auto& m) { put(m, out); }, message);
+  return out;
+}
+
+std::string digest_bytes(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
+}
+
+}  // namespace ls::wire
