@@ -107,7 +107,7 @@ LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
         "looks along the +z of `to_world`, +y up, +x to the left")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 LS_TYPE(IntegratorSettings, "integrator", "volpath",
-        "volpath, volpath_distant_mis, volpath_simple, volpathmis; path, direct, ptracer",
+        "volpath, path",
         "how light is followed")
 #undef LS_TYPE
 

@@ -194,6 +194,10 @@ template <class V, Of<Shape> T>
 void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
   v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
+  v.field({.name = "node_centred",
+           .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true in "
+                  "files of version 0.x; not for `.vdb`"},
+          s.node_centred);
   v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
   v.field({.name = "bsdf",
            .doc = "`diffuse` if there is none, black if the shape emits light",

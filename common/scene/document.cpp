@@ -9,6 +9,7 @@
 
 #include "common/scene/limits.h"
 #include "common/scene/suggest.h"
+#include "common/scene/upgrade.h"
 
 namespace ls::scene {
 namespace {
@@ -124,18 +125,6 @@ class Parameters {
   std::size_t total_ = 0;
 };
 
-// Parameters of 0.x files are in camelCase; Mitsuba 3 renames them when it reads such a file, and so do we.
-std::string snake_case(std::string_view name) {
-  std::string out;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    const auto c = static_cast<unsigned char>(name[i]);
-    const bool hump = i > 0 && std::isupper(c) && std::islower(static_cast<unsigned char>(name[i - 1]));
-    if (hump) out += '_';
-    out += static_cast<char>(hump || (i > 0 && std::isupper(c)) ? std::tolower(c) : c);
-  }
-  return out;
-}
-
 class Loader {
  public:
   Loader(AssetSource& assets, const std::map<std::string, std::string>& defines, Report& report)
@@ -161,9 +150,7 @@ class Loader {
                     fmt::format("'{}' is not a version; write version=\"3.0.0\"", version->value));
       return false;
     }
-    const bool old_names =
-        version->value[0] < '2' && (version->value.size() == 1 || version->value[1] == '.');
-    return expand(root, old_names);
+    return expand(root, is_old_version(version->value));
   }
   void warn_of_unused_defines(const Element& root) const { parameters_.warn_of_unused(root.at); }
 
@@ -182,20 +169,20 @@ class Loader {
 
   // Substitutes, and replaces the elements that speak about the text itself. Depth: bounded by kMaxNesting
   // and kMaxIncludeDepth.
-  bool expand(Element& e, bool old_names) {
+  bool expand(Element& e, bool old) {
     for (Attribute& a : e.attributes)
       if (!parameters_.substitute(a)) return false;
-    if (old_names) upgrade(e);
     std::vector<Element> children;
     for (Element& child : e.children)
-      if (!expand_child(child, old_names, children)) return false;
+      if (!expand_child(child, old, children)) return false;
     e.children = std::move(children);
+    if (old) upgrade(e);
     return true;
   }
 
-  bool expand_child(Element& child, bool old_names, std::vector<Element>& out) {
+  bool expand_child(Element& child, bool old, std::vector<Element>& out) {
     if (child.tag == "include") return include(child, out);
-    if (!expand(child, old_names)) return false;
+    if (!expand(child, old)) return false;
     if (child.tag == "default") {
       return check_attributes(child, {"name", "value"}) &&
              parameters_.declare(child, std::string(child.get("name")), std::string(child.get("value")));
@@ -211,12 +198,6 @@ class Loader {
     }
     out.push_back(std::move(child));
     return true;
-  }
-
-  void upgrade(Element& e) {
-    if (e.tag == "lookAt") e.tag = "lookat";
-    for (Attribute& a : e.attributes)
-      if (a.name == "name") a.value = snake_case(a.value);
   }
 
   bool check_attributes(const Element& e, std::initializer_list<std::string_view> names) {

@@ -23,6 +23,7 @@ struct Element {
   Span at;  // the tag's name
   std::vector<Attribute> attributes;
   std::vector<Element> children;
+  bool old = false;  // of a file of Mitsuba 0.x; see upgrade.h
 
   const Attribute* find(std::string_view attribute) const;
   // The attribute's value, empty if there is none.

@@ -7,8 +7,10 @@
 #include <cmath>
 
 #include "common/scene/describe_fields.h"
+#include "common/scene/integrators.h"
 #include "common/scene/known.h"
 #include "common/scene/materials.h"
+#include "common/scene/upgrade.h"
 
 namespace ls {
 namespace scene {
@@ -162,8 +164,11 @@ A whole scene, a ball of fog in a white surrounding:
 
 - Values: `<float>`, `<integer>`, `<boolean>`, `<string>`, `<rgb>`, `<spectrum>`, `<vector>`, `<point>`, each with `name` and
   `value`; vectors and points also by `x`, `y`, `z`. Numbers are separated by commas or blanks. A colour is one number (grey), three,
-  or `#rrggbb` (8-bit sRGB). Where the tables say rgb, `<float>` and `<spectrum>` will do, too; a spectrum must be the same at all
-  wavelengths.
+  or `#rrggbb` (8-bit sRGB). Where the tables say rgb, `<float>`, `<color>` and `<spectrum>` will do, too.
+- `<spectrum value="400:0.1, 500:0.3, 700:0.9"/>` is a curve over wavelengths in nm, with straight lines between its points and 0
+  beyond its ends. It becomes the linear sRGB that the CIE 1931 2-degree observer sees: of light as it is, of anything else under
+  D65. What sRGB or a reflectance can't hold is cut off, with a warning. `<spectrum value="2"/>` of an emitter is light of the same
+  power at all wavelengths, which is 2 * (1.2048, 0.9483, 0.9089), as in Mitsuba's RGB modes; elsewhere it is grey.
 - `<transform name="to_world">` holds `<translate>`, `<rotate>`, `<scale>`, `<lookat>`, `<matrix>` (9 or 16 numbers, row by row),
   each applied after those before it. `<rotate>` turns by `angle` degrees about the direction `x`, `y`, `z`; if that is not of
   length 1 there is a warning, as Mitsuba 3 then shears.
@@ -175,9 +180,35 @@ A whole scene, a ball of fog in a white surrounding:
   value="..."/>` before it. A `-D` that nothing in the scene asks for is a warning over HTTP and an error on the command line.
 - `<include filename="..."/>` puts in the objects of another file, `<path value="folder"/>` adds a folder in which files are
   looked for. Names are relative to the main scene file, those in an included file first to the folder of that file.
-- Files of version 0.x are read with their camelCase names as far as their plugins are those of Mitsuba 3.
+- Files of version 0.x are read as Mitsuba 0.5 and 0.6 do: see its section.
 
 )";
+
+constexpr std::string_view kOldFiles[] = {
+    R"(## Files of version 0.x
+
+Names may be in camelCase: `toWorld` is `to_world`, `intIOR` is `int_ior`, `<lookAt>` is `<lookat>`. Some parameters have new names
+besides:
+
+| object | 0.x | here |
+|---|---|---|
+)",
+    R"(
+What else such files mean:
+
+- A shape without a bsdf that bounds a medium lets light through (`null`), unless it emits light.
+- `homogeneous` takes `sigmaA` and `sigmaS`, or `sigmaT` and `albedo`; `heterogeneous` takes `density` and `albedo`. A constant
+  density is everywhere.
+- A `gridvolume` is placed by the box in its file, with the outermost values on the faces of the box (`use_grid_bbox` and
+  `node_centred` are true).
+- `conductor` and `roughconductor` are copper unless they say otherwise.
+- A curve in a `<spectrum>` is seen as it is, whatever it is for; a single number is grey. `<rgb value="#..."/>` is linear,
+  `<srgb>` is not.
+- Textures: `uscale`, `vscale`, `uoffset`, `voffset` give u * uscale + uoffset; `gamma` 1 is `raw`; the filters `trilinear` and `ewa`
+  are `bilinear`.
+- A film "mfilm" is of one pixel with a box filter unless it says otherwise.
+
+)"};
 
 constexpr std::string_view kCanonical = R"(## Canonical form
 
@@ -185,6 +216,25 @@ A scene that was read travels as canonical JSON: every field written, keys sorte
 to the same bits, files named by SHA-256. Objects that nothing uses are left out. The SHA-256 of this text is the scene's digest.
 A grid of an OpenVDB file is placed by the file's own transform, then by `to_world`.
 )";
+
+std::string old_files_section() {
+  std::string out(kOldFiles[0]);
+  for (const Renamed& row : renamed_parameters())
+    out += fmt::format("| {} `{}` | `{}` | `{}` |\n", row.tag, row.plugin, row.before, row.now);
+  return out += kOldFiles[1];
+}
+
+std::string integrators_section() {
+  std::string out = "Integrators by their names, in all versions:\n\n| name | means |\n|---|---|\n";
+  for (const IntegratorRow& row : integrators())
+    if (row.name != row.ours || row.max_depth)
+      out += fmt::format("| `{}` | `{}`{}{} |\n", row.name, row.ours,
+                         row.max_depth ? fmt::format(" with max_depth {}", *row.max_depth) : "",
+                         row.other_method ? ", with a warning" : "");
+  for (const WrapperRow& row : integrator_wrappers())
+    out += fmt::format("| `{}` | the integrator within it, with a warning: {} |\n", row.name, row.lost);
+  return out + "\n";
+}
 
 std::string meaningless_section() {
   std::string out = "## Accepted without effect\n\n| object | parameters | why |\n|---|---|---|\n";
@@ -239,13 +289,11 @@ std::string scene_format_markdown() {
   add_type<FilmSettings>(out);
   add_types(out, static_cast<const ReconstructionFilter*>(nullptr));
   add_type<IntegratorSettings>(out);
+  out += integrators_section();
   out +=
-      "`volpathmis`, `volpath_distant_mis` and `volpath_simple` mean `volpath`; `ptracer` means `path`, and "
-      "`direct` means `path` "
-      "with max_depth 2; `moment` and `aov` mean the\n"
-      "integrator within them. A sampler, whatever its type, gives `sample_count` (default 4) samples a "
-      "pixel.\n\n";
-  out += meaningless_section() + unsupported_section() + names_section();
+      "A sampler, whatever its type, gives `sample_count` (default 4) samples a pixel. The films `ldrfilm`, "
+      "`mfilm` and\n`tiledhdrfilm` are read as `hdrfilm`, with a warning.\n\n";
+  out += old_files_section() + meaningless_section() + unsupported_section() + names_section();
   return out += kCanonical;
 }
 

@@ -7,19 +7,45 @@ namespace ls::scene {
 namespace {
 
 constexpr IntegratorRow kRows[] = {
-    {"volpath", "volpath", {}},        {"volpathmis", "volpath", {}}, {"volpath_distant_mis", "volpath", {}},
-    {"volpath_simple", "volpath", {}}, {"path", "path", {}},          {"direct", "path", 2},
+    {"volpath", "volpath", {}},
+    {"volpathmis", "volpath", {}},
+    {"volpath_distant_mis", "volpath", {}},
+    {"volpath_simple", "volpath", {}},
+    {"path", "path", {}},
+    {"direct", "path", 2},
     {"ptracer", "path", {}},
+    {"prb", "path", {}, true},
+    {"prb_basic", "path", {}, true},
+    {"prbvolpath", "volpath", {}, true},
+    {"bdpt", "volpath", {}, true},
+    {"erpt", "volpath", {}, true},
+    {"mlt", "volpath", {}, true},
+    {"photonmapper", "volpath", {}, true},
+    {"ppm", "volpath", {}, true},
+    {"pssmlt", "volpath", {}, true},
+    {"sppm", "volpath", {}, true},
+    {"vpl", "volpath", {}, true},
 };
+
+constexpr WrapperRow kWrappers[] = {
+    {"moment", "the variances are not written"},
+    {"aov", "it asks for no extra channels"},
+    {"adaptive", "how many samples a pixel gets is decided by --target-error"},
+    {"irrcache", "nothing is interpolated"},
+};
+
+template <class Rows>
+auto* row_of(const Rows& rows, std::string_view name) {
+  const auto it =
+      std::find_if(std::begin(rows), std::end(rows), [&](const auto& r) { return r.name == name; });
+  return it == std::end(rows) ? nullptr : &*it;
+}
 
 }  // namespace
 
 std::span<const IntegratorRow> integrators() { return kRows; }
-
-const IntegratorRow* integrator_row(std::string_view name) {
-  const auto it = std::find_if(std::begin(kRows), std::end(kRows),
-                               [&](const IntegratorRow& r) { return r.name == name; });
-  return it == std::end(kRows) ? nullptr : it;
-}
+const IntegratorRow* integrator_row(std::string_view name) { return row_of(kRows, name); }
+std::span<const WrapperRow> integrator_wrappers() { return kWrappers; }
+const WrapperRow* wrapper_row(std::string_view name) { return row_of(kWrappers, name); }
 
 }  // namespace ls::scene

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "common/scene/integrators.h"
+
 namespace ls::scene {
 namespace {
 
@@ -12,18 +14,24 @@ struct PluginRow {
   Names supported, unsupported;
 };
 
+Names integrator_names() {
+  Names names;
+  for (const IntegratorRow& row : integrators()) names.emplace_back(row.name);
+  for (const WrapperRow& row : integrator_wrappers()) names.emplace_back(row.name);
+  return names;
+}
+
 const std::map<std::string_view, PluginRow>& plugins() {
   static const std::map<std::string_view, PluginRow> table = {
       {"integrator",
-       {{"path", "volpath", "volpathmis", "volpath_distant_mis", "volpath_simple", "direct", "ptracer",
-         "moment", "aov"},
-        {"bdpt", "depth", "irrcache", "mlt", "pssmlt", "photonmapper", "ppm", "sppm", "prb", "prb_basic",
-         "prbvolpath", "direct_projective", "prb_projective", "prb_reparam", "stokes", "vpl", "erpt"}}},
+       {integrator_names(),
+        {"ao", "depth", "direct_projective", "field", "multichannel", "prb_projective", "prb_reparam",
+         "stokes"}}},
       {"sensor",
        {{"perspective", "thinlens"},
         {"batch", "distant", "irradiancemeter", "orthographic", "perspective_rdist", "radiancemeter",
          "fluencemeter", "spherical", "telecentric"}}},
-      {"film", {{"hdrfilm"}, {"ldrfilm", "mfilm", "specfilm", "tiledhdrfilm"}}},
+      {"film", {{"hdrfilm", "ldrfilm", "mfilm", "tiledhdrfilm"}, {"specfilm"}}},
       {"sampler",
        {{"independent", "stratified", "multijitter", "orthogonal", "ldsampler", "halton", "hammersley",
          "sobol"},
@@ -75,6 +83,8 @@ const std::map<std::string_view, PluginRow>& plugins() {
        {{"hg", "isotropic"},
         {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
   };
+      {"film", "ldrfilm", {"gamma", "exposure", "tonemap_method", "key", "burn"}, "colours stay linear"},
+      {"film", "mfilm", {"digits", "variable"}, output},
   return table;
 }
 
@@ -104,8 +114,44 @@ const std::vector<MeaninglessRow>& meaningless_table() {
        "direct",
        {"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"},
        sampling},
-      {"integrator", "ptracer", {"samples_per_pass"}, sampling},
-      {"integrator", "aov", {"aovs", "img"}, "extra channels are not written"},
+      {"integrator", "volpath", {"version", "max_null_collisions"}, "all light is followed"},
+      {"integrator", "bdpt", {"light_image", "sample_direct"}, sampling},
+      {"integrator",
+       "erpt",
+       {"num_chains", "max_chains", "chain_length", "direct_samples", "bidirectional_mutation",
+        "lens_perturbation", "caustic_perturbation", "multi_chain_perturbation", "manifold_perturbation",
+        "lambda"},
+       sampling},
+      {"integrator",
+       "mlt",
+       {"luminance_samples", "direct_samples", "two_stage", "bidirectional_mutation", "lens_perturbation",
+        "caustic_perturbation", "multi_chain_perturbation", "manifold_perturbation", "lambda"},
+       sampling},
+      {"integrator",
+       "photonmapper",
+       {"direct_samples", "glossy_samples", "global_photons", "caustic_photons", "volume_photons",
+        "global_lookup_radius", "caustic_lookup_radius", "lookup_size", "granularity"},
+       sampling},
+      {"integrator",
+       "ppm",
+       {"photon_count", "initial_radius", "alpha", "granularity", "max_passes"},
+       sampling},
+      {"integrator",
+       "sppm",
+       {"photon_count", "initial_radius", "alpha", "granularity", "max_passes"},
+      {"shape", "ply", {"srgb"}, "colours of vertices are not used"},
+       sampling},
+      {"integrator",
+       "pssmlt",
+       {"bidirectional", "luminance_samples", "direct_samples", "two_stage", "p_large"},
+       sampling},
+      {"integrator", "vpl", {"shadow_map_resolution", "clamping"}, sampling},
+      {"integrator", "adaptive", {"max_error", "p_value", "max_sample_factor"}, sampling},
+      {"integrator",
+       "irrcache",
+       {"resolution", "quality", "gradients", "clamp_neighbor", "clamp_screen", "overture",
+        "quality_adjustment", "indirect_only", "debug"},
+       sampling},
       {"sensor", "", {"shutter_open", "shutter_close"}, once},
       {"sensor", "", {"srf"}, "colours are linear RGB"},
       {"sensor", "perspective", {"focus_distance"}, "a pinhole has everything in focus"},
@@ -140,6 +186,12 @@ std::string_view meaningless_because(std::string_view tag, std::string_view plug
 std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin) {
   std::vector<std::string> all;
   for (const MeaninglessRow& row : meaningless_table())
+      {"medium", "material", "measured media are not known by name here; give their coefficients"},
+      {"shape", "max_smooth_angle",
+       "normals are those of the file or, with face_normals, those of its triangles"},
+      {"texture", "gamma", "only 1 is understood, for values that are linear as they are"},
+      {"texture", "wrap_mode_u", "only the same mode in both directions is understood"},
+      {"texture", "wrap_mode_v", "only the same mode in both directions is understood"},
     if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin))
       all.insert(all.end(), row.parameters.begin(), row.parameters.end());
   return all;
@@ -156,6 +208,11 @@ std::string_view replacement(std::string_view tag, std::string_view parameter) {
       {"medium", "density", "the density is the volume `sigma_t`; `scale` multiplies it"},
   };
   for (const auto& row : rows)
+bool is_supported_plugin(std::string_view tag, std::string_view plugin) {
+  const Names& names = supported_plugins(tag);
+  return std::find(names.begin(), names.end(), plugin) != names.end();
+}
+
     if (row.tag == tag && row.parameter == parameter) return row.instead;
   return {};
 }

@@ -18,6 +18,7 @@ std::string_view replacement(std::string_view tag, std::string_view parameter);
 // The plugins of a tag that can be read, and those that the dialect has besides.
 const std::vector<std::string>& supported_plugins(std::string_view tag);
 const std::vector<std::string>& unsupported_plugins(std::string_view tag);
+bool is_supported_plugin(std::string_view tag, std::string_view plugin);
 bool is_unsupported_plugin(std::string_view tag, std::string_view plugin);
 
 struct MeaninglessRow {

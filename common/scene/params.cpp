@@ -242,30 +242,6 @@ void Params::convert(const Field& f, const Element& e, AssetIndex& value) {
   if (const auto index = reader_.asset(*name, value_place(e, "value"))) value = *index;
 }
 
-std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_view wanted) {
-  const std::string_view text = e.get("value");
-  std::optional<Rgb> c;
-  if (e.tag == "rgb") c = parse_rgb(text);
-  if (e.tag == "float" || e.tag == "integer")
-    if (const auto x = parse_number(text)) c = Rgb{*x, *x, *x};
-  if (e.tag == "spectrum" && kind_of(e) == TagKind::property) {
-    const SpectrumText spectrum = parse_spectrum(text);
-    if (spectrum.varies || e.find("filename")) {
-      reader_.report().error(
-          e.find("value") ? value_place(e, "value") : e.at,
-          fmt::format("'{}' of {} is a curve over wavelengths; colours are linear RGB here: give it as <rgb>",
-                      f.name, title()));
-      return std::nullopt;
-    }
-    c = spectrum.value;
-  }
-  if (!c) {
-    wrong_type(f.name, e, wanted);
-    return std::nullopt;
-  }
-  return in_range(f, e, *c) ? c : std::nullopt;
-}
-
 void Params::convert(const Field& f, const Element& e, TextureIndex& value) {
   const Element* object = object_at(e);
   if (object && (object->tag == "texture" || object->tag == "spectrum")) {

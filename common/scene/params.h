@@ -96,6 +96,8 @@ class Params {
   const Element* object_at(const Element& e);
   std::optional<std::string> string_value(std::string_view name, const Element& e);
   std::optional<Rgb> colour(const Field& f, const Element& e, std::string_view wanted);
+  std::optional<Rgb> spectrum(const Field& f, const Element& e, std::string_view wanted);
+  Rgb shown(const Field& f, const Element& e, const Rgb& seen);
 
   Reader& reader_;
   const Element& object_;

@@ -1,7 +1,6 @@
 // Sensor, film, filter, sampler and integrator.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -90,9 +89,15 @@ void Reader::read_fov(Params& p, Sensor& s) {
 
 void Reader::read_film(const Element& e) {
   used_parts_.insert(&e);
-  if (e.get("type") != "hdrfilm") return unknown_plugin(e, report_);
+  if (!is_supported_plugin("film", e.get("type"))) return unknown_plugin(e, report_);
   Params p(*this, e);
   FilmSettings& film = scene_.film;
+  if (e.get("type") == "mfilm") film = {{1, 1}, BoxFilter{}};  // what Mitsuba 0.x gives it
+  if (e.get("type") != "hdrfilm")
+    report_.warning(value_place(e, "type"),
+                    fmt::format("{} gives the size of the frame and its filter: what is written are linear "
+                                "colours, as of \"hdrfilm\"",
+                                p.title()));
   bind(p, film);
   check_crop(p);
   if (std::int64_t{film.size.width} * film.size.height > kMaxFramePixels)
@@ -152,9 +157,13 @@ ReconstructionFilter Reader::read_filter(const Element& e) {
 // Samples are this program's own; only how many of them is the scene's to say.
 void Reader::read_sampler(const Element& e) {
   used_parts_.insert(&e);
-  const auto& known = supported_plugins("sampler");
-  if (std::find(known.begin(), known.end(), e.get("type")) == known.end()) return unknown_plugin(e, report_);
+  if (!is_supported_plugin("sampler", e.get("type"))) return unknown_plugin(e, report_);
   Params p(*this, e);
+  if (e.get("type") != "independent")
+    report_.warning(
+        value_place(e, "type"),
+        fmt::format("of {} only the number of samples is used: which they are is this program's own matter",
+                    p.title()));
   if (const Element* count = p.take("sample_count"))
     p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSpp}}, *count, scene_.sample_count);
   p.finish();
@@ -168,24 +177,37 @@ void Reader::read_integrator(const Element& e, int depth) {
   if (depth > 4) return report_.error(e.at, "integrators are nested too deep, or contain themselves");
   const std::string_view type = e.get("type");
   Params p(*this, e);
-  if (type == "moment" || type == "aov") {
+  if (const WrapperRow* wrapper = wrapper_row(type)) {
+    check_channels(p);
     const auto inner = p.take_nested("integrator");
     if (inner.size() != 1)
       report_.error(e.at, fmt::format("{} needs one nested integrator, not {}", p.title(), inner.size()));
-    report_.warning(
-        value_place(e, "type"),
-        fmt::format("the extra channels of \"{}\" are not written: only its nested integrator is used",
-                    type));
+    report_.warning(value_place(e, "type"),
+                    fmt::format("only the integrator within {} is used: {}", p.title(), wrapper->lost));
     if (!inner.empty()) read_integrator(*inner[0].object, depth + 1);
     return p.finish();
   }
   IntegratorSettings& i = scene_.integrator;
   const IntegratorRow* row = integrator_row(type);
   if (!row) return unknown_plugin(e, report_);
+  if (row->other_method)
+    report_.warning(value_place(e, "type"), fmt::format("{} is read as \"{}\", which gives the same picture "
+                                                        "by other means",
+                                                        p.title(), row->ours));
   i.name = row->ours;
   bind(p, i);
   if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
+}
+
+// Channels that a scene asks for and that are not written would be missed.
+void Reader::check_channels(Params& p) {
+  const Element* channels = p.take("aovs");
+  if (!channels || channels->get("value").find_first_not_of(" \t\r\n") == std::string_view::npos) return;
+  report_.error(value_place(*channels, "value"),
+                fmt::format("the extra channels \"{}\" can't be written by this version: put the nested "
+                            "integrator in the place of {}",
+                            channels->get("value"), p.title()));
 }
 
 }  // namespace ls::scene

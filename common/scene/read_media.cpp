@@ -6,6 +6,45 @@
 #include "common/scene/transform.h"
 
 namespace ls::scene {
+namespace {
+
+void need_both(Params& p, const char* one, const char* other, Report& report) {
+  if (p.has(one) && p.has(other)) return;
+  report.error(p.object().at, fmt::format("{} needs {} and {}", p.title(), one, other));
+}
+
+// sigma_a and sigma_s, or sigma_t and albedo, which follow.
+void read_old_coefficients(Params& p, HomogeneousMedium& medium, Report& report) {
+  const bool apart = p.has("sigma_a") || p.has("sigma_s"), together = p.has("sigma_t") || p.has("albedo");
+  if (apart && together)
+    return report.error(p.object().at,
+                        fmt::format("{} gives both sigma_a or sigma_s and sigma_t or albedo", p.title()));
+  if (!apart && !together)
+    return report.error(p.object().at,
+                        fmt::format("{} needs its coefficients: sigma_a and sigma_s, or sigma_t and albedo; "
+                                    "those of human skin, the default of Mitsuba 0.x, are not known here",
+                                    p.title()));
+  if (!apart) return need_both(p, "sigma_t", "albedo", report);
+  need_both(p, "sigma_a", "sigma_s", report);
+  Rgb absorption{}, scattering{};
+  const auto read = [&](std::string_view name, Rgb& value) {
+    if (const Element* e = p.take(name))
+      p.convert({.name = name, .doc = "", .range = kNonNegative, .constvolume = true}, *e, value);
+  };
+  read("sigma_a", absorption);
+  read("sigma_s", scattering);
+  for (std::size_t i = 0; i < 3; ++i) {
+    medium.sigma_t[i] = absorption[i] + scattering[i];
+    medium.albedo[i] = medium.sigma_t[i] > 0 ? scattering[i] / medium.sigma_t[i] : 0;
+  }
+}
+
+void read_old_coefficients(Params& p, HeterogeneousMedium&, Report& report) {
+  if (!p.has("sigma_t")) report.error(p.object().at, fmt::format("{} needs density", p.title()));
+  if (!p.has("albedo")) report.error(p.object().at, fmt::format("{} needs albedo", p.title()));
+}
+
+}  // namespace
 
 std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
   const std::string_view type = e.get("type");
@@ -18,6 +57,9 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
     GridVolume volume;
     bind(p, volume);
     if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
+    if (volume.node_centred && volume.wrap != Wrap::clamp)
+      report_.error(e.at,
+                    "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
     if (!invertible(volume.to_world))
       report_.error(e.at,
                     "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
@@ -58,6 +100,7 @@ template <class T>
 std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
   Params p(*this, e);
   T medium;
+  if (e.old) read_old_coefficients(p, medium, report_);
   bind(p, medium);
   const auto phases = p.take_nested("phase");
   if (phases.size() > 1)
@@ -70,7 +113,20 @@ std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
     medium.phase = *index;
   }
   scene_.media.emplace_back(medium);
+  if constexpr (std::is_same_v<T, HeterogeneousMedium>)
+    if (e.old && !report_.has_errors()) unbound_constant_density(e);
   return MediumIndex{static_cast<std::uint32_t>(scene_.media.size() - 1)};
+}
+
+// A constant density of 0.x is everywhere, not in the unit cube.
+void Reader::unbound_constant_density(const Element& e) {
+  const auto medium = std::get<HeterogeneousMedium>(scene_.media.back());
+  const Rgb* density = constant(medium.sigma_t);
+  if (!density) return;
+  const Rgb* albedo = constant(medium.albedo);
+  if (!albedo)
+    return report_.error(e.at, "the density of this medium is the same everywhere, but its albedo is a grid");
+  scene_.media.back() = HomogeneousMedium{*density, *albedo, medium.scale, medium.phase};
 }
 
 }  // namespace ls::scene

@@ -53,11 +53,17 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
     if (const auto index = bsdf(*bsdfs[0].object, *bsdfs[0].use)) shape.bsdf = *index;
     return;
   }
-  // Mitsuba 3: diffuse; black under an emitter.
+  // 0.x: what only bounds a medium lets light through.
+  if (p.object().old && emitters.empty() && shape.is_medium_transition) {
+    scene_.bsdfs.emplace_back(NullBsdf{});
+    shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+    return;
+  }
+  // Mitsuba: diffuse; black under an emitter.
   const double grey = emitters.empty() ? .5 : 0;
   scene_.bsdfs.emplace_back(DiffuseBsdf{add_constant_texture({grey, grey, grey})});
   shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
-  if (shape.is_medium_transition)
+  if (shape.is_medium_transition && !p.object().old)
     report_.warning(p.object().at, fmt::format("{} bounds a medium but has no bsdf, so it is opaque: add "
                                                "<bsdf type=\"null\"/> to let light through",
                                                p.title()));

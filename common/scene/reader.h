@@ -76,6 +76,7 @@ class Reader {
   void check_placement(const Element& e, const Shape& shape);
 
   void read_emitter(const Element& e);
+  void unbound_constant_density(const Element& e);
   void read_directional(const Element& e);
   void read_point(const Element& e);
   void read_spot(const Element& e);
@@ -101,6 +102,7 @@ class Reader {
   // Films, filters and samplers of the top level, and which of them a sensor referred to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
+  void check_channels(Params& p);
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
 
   Memo<TextureIndex> textures_;

@@ -23,7 +23,7 @@ const std::vector<TagRow>& tags() {
     for (const char* tag : {"integrator", "sensor", "film", "rfilter", "sampler", "shape", "bsdf", "emitter",
                             "texture", "volume", "medium", "phase"})
       r.push_back({tag, TagKind::object, {"type"}, {"id", "name"}});
-    for (const char* tag : {"float", "integer", "boolean", "string", "rgb"})
+    for (const char* tag : {"float", "integer", "boolean", "string", "rgb", "color"})
       r.push_back({tag, TagKind::property, {"name", "value"}, {}});
     r.push_back({"spectrum", TagKind::property, {"name"}, {"value", "filename"}});
     for (const char* tag : {"vector", "point"})

@@ -39,14 +39,19 @@ bool for_each_token(std::string_view text, F f) {
   return true;
 }
 
-double decode_srgb(double x) { return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4); }
-
-std::optional<Rgb> parse_hex(std::string_view digits) {
-  unsigned value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
-  if (digits.size() != 6 || error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
-  return Rgb{decode_srgb((value >> 16) / 255.0), decode_srgb((value >> 8 & 255) / 255.0),
-             decode_srgb((value & 255) / 255.0)};
+// At least two pairs, in increasing order of their wavelengths.
+std::optional<SpectralCurve> parse_curve(std::string_view text) {
+  SpectralCurve curve;
+  const bool ok = for_each_token(text, [&](std::string_view token) {
+    const std::size_t colon = token.find(':');
+    if (colon == std::string_view::npos || curve.nm.size() == kMaxSpectrumPairs) return false;
+    const auto nm = parse_number(token.substr(0, colon)), value = parse_number(token.substr(colon + 1));
+    if (!nm || !value || (!curve.nm.empty() && !(*nm > curve.nm.back()))) return false;
+    curve.nm.push_back(*nm);
+    curve.value.push_back(*value);
+    return true;
+  });
+  return ok && curve.nm.size() >= 2 ? std::optional(std::move(curve)) : std::nullopt;
 }
 
 }  // namespace
@@ -78,8 +83,10 @@ std::optional<std::vector<double>> parse_numbers(std::string_view text, std::siz
 }
 
 std::optional<Rgb> parse_rgb(std::string_view text) {
-  text = trimmed(text);
-  if (text.starts_with('#')) return parse_hex(text.substr(1));
+  if (auto hex = parse_hex(text)) {
+    for (double& x : *hex) x = decode_srgb(x);
+    return hex;
+  }
   const auto numbers = parse_numbers(text, 3);
   if (!numbers) return std::nullopt;
   if (numbers->size() == 1) return Rgb{(*numbers)[0], (*numbers)[0], (*numbers)[0]};
@@ -87,24 +94,26 @@ std::optional<Rgb> parse_rgb(std::string_view text) {
   return std::nullopt;
 }
 
+std::optional<Rgb> parse_hex(std::string_view text) {
+  text = trimmed(text);
+  if (text.size() != 7 || text[0] != '#') return std::nullopt;
+  unsigned value = 0;
+  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return Rgb{(value >> 16) / 255.0, (value >> 8 & 255) / 255.0, (value & 255) / 255.0};
+}
+
+double decode_srgb(double x) { return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4); }
+
 SpectrumText parse_spectrum(std::string_view text) {
-  if (text.find(':') == std::string_view::npos) return {parse_rgb(text), false};
-  std::optional<double> common;
-  bool varies = false;
-  std::size_t pairs = 0;
-  const bool ok = for_each_token(text, [&](std::string_view token) {
-    const std::size_t colon = token.find(':');
-    if (colon == std::string_view::npos || ++pairs > kMaxSpectrumPairs) return false;
-    const auto wavelength = parse_number(token.substr(0, colon)),
-               value = parse_number(token.substr(colon + 1));
-    if (!wavelength || !value) return false;
-    varies |= common && *common != *value;
-    common = value;
-    return true;
-  });
-  if (!ok || !common) return {};
-  if (varies) return {std::nullopt, true};
-  return {Rgb{*common, *common, *common}, false};
+  if (text.find(':') != std::string_view::npos) {
+    auto curve = parse_curve(text);
+    return curve ? SpectrumText(std::move(*curve)) : SpectrumText();
+  }
+  const auto numbers = parse_numbers(text, 3);
+  if (numbers && numbers->size() == 1) return numbers->front();
+  if (numbers && numbers->size() == 3) return Rgb{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+  return {};
 }
 
 }  // namespace ls::scene

@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "common/scene/scene.h"
+#include "common/scene/spectrum.h"
 
 namespace ls::scene {
 
@@ -15,13 +17,13 @@ std::optional<long long> parse_integer(std::string_view text);
 std::optional<bool> parse_boolean(std::string_view text);  // true, false in any case
 // Numbers between commas and blanks; nothing if one of them is no number, or there are more than `most`.
 std::optional<std::vector<double>> parse_numbers(std::string_view text, std::size_t most);
-// One number (grey), three, or #rrggbb: 8-bit sRGB, decoded to linear (IEC 61966-2-1).
+// One number (grey), three, or #rrggbb: 8-bit sRGB, decoded to linear.
 std::optional<Rgb> parse_rgb(std::string_view text);
-// <spectrum>: one number, three (0.x files), or wavelength:value pairs that are all of one value.
-struct SpectrumText {
-  std::optional<Rgb> value;
-  bool varies = false;  // well-formed pairs whose values differ
-};
+// #rrggbb as it is written: 255 is 1.
+std::optional<Rgb> parse_hex(std::string_view text);
+double decode_srgb(double x);  // to linear (IEC 61966-2-1)
+// <spectrum>: one number, three of linear sRGB (0.x files), or wavelength:value pairs in nm.
+using SpectrumText = std::variant<std::monostate, double, Rgb, SpectralCurve>;
 SpectrumText parse_spectrum(std::string_view text);
 
 }  // namespace ls::scene

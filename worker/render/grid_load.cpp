@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -37,7 +38,8 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
   if (!path) return tl::unexpected(path.error());
   auto data = load_vol(*path, files.name(v.file));
   if (!data) return tl::unexpected(data.error());
-  // Values sit at cell centres of the unit cube; the cube is the file's box first, if asked for, then moved.
+  // Values sit at cell centres of the unit cube, or at nodes from face to face; the cube is the file's box
+  // first, if asked for, then moved.
   Affine unit_to_scene(v.to_world);
   if (v.use_grid_bbox) {
     const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
@@ -52,10 +54,18 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
                 fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
   }
   const int n[3] = {static_cast<int>(data->nx), static_cast<int>(data->ny), static_cast<int>(data->nz)};
+  if (v.node_centred && std::min({n[0], n[1], n[2]}) < 2) {
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("{}: {} x {} x {} values can't be nodes from face to face of a box: that takes two "
+                    "along each axis",
+                    files.name(v.file), n[0], n[1], n[2]));
+  }
+  const double margin = v.node_centred ? 0 : .5;
+  const V3d last(n[0] - 1, n[1] - 1, n[2] - 1), steps = last + V3d(2 * margin);
   Affine to_nodes;
-  to_nodes.a = {static_cast<double>(n[0]), 0, 0, 0, static_cast<double>(n[1]), 0, 0, 0,
-                static_cast<double>(n[2])};
-  to_nodes.b = V3d(-.5);
+  to_nodes.a = {steps.x, 0, 0, 0, steps.y, 0, 0, 0, steps.z};
+  to_nodes.b = V3d(-margin);
   const Affine world_to_index = from_world(to_nodes * unit_to_scene.inverse(), center, scale);
   LoadedVolume out;
   out.clamped = data->negatives;
@@ -69,7 +79,7 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
       for (std::size_t i = 0; i < count; ++i) values[i] = data->values[data->channels * i + c];
     }
     out.channels.emplace_back(std::array<int, 3>{n[0], n[1], n[2]}, std::move(values), world_to_index,
-                              V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), to_sigma, v.filter, v.wrap);
+                              V3d(-margin), last + V3d(margin), to_sigma, v.filter, v.wrap);
   }
   return out;
 }

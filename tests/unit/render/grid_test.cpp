@@ -145,6 +145,30 @@ TEST(Grid, ASceneChoosesFilterAndWrapMode) {
   EXPECT_EQ(value_at(grid_of(kNearest, Wrap::mirror), outside), 3);
 }
 
+TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
+  const auto load = [](const std::array<int, 3>& size, const std::vector<float>& values) {
+    test::SceneKit kit({1, 1});
+    const VolumeIndex v = kit.grid(size, values, Transform());
+    auto& volume = std::get<GridVolume>(kit.scene.volumes[v.value]);
+    volume.node_centred = true;
+    return load_volume(volume, AssetLoader{kit.scene, kit.files}, V3d(0), 1, 1);
+  };
+  const auto loaded = load({3, 2, 2}, {0, 2, 8, 0, 2, 8, 0, 2, 8, 0, 2, 8});
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  const Grid& g = loaded->channels.at(0);
+  EXPECT_FLOAT_EQ(value_at(g, {0, .5f, .5f}), 0);
+  EXPECT_FLOAT_EQ(value_at(g, {.25f, .5f, .5f}), 1);
+  EXPECT_FLOAT_EQ(value_at(g, {.5f, .5f, .5f}), 2);
+  EXPECT_FLOAT_EQ(value_at(g, {1, .5f, .5f}), 8);
+  EXPECT_EQ(g.domain_lo().x, 0);
+  EXPECT_EQ(g.domain_hi().x, 2);
+
+  const auto flat = load({3, 1, 2}, {1, 1, 1, 1, 1, 1});
+  ASSERT_FALSE(flat);
+  EXPECT_NE(flat.error().message.find("3 x 1 x 2 values can't be nodes"), std::string::npos)
+      << flat.error().message;
+}
+
 struct Ray {
   V3 o, d;
 };

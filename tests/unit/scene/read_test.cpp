@@ -244,7 +244,8 @@ TEST(Reading, ColoursComeInManyForms) {
   EXPECT_EQ(value("<rgb name=\"reflectance\" value=\".25\"/>"), (Rgb{.25, .25, .25}));
   EXPECT_EQ(value("<rgb name=\"reflectance\" value=\" .1,.2\t.3 \"/>"), (Rgb{.1, .2, .3}));
   EXPECT_EQ(value("<float name=\"reflectance\" value=\"1e-1\"/>"), (Rgb{.1, .1, .1}));
-  EXPECT_EQ(value("<spectrum name=\"reflectance\" value=\"400:.5, 700:.5\"/>"), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(value("<spectrum name=\"reflectance\" value=\".5\"/>"), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(value("<color name=\"reflectance\" value=\".5, .6 .7\"/>"), (Rgb{.5, .6, .7}));
   EXPECT_EQ(
       value(
           "<spectrum name=\"reflectance\" type=\"uniform\"><float name=\"value\" value=\".3\"/></spectrum>"),

@@ -85,6 +85,40 @@ TEST(Warnings, DefinesThatNothingAsksForAreWarnedAbout) {
               HasSubstr("asks for $n"));
 }
 
+TEST(Warnings, IntegratorsThatAreReadAsOthersSaySo) {
+  const auto read_integrator = [](const std::string& inside) { return read(with_sensor(inside)); };
+  const auto mlt = read_integrator(
+      "<integrator type=\"mlt\"><integer name=\"max_depth\" value=\"7\"/><integer "
+      "name=\"direct_samples\" value=\"16\"/></integrator>");
+  ASSERT_TRUE(mlt.scene) << messages(mlt);
+  EXPECT_EQ(mlt.scene->integrator, (IntegratorSettings{.name = "volpath", .max_depth = 7}));
+  ASSERT_EQ(mlt.diagnostics.size(), 2u);
+  EXPECT_THAT(mlt.diagnostics[0].text, HasSubstr("integrator \"mlt\" is read as \"volpath\""));
+  EXPECT_THAT(mlt.diagnostics[1].text,
+              HasSubstr("'direct_samples' of integrator \"mlt\" has no effect here"));
+
+  for (const char* wrapper : {"moment", "aov", "adaptive", "irrcache"}) {
+    const auto r = read_integrator(fmt::format(
+        "<integrator type=\"{}\"><integrator type=\"direct\" name=\"inner\"/></integrator>", wrapper));
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_EQ(r.scene->integrator, (IntegratorSettings{.name = "path", .max_depth = 2}));
+    ASSERT_EQ(r.diagnostics.size(), 1u);
+    EXPECT_THAT(r.diagnostics[0].text,
+                HasSubstr(fmt::format("only the integrator within integrator \"{}\" is used", wrapper)));
+  }
+}
+
+TEST(Warnings, SamplersOfOtherNamesGiveANumberOnly) {
+  const auto r = read(
+      "<scene version=\"3.0.0\"><sensor type=\"perspective\"><sampler type=\"multijitter\"><integer "
+      "name=\"sample_count\" value=\"9\"/></sampler></sensor></scene>");
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->sample_count, 9u);
+  ASSERT_EQ(r.diagnostics.size(), 1u);
+  EXPECT_THAT(r.diagnostics[0].text,
+              HasSubstr("of sampler \"multijitter\" only the number of samples is used"));
+}
+
 TEST(Warnings, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
   const auto r =
       read(with_sensor("<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" "

@@ -1,0 +1,28 @@
+// Curves over wavelengths as linear sRGB: what the CIE 1931 2-degree standard observer sees, in the primaries
+// and with the white (D65) of ITU-R BT.709.
+#pragma once
+
+#include <vector>
+
+#include "common/scene/scene.h"
+
+namespace ls::scene {
+
+// Straight lines between the points, 0 beyond the ends. At least two points; nm increases.
+struct SpectralCurve {
+  std::vector<double> nm, value;
+  bool operator==(const SpectralCurve&) const = default;
+};
+
+// What a reflectance is seen under. The colour of light itself, and every curve of Mitsuba 0.x, is seen as it
+// is: under light of the same power at all wavelengths.
+enum class Illuminant { equal_energy, d65 };
+
+// integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear sRGB.
+// Parts are negative where the colour is outside of what sRGB can show.
+Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
+
+// Of light of the same power at all wavelengths whose luminance is 1: X = Y = Z = 1, which is not white.
+Rgb equal_energy_srgb();
+
+}  // namespace ls::scene
