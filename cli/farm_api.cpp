@@ -188,6 +188,11 @@ FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& sp
       client_.request("POST", "/api/v1/jobs", body.dump(-1, ' ', false, json::error_handler_t::replace)));
 }
 
+FarmApi::Answer<json> FarmApi::submit_bundle(const std::filesystem::path& file, const std::string& type,
+                                             const std::string& query) {
+  return as_json(client_.post_file("/api/v1/jobs" + query, file, type));
+}
+
 std::string job_path(const std::string& id) {
   std::string path = "/api/v1/jobs/";
   for (const unsigned char c : id)

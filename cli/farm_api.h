@@ -36,6 +36,9 @@ class FarmApi {
   // upload.
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& said);
+  // Sends an archive as it is; `query` as of spec_query().
+  Answer<Json> submit_bundle(const std::filesystem::path& file, const std::string& type,
+                             const std::string& query);
 
  private:
   explicit FarmApi(HttpClient client) : client_(std::move(client)) {}

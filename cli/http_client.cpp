@@ -13,7 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr long kConnectSeconds = 15;
-constexpr long kStallSeconds = 60;  // without a byte
+constexpr long kStallSeconds = 60;   // without a byte
+constexpr long kWorkSeconds = 3600;  // the same while the other side works
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -71,9 +72,11 @@ Result<void> check_url(const std::string& url) {
 struct HttpClient::State {
   Options options;
   CURL* curl = nullptr;
+  long stall_seconds = kStallSeconds;
   ~State() { curl_easy_cleanup(curl); }
 
   Result<HttpResponse> perform(const std::string& path, const Headers& headers, std::FILE* save);
+  Result<HttpResponse> send(const std::string& path, const fs::path& file, std::string_view content_type);
   void set_common(const std::string& url, const Headers& headers);
   Headers headers() const {
     Headers list;
@@ -112,7 +115,8 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
   curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
-  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, kStallSeconds);
+  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, stall_seconds);
+  curl_easy_setopt(curl, CURLOPT_TCP_KEEPALIVE, 1L);
   if (!options.ca.empty()) curl_easy_setopt(curl, CURLOPT_CAINFO, options.ca.c_str());
 }
 
@@ -160,19 +164,34 @@ Result<HttpResponse> HttpClient::request(std::string_view method, const std::str
   return state_->perform(path, headers, nullptr);
 }
 
-Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file) {
+// With PUT, unless another method is set.
+Result<HttpResponse> HttpClient::State::send(const std::string& path, const fs::path& file,
+                                             std::string_view content_type) {
   const FilePtr source(std::fopen(file.c_str(), "rbe"));
   std::error_code error;
   const auto bytes = fs::file_size(file, error);
   if (!source || error) return fail(Errc::not_found, fmt::format("{} cannot be read", file.string()));
-  Headers headers = state_->headers();
-  add(headers, "Content-Type: application/octet-stream");
-  CURL* curl = state_->curl;
+  Headers list = headers();
+  add(list, fmt::format("Content-Type: {}", content_type));
   curl_easy_setopt(curl, CURLOPT_UPLOAD, 1L);
   curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes));
   curl_easy_setopt(curl, CURLOPT_READFUNCTION, &read_file_chunk);
   curl_easy_setopt(curl, CURLOPT_READDATA, source.get());
-  return state_->perform(path, headers, nullptr);
+  return perform(path, list, nullptr);
+}
+
+Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file) {
+  return state_->send(path, file, "application/octet-stream");
+}
+
+Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::path& file,
+                                           std::string_view content_type) {
+  curl_easy_setopt(state_->curl, CURLOPT_CUSTOMREQUEST, "POST");
+  state_->stall_seconds = kWorkSeconds;
+  auto response = state_->send(path, file, content_type);
+  state_->stall_seconds = kStallSeconds;
+  curl_easy_reset(state_->curl);  // also if nothing was sent
+  return response;
 }
 
 Result<HttpResponse> HttpClient::download(const std::string& path, const fs::path& file) {

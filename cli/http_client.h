@@ -36,6 +36,9 @@ class HttpClient {
                                std::string_view content_type = "application/json");
   // PUTs the bytes of a file, without holding them in memory.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file);
+  // POSTs them; the coordinator may take up to an hour to answer, as it unpacks them first.
+  Result<HttpResponse> post_file(const std::string& path, const std::filesystem::path& file,
+                                 std::string_view content_type);
   // Writes a 2xx answer's body to `file` by way of a temporary one beside it, or straight if it is a pipe or
   // a device; of other answers the body is returned.
   Result<HttpResponse> download(const std::string& path, const std::filesystem::path& file);

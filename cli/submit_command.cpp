@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "cli/bundle.h"
 #include "cli/commands.h"
 #include "cli/farm_api.h"
 #include "cli/farm_wait.h"
@@ -32,30 +35,61 @@ int fetch_results(FarmApi& api, const std::string& id, const Flags& flags) {
   return kOk;
 }
 
+using Job = FarmApi::Answer<FarmApi::Json>;
+
+// Here first: what is wrong with the scene is told before anything is sent.
+Job submit_scene(const Flags& flags, const JobSpec& spec) {
+  const auto scene = read_local_scene(flags.scene, spec.defines, flags.job.strict);
+  if (!scene) return tl::unexpected(scene.error());
+  say_diagnostics(scene->warnings);
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return tl::unexpected(coordinator::Rejected{api.error(), {}});
+  return api->submit(*scene, spec, [&](const std::string& line) {
+    if (!flags.quiet) say(line);
+  });
+}
+
+Job submit_bundle(const Flags& flags, const JobSpec& spec, const std::string& type) {
+  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
+  if (flags.job.strict)
+    return refuse(
+        {Errc::invalid_argument, "--strict: a bundle is read by the coordinator, which has no such choice"});
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(flags.scene, error))
+    return refuse({Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return refuse(api.error());
+  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
+  if (!job) return job;
+  if (const auto warnings = job->find("warnings"); warnings != job->end() && warnings->is_array())
+    for (const auto& warning : *warnings)
+      if (warning.is_string()) say(warning.get<std::string>());
+  return job;
+}
+
+int wait_and_fetch(const std::string& id, const Flags& flags) {
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return say_error(api.error());
+  const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
+  if (!end) return say_rejected(end.error());
+  if (const int code = say_end(*end); code != kOk) return code;
+  return fetch_results(*api, id, flags);
+}
+
 int run(const Flags& flags) {
   const auto spec = flags.job.parse();
   if (!spec) return say_error(spec.error());
   for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report)})
     if (!file.empty())
       if (const auto ok = check_output(option, file); !ok) return say_error(ok.error());
-  // Here first: what is wrong is told before anything is sent.
-  const auto scene = read_local_scene(flags.scene, spec->defines, flags.job.strict);
-  if (!scene) return say_rejected(scene.error());
-  say_diagnostics(scene->warnings);
-  auto api = FarmApi::open(flags.farm);
-  if (!api) return say_error(api.error());
-  const auto job = api->submit(*scene, *spec, [&](const std::string& line) {
-    if (!flags.quiet) say(line);
-  });
+  const auto type = bundle_type(flags.scene);
+  const Job job = type ? submit_bundle(flags, *spec, *type) : submit_scene(flags, *spec);
   if (!job) return say_rejected(job.error());
   const std::string id = text_field(*job, "id");
   if (id.empty()) return say_error({Errc::internal, "the coordinator's answer names no job"});
   print(flags.farm.json ? job->dump() : plain_text(id));
   if (!flags.wait && flags.out.empty() && flags.report.empty()) return kOk;
-  const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
-  if (!end) return say_rejected(end.error());
-  if (const int code = say_end(*end); code != kOk) return code;
-  return fetch_results(*api, id, flags);
+  return wait_and_fetch(id, flags);
 }
 
 }  // namespace
@@ -64,7 +98,11 @@ void add_submit(CLI::App& app, Action& action) {
   auto flags = std::make_shared<Flags>();
   CLI::App* submit =
       app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
-  submit->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
+  submit
+      ->add_option("scene", flags->scene,
+                   "Mitsuba XML, or a .zip, .tar or .tar.gz with one and all its files")
+      ->required()
+      ->type_name("SCENE");
   flags->farm.add_to(*submit);
   flags->job.add_to(*submit);
   submit->add_option("--priority", flags->job.priority, "higher goes first; default 0")->type_name("N");

@@ -57,6 +57,7 @@ void add_limits(CLI::App& app, ls::http::Limits& limits) {
   hidden("--http-event-streams", limits.event_streams, 1);
   hidden("--http-event-queue", limits.event_queue, 1);
   hidden("--http-blob-bytes", limits.blob_bytes, 1);
+  hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
 Result<void> check_store(const std::string& store) {
@@ -149,7 +150,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   ls::coordinator::GrpcServer grpc(**coordinator, *join_token);
   const auto grpc_port = grpc.start(flags.grpc);
   if (!grpc_port) return tl::unexpected(grpc_port.error());
-  ls::http::Api api(**coordinator, *token, flags.limits, ls::http::StaticFiles(ls::http::embedded_files()));
+  ls::http::Limits limits = flags.limits;
+  limits.spool = data / "spool";
+  ls::http::Api api(**coordinator, *token, limits, ls::http::StaticFiles(ls::http::embedded_files()));
   (*http)->start(api);
   if (auto written = write_ports(data, (*http)->port(), *grpc_port); !written) return written;
 

@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "common/base/log.h"
+#include "coordinator/http/handlers.h"
 #include "coordinator/http/problem.h"
 
 namespace ls::http {
@@ -21,17 +22,9 @@ bool lists(std::string_view words, std::string_view word) {
 
 Response unsupported_type(const Route& route, std::string_view type) {
   std::string accepted(route.accepts);
+  if (!route.unpacks.empty()) accepted.append(" ").append(route.unpacks);
   for (std::size_t at = 0; (at = accepted.find(' ', at)) != std::string::npos; at += 2)
     accepted.replace(at, 1, ", ");
-  static constexpr std::string_view kBundles =
-      "application/zip application/x-zip-compressed application/x-tar "
-      "application/gzip application/x-gzip";
-  if (lists(kBundles, type))
-    return problem(
-        415, fmt::format("bundles ({}) are not read yet; accepted here: {}. Upload the scene and its assets "
-                         "with PUT /api/v1/blobs/SHA256 and name them in application/json {{scene, assets, "
-                         "spec}}, or send one self-contained scene as application/xml",
-                         type, accepted));
   return problem(
       415, fmt::format("Content-Type is {}; accepted here: {}", type.empty() ? "missing" : type, accepted));
 }
@@ -89,7 +82,8 @@ std::variant<Response, Match> Api::admit(const Request& request) const {
 std::optional<Response> Api::refuse_body(const Route& route, const Request& request) const {
   if (route.body == BodyKind::none) return std::nullopt;
   const std::string type = media_type(request.header("content-type"));
-  if (route.body == BodyKind::buffered && !lists(route.accepts, type)) return unsupported_type(route, type);
+  if (body_kind(route, request) == BodyKind::buffered && !lists(route.accepts, type))
+    return unsupported_type(route, type);
   const std::uint64_t limit = body_limit(route, request);
   if (request.content_length.value_or(0) > limit)
     return problem(413, fmt::format("the body has {} bytes; at most {} are accepted here",
@@ -97,20 +91,37 @@ std::optional<Response> Api::refuse_body(const Route& route, const Request& requ
   return std::nullopt;
 }
 
+BodyKind Api::body_kind(const Route& route, const Request& request) const {
+  if (route.unpacks.empty()) return route.body;
+  return lists(route.unpacks, media_type(request.header("content-type"))) ? BodyKind::archive : route.body;
+}
+
 std::uint64_t Api::body_limit(const Route& route, const Request& request) const {
-  if (route.body == BodyKind::blob) return limits_.blob_bytes;
+  const BodyKind kind = body_kind(route, request);
+  if (kind == BodyKind::blob) return limits_.blob_bytes;
+  if (kind == BodyKind::archive) return limits_.bundle_bytes;
   const bool is_job = route.body_limit == kMaxSceneXml;
   return is_job && media_type(request.header("content-type")) == "application/json" ? kMaxJobJson
                                                                                     : route.body_limit;
 }
 
+std::variant<Response, std::unique_ptr<BodySink>> Api::open_upload(const Match& match,
+                                                                   const Request& request) {
+  return body_kind(*match.route, request) == BodyKind::archive ? open_bundle(*this, request)
+                                                               : open_blob(*this, request, match.params);
+}
+
 Response Api::handle(const Match& match, const Request& request) {
+  return guarded(match.route->pattern, [&] { return match.route->handler(*this, request, match.params); });
+}
+
+Response guarded(std::string_view what, const std::function<Response()>& work) {
   try {
-    return match.route->handler(*this, request, match.params);
+    return work();
   } catch (const std::bad_alloc&) {
     return problem(503, "the coordinator has not enough memory for this request now");
   } catch (const std::exception& e) {
-    log_error(fmt::format("route={}", match.route->pattern), e.what());
+    log_error(fmt::format("route={}", what), e.what());
     return problem(500, fmt::format("a bug of the coordinator: {}", e.what()));
   }
 }

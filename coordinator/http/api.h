@@ -3,9 +3,11 @@
 // its sink.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <variant>
 
 #include "coordinator/http/auth.h"
@@ -36,10 +38,16 @@ class Api {
   std::variant<Response, Match> admit(const Request& request) const;
   // Bytes that this request's body may have, announced or not.
   std::uint64_t body_limit(const Route& route, const Request& request) const;
+  // What becomes of this request's body: the route's kind, or `archive` if it is of a type that the route
+  // unpacks.
+  BodyKind body_kind(const Route& route, const Request& request) const;
   // Runs the route's handler; no exception leaves it.
   Response handle(const Match& match, const Request& request);
-  // For a route with BodyKind::blob.
+  // For bodies that are streamed: BodyKind::blob and archive.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
+  // Long work ends at its next step: the coordinator stops.
+  void ask_to_stop() { stop_.request_stop(); }
+  std::stop_token stop_token() const { return stop_.get_token(); }
 
   coordinator::Coordinator& coordinator() { return coordinator_; }
   Auth& auth() { return auth_; }
@@ -54,7 +62,12 @@ class Api {
   Limits limits_;
   StaticFiles files_;
   Counters counters_;
+  std::stop_source stop_;
 };
+
+// What `work` answers; of an exception a 503 (no memory) or 500, so that none leaves. `what` names it in the
+// log.
+Response guarded(std::string_view what, const std::function<Response()>& work);
 
 // Characters and length of an id that we could have made; anything else is no job.
 bool plausible_id(std::string_view id);

@@ -1,4 +1,4 @@
-// What follows the header: bodies kept whole in memory, and blobs streamed to the store.
+// What follows the header: bodies kept whole in memory, and those streamed into a sink.
 #include <fmt/format.h>
 
 #include <boost/asio/use_awaitable.hpp>
@@ -29,8 +29,8 @@ net::awaitable<Connection::Body> Connection::read_whole(Parser& parser, Request&
   co_return Body{};
 }
 
-net::awaitable<Connection::Body> Connection::read_blob(Parser& parser, const Match& match,
-                                                       const Request& request) {
+net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const Match& match,
+                                                           const Request& request) {
   auto open = [this, &match, &request] { return shared_.api.open_upload(match, request); };
   auto opened = co_await run_on(shared_.slow, shared_.io, std::move(open));
   if (auto* refused = std::get_if<Response>(&opened)) co_return Body{Read::ok, std::move(*refused)};
@@ -49,7 +49,8 @@ net::awaitable<Connection::Body> Connection::read_blob(Parser& parser, const Mat
     sink.reset();  // here, on the pool: it may remove a large file
     return answer;
   };
-  auto answer = co_await run_on(shared_.slow, shared_.io, std::move(end));
+  const bool unpacks = whole && shared_.api.body_kind(*match.route, request) == BodyKind::archive;
+  auto answer = co_await run_on(unpacks ? shared_.bundles : shared_.slow, shared_.io, std::move(end));
   if (answer) body.answer = std::move(answer);
   co_return body;
 }

@@ -140,9 +140,11 @@ net::awaitable<bool> Connection::serve_one() {
 net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match, Request& request) {
   const Route& route = *match.route;
   Body body;
-  if (route.body == BodyKind::buffered)
+  const BodyKind kind = shared_.api.body_kind(route, request);
+  if (kind == BodyKind::buffered)
     body = co_await read_whole(parser, request, shared_.api.body_limit(route, request));
-  if (route.body == BodyKind::blob) body = co_await read_blob(parser, match, request);
+  if (kind == BodyKind::blob || kind == BodyKind::archive)
+    body = co_await read_streamed(parser, match, request);
   disarm();
   if (body.read != Read::ok) {
     co_await answer_failed_read(body.read);

@@ -39,6 +39,7 @@ struct Shared {
   net::io_context& io;
   net::thread_pool& quick;
   net::thread_pool& slow;
+  net::thread_pool& bundles;
   Api& api;
   std::set<Connection*> open;
   std::size_t event_streams = 0;
@@ -77,7 +78,7 @@ class Connection {
 
   // ---- body_reader.cpp ----
   net::awaitable<Body> read_whole(Parser& parser, Request& request, std::uint64_t limit);
-  net::awaitable<Body> read_blob(Parser& parser, const Match& match, const Request& request);
+  net::awaitable<Body> read_streamed(Parser& parser, const Match& match, const Request& request);
   net::awaitable<Body> read_into(Parser& parser, BodySink& sink);
   net::awaitable<Read> read_portion(Parser& parser, std::string& into, SteadyClock::time_point began,
                                     std::uint64_t& received);

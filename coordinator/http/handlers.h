@@ -6,6 +6,8 @@
 
 namespace ls::http {
 
+class BodySink;
+
 // handlers_system.cpp
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
@@ -30,8 +32,12 @@ Response get_convergence(Api&, const Request&, const Params&);
 Response get_tiles(Api&, const Request&, const Params&);
 Response get_log(Api&, const Request&, const Params&);
 
-// handlers_blobs.cpp; PUT is streamed: Api::open_upload
+// handlers_blobs.cpp; PUT is streamed
 Response post_blobs_missing(Api&, const Request&, const Params&);
 Response head_blob(Api&, const Request&, const Params&);
+std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&, const Params&);
+
+// handlers_bundles.cpp: POST /jobs with an archive
+std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Request&);
 
 }  // namespace ls::http

@@ -69,9 +69,11 @@ class CompareSink final : public BodySink {
   std::uint64_t limit_, received_ = 0;
 };
 
-std::variant<Response, std::unique_ptr<BodySink>> open_sink(Api& api, const Match& match,
-                                                            const Request& request) {
-  const auto digest = read_digest(std::string_view(match.params[0]), "the last part of the address");
+}  // namespace
+
+std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Request& request,
+                                                            const Params& params) {
+  const auto digest = read_digest(std::string_view(params[0]), "the last part of the address");
   if (!digest) return problem(digest.error());
   if (!request.header("content-range").empty())
     return problem(501,
@@ -87,13 +89,6 @@ std::variant<Response, std::unique_ptr<BodySink>> open_sink(Api& api, const Matc
   auto upload = blobs.begin_upload(*digest);
   if (!upload) return problem(upload.error());
   return std::make_unique<StoreSink>(std::move(*upload), *digest, api.limits().blob_bytes);
-}
-
-}  // namespace
-
-std::variant<Response, std::unique_ptr<BodySink>> Api::open_upload(const Match& match,
-                                                                   const Request& request) {
-  return open_sink(*this, match, request);
 }
 
 Response head_blob(Api& api, const Request&, const Params& params) {

@@ -9,6 +9,7 @@
 #include "coordinator/http/json_read.h"
 #include "coordinator/http/problem.h"
 #include "coordinator/http/spec_query.h"
+#include "coordinator/http/submission.h"
 #include "coordinator/views.h"
 
 namespace ls::http {
@@ -35,20 +36,6 @@ Result<std::map<std::string, Digest>> read_assets(const json& body) {
     assets.emplace(item.key(), *digest);
   }
   return assets;
-}
-
-Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
-  auto& blobs = api.coordinator().blobs();
-  if (!blobs.has(digest))
-    return fail(Errc::failed_precondition,
-                fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
-  const auto size = blobs.size(digest);
-  if (!size) return tl::unexpected(size.error());
-  if (*size > kMaxSceneXml)
-    return bad(fmt::format("the scene file has {} bytes; at most {} are accepted", *size, kMaxSceneXml));
-  const auto bytes = blobs.read(digest, 0, *size);
-  if (!bytes) return tl::unexpected(bytes.error());
-  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
 }
 
 Result<SubmitRequest> from_json(Api& api, const Request& request) {
@@ -138,15 +125,7 @@ Response post_job(Api& api, const Request& request, const Params&) {
   const bool is_json = media_type(request.header("content-type")) == "application/json";
   auto submit = is_json ? from_json(api, request) : from_xml(request);
   if (!submit) return problem(submit.error());
-  const auto id = api.coordinator().submit(std::move(*submit));
-  if (!id) return problem(id.error().error, id.error().diagnostics);
-  const std::string url = "/api/v1/jobs/" + id->value;
-  const auto job = api.coordinator().job(*id);
-  nlohmann::ordered_json body{{"id", id->value}, {"url", url}};
-  body["warnings"] = job ? job->warnings : std::vector<std::string>{};
-  Response response = json_response(201, write_json(body));
-  response.headers.emplace_back("Location", url);
-  return response;
+  return submit_job(api, std::move(*submit));
 }
 
 Response get_job(Api& api, const Request&, const Params& params) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 
 namespace ls::http {
 
@@ -23,6 +24,14 @@ inline constexpr std::size_t kMaxQueryParameters = 256;
 inline constexpr std::size_t kMaxIdLength = 64;  // of a job's id
 inline constexpr double kMaxExposure = 32;       // stops, either way
 
+// ---- bundles ----
+inline constexpr std::size_t kMaxBundleEntries = kMaxAssets;  // files and folders
+inline constexpr std::size_t kMaxBundleNames = 16u << 20;     // bytes of all names together
+inline constexpr std::size_t kMaxBundleJobJson = 1u << 20;    // job.json
+inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;   // a zip's list, which is read as a whole
+inline constexpr std::uint64_t kMaxBundleRatio = 200;         // unpacked bytes per byte of the archive ...
+inline constexpr std::uint64_t kBundleSlack = 64u << 20;      // ... beyond these: empty grids pack well
+
 // ---- buffers ----
 inline constexpr std::size_t kReadBuffer = 64u << 10;   // per connection
 inline constexpr std::size_t kBodyChunk = 256u << 10;   // handed to the disk at once
@@ -36,7 +45,9 @@ inline constexpr std::size_t kMaxRevokedSessions = 10'000;
 
 // Those that tests and an operator's config file may change.
 struct Limits {
-  std::uint64_t blob_bytes = std::uint64_t{64} << 30;  // PUT /blobs/SHA256
+  std::uint64_t blob_bytes = std::uint64_t{64} << 30;      // PUT /blobs/SHA256, and one file of a bundle
+  std::uint64_t bundle_bytes = std::uint64_t{16} << 30;    // POST /jobs with an archive
+  std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
   std::size_t event_streams = 128;  // of the connections; the rest stays free for requests
@@ -54,6 +65,8 @@ struct Limits {
   double stop_seconds = 5;        // for requests under way when the coordinator stops
   int quick_threads = 2;          // for answers out of memory
   int slow_threads = 4;           // for reading scenes, writing images and blobs
+  int bundle_threads = 2;         // for unpacking bundles, so that they never fill the slow ones
+  std::filesystem::path spool;  // where bundles lie while they are read; empty: the system's temporary folder
 };
 
 }  // namespace ls::http

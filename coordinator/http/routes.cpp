@@ -16,6 +16,9 @@ constexpr BodyKind kWhole = BodyKind::buffered;
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kPatchJson = "application/json application/merge-patch+json";
 constexpr std::string_view kJobTypes = "application/json application/xml text/xml";
+constexpr std::string_view kBundleTypes =
+    "application/zip application/x-zip-compressed application/x-tar application/x-tar+gzip "
+    "application/gzip application/x-gzip";
 
 constexpr std::array kRoutes = {
     Route{Method::get, "/healthz", kOpen, Lane::here, kNone, 0, get_healthz},
@@ -25,7 +28,8 @@ constexpr std::array kRoutes = {
     Route{Method::post, "/api/v1/session", kOpen, Lane::here, kWhole, kMaxSessionJson, post_session, kJson},
     Route{Method::del, "/api/v1/session", kOpen, Lane::here, kNone, 0, delete_session},
     Route{Method::get, "/api/v1/jobs", kToken, Lane::quick, kNone, 0, get_jobs},
-    Route{Method::post, "/api/v1/jobs", kToken, Lane::slow, kWhole, kMaxSceneXml, post_job, kJobTypes},
+    Route{Method::post, "/api/v1/jobs", kToken, Lane::slow, kWhole, kMaxSceneXml, post_job, kJobTypes,
+          kBundleTypes},
     Route{Method::get, "/api/v1/jobs/{id}", kToken, Lane::quick, kNone, 0, get_job},
     Route{Method::patch, "/api/v1/jobs/{id}", kToken, Lane::quick, kWhole, kMaxControlJson, patch_job,
           kPatchJson},

@@ -27,6 +27,8 @@ enum class BodyKind {
   none,      // anything that comes is thrown away
   buffered,  // whole, at most body_limit bytes
   blob,      // streamed into Api::open_upload
+  archive,   // the same; what comes is unpacked at its end, which takes its time. Of a request, never of a
+             // route
 };
 
 using Params = std::vector<std::string>;  // what stands for {..} in the pattern, in order
@@ -41,6 +43,7 @@ struct Route {
   std::uint64_t body_limit = 0;
   Handler handler = nullptr;      // none for BodyKind::blob
   std::string_view accepts = {};  // media types of a buffered body, separated by spaces
+  std::string_view unpacks = {};  // those whose body is an archive instead
 };
 
 std::span<const Route> routes();

@@ -51,7 +51,7 @@ Result<Address> parse_address(const std::string& text) {
 
 struct Server::State {
   // In this order: what a coroutine's frame uses outlives the io_context that destroys the frame.
-  std::unique_ptr<net::thread_pool> quick, slow;
+  std::unique_ptr<net::thread_pool> quick, slow, bundles;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};
@@ -162,7 +162,8 @@ void Server::start(Api& api) {
   State& s = *state_;
   s.quick = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().quick_threads));
   s.slow = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().slow_threads));
-  s.shared = std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, api, {}, 0, 0, false});
+  s.bundles = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().bundle_threads));
+  s.shared = std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, *s.bundles, api, {}, 0, 0, false});
   net::co_spawn(s.io, s.accept_loop(), net::detached);
   s.thread = std::thread([&s] { s.io.run(); });
 }
@@ -182,10 +183,12 @@ void Server::stop() {
     const auto patience = steady_seconds(s.shared->api.limits().stop_seconds);
     s.all_closed.wait_for(lock, patience, [&s] { return s.none_open; });
   }
+  s.shared->api.ask_to_stop();
   s.io.stop();
   s.thread.join();
   s.quick->join();
   s.slow->join();
+  s.bundles->join();
   state_.reset();  // with it the frames of connections that were cut: they use the api
 }
 

@@ -76,11 +76,13 @@ Result<void> add_define(Json& defines, std::string_view text) {
 
 }  // namespace
 
-Result<JobSpec> spec_from_query(const Fields& query, std::string_view also) {
+Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
+  // What is wrong there is told even if the query has something else in its place.
+  if (const auto alone = parse_job_spec(base); !alone) return alone;
   Json spec = Json::object();
   Json defines = Json::object();
   for (const auto& [key, text] : query) {
-    if (key == also) continue;
+    if (!also.empty() && key == also) continue;
     if (key == "define") {
       if (auto ok = add_define(defines, text); !ok) return tl::unexpected(ok.error());
       continue;
@@ -92,15 +94,17 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also) {
       return fail(
           Errc::invalid_argument,
           fmt::format(
-              "unknown query parameter '{}'; known: {}, spp, target_error, time, seed, size, integrator, "
+              "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
               "aov, define, priority, float, tags",
-              key, also));
+              key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);
   }
-  if (!defines.empty()) spec["defines"] = std::move(defines);
+  Json whole = Json::parse(base);  // parsed above without complaint
+  if (!defines.empty()) whole["defines"].update(defines);
+  whole.update(spec);
   // One validator for both ways in. What is not UTF-8 is replaced: no valid key or name has it.
-  return parse_job_spec(spec.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return parse_job_spec(whole.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace ls::http

@@ -10,7 +10,8 @@ namespace ls::http {
 
 // Keys: spp, target_error, time, seed, size, integrator, priority, float, aov and tags (comma lists), define
 // (repeated). A key of `also` is left alone; any other, a repeated one, or a wrong value is an error that
-// names it.
-Result<JobSpec> spec_from_query(const Fields& query, std::string_view also);
+// names it. What the query does not say is taken from `base`, the JSON of a spec; of `define` each name by
+// itself.
+Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

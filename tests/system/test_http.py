@@ -139,13 +139,6 @@ def test_a_wrong_scene_is_refused_with_places(farm):
     assert "sphere" in first["text"]
 
 
-@pytest.mark.parametrize("kind", ["application/zip", "application/x-tar"])
-def test_bundles_are_refused_with_what_to_send_instead(farm, kind):
-    answer = farm.ask("POST", "/api/v1/jobs", b"PK\x03\x04", {"Content-Type": kind})
-    assert answer.status == 415
-    assert "application/xml" in answer.json()["detail"]
-
-
 def test_garbage_is_answered(farm):
     for garbage in (b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n", b"GET\r\n\r\n", b"\xff" * 100 + b"\r\n\r\n"):
         with farm.connect() as sock:

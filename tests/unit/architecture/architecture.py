@@ -55,6 +55,7 @@ DOORS = [
     Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
     Door("Boost", r"^boost/", r"^coordinator/http/", "the HTTP server"),
+    Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/archive\.(h|cpp)$", "one file pair of the HTTP door"),
     Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
     Door("hiredis", r"^hiredis/", r"^$", "nowhere yet"),
     Door("pugixml", r"^pugixml\.hpp$", r"^common/scene/", "the scene reader"),

@@ -41,7 +41,8 @@ class ApiTest : public ::testing::Test {
     auto admitted = api.admit(r);
     if (auto* response = std::get_if<Response>(&admitted)) return *response;
     auto& match = std::get<Match>(admitted);
-    if (match.route->body != BodyKind::blob) return api.handle(match, r);
+    const BodyKind kind = api.body_kind(*match.route, r);
+    if (kind != BodyKind::blob && kind != BodyKind::archive) return api.handle(match, r);
     auto opened = api.open_upload(match, r);
     if (auto* response = std::get_if<Response>(&opened)) return *response;
     auto& sink = std::get<std::unique_ptr<BodySink>>(opened);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdio>
 #include <future>
 #include <thread>
 
@@ -192,6 +193,26 @@ TEST_F(ServerTest, RefusesTooLongABodyBeforeItComes) {
 
   EXPECT_EQ(ask(put("x", 5u << 20)), 413);
   EXPECT_EQ(coordinator.store.open_uploads, 0);
+}
+
+TEST_F(ServerTest, StreamsABundleToTheDiskWithinItsBounds) {
+  Limits limits = quick_limits();
+  limits.bundle_bytes = 700'000;
+  start(limits);
+  const std::string head =
+      "POST /api/v1/jobs HTTP/1.1\r\nHost: x\r\n" + kAuth + "Content-Type: application/x-tar\r\n";
+  const std::string zeros(512 * 1024, '\0');
+  char size[16];
+  std::snprintf(size, sizeof size, "%zx\r\n", zeros.size());
+  const std::string chunk = size + zeros + "\r\n";
+
+  // Well-formed, but there is nothing in it.
+  EXPECT_EQ(ask(head + "Content-Length: " + std::to_string(zeros.size()) + "\r\n\r\n" + zeros), 400);
+  EXPECT_EQ(ask(head + "Transfer-Encoding: chunked\r\n\r\n" + chunk + "0\r\n\r\n"), 400);
+  EXPECT_EQ(ask(head + "Transfer-Encoding: chunked\r\n\r\n" + chunk + chunk), 413);
+  EXPECT_EQ(ask(head + "Content-Length: 700001\r\n\r\n"), 413);
+  EXPECT_EQ(ask(head + "Content-Length: 0\r\n\r\n"), 400);
+  EXPECT_TRUE(coordinator.jobs().empty());
 }
 
 TEST_F(ServerTest, AnswersARefusedUploadThatIsStillBeingSent) {

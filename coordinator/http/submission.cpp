@@ -1,0 +1,37 @@
+#include "coordinator/http/submission.h"
+
+#include <fmt/format.h>
+
+#include "coordinator/http/json_read.h"
+#include "coordinator/http/problem.h"
+
+namespace ls::http {
+
+Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
+  auto& blobs = api.coordinator().blobs();
+  if (!blobs.has(digest))
+    return fail(Errc::failed_precondition,
+                fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
+  const auto size = blobs.size(digest);
+  if (!size) return tl::unexpected(size.error());
+  if (*size > kMaxSceneXml)
+    return fail(Errc::invalid_argument,
+                fmt::format("the scene file has {} bytes; at most {} are accepted", *size, kMaxSceneXml));
+  const auto bytes = blobs.read(digest, 0, *size);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+}
+
+Response submit_job(Api& api, coordinator::SubmitRequest request) {
+  const auto id = api.coordinator().submit(std::move(request));
+  if (!id) return problem(id.error().error, id.error().diagnostics);
+  const std::string url = "/api/v1/jobs/" + id->value;
+  const auto job = api.coordinator().job(*id);
+  nlohmann::ordered_json body{{"id", id->value}, {"url", url}};
+  body["warnings"] = job ? job->warnings : std::vector<std::string>{};
+  Response response = json_response(201, write_json(body));
+  response.headers.emplace_back("Location", url);
+  return response;
+}
+
+}  // namespace ls::http
