@@ -15,29 +15,10 @@ json text_or_null(const std::string& text) { return text.empty() ? json() : json
 // Names come from strangers: what is not UTF-8 is replaced.
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
 
-// ls_domain has to_string; the views must link without it.
-std::string_view state_word(JobState state) {
-  switch (state) {
-    case JobState::queued:
-      return "queued";
-    case JobState::running:
-      return "running";
-    case JobState::paused:
-      return "paused";
-    case JobState::done:
-      return "done";
-    case JobState::failed:
-      return "failed";
-    case JobState::cancelled:
-      return "cancelled";
-  }
-  return "";
-}
-
 json to_value(const JobView& v) {
   json j{{"id", v.id.value},
          {"name", v.name},
-         {"state", state_word(v.state)},
+         {"state", to_string(v.state)},
          {"stopped", text_or_null(v.stopped)},
          {"progress", number(v.progress)},
          {"spp", v.spp},

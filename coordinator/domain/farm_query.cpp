@@ -7,52 +7,6 @@
 
 namespace ls::coordinator {
 
-std::string_view to_string(JobState state) {
-  switch (state) {
-    case JobState::queued:
-      return "queued";
-    case JobState::running:
-      return "running";
-    case JobState::paused:
-      return "paused";
-    case JobState::done:
-      return "done";
-    case JobState::failed:
-      return "failed";
-    case JobState::cancelled:
-      return "cancelled";
-  }
-  return "";
-}
-
-std::string_view to_string(StopReason reason) {
-  switch (reason) {
-    case StopReason::spp:
-      return "spp";
-    case StopReason::error:
-      return "error";
-    case StopReason::time:
-      return "time";
-    case StopReason::user:
-      return "user";
-  }
-  return "";
-}
-
-std::string_view to_string(WorkerState state) {
-  switch (state) {
-    case WorkerState::connected:
-      return "connected";
-    case WorkerState::draining:
-      return "draining";
-    case WorkerState::lost:
-      return "lost";
-    case WorkerState::sick:
-      return "sick";
-  }
-  return "";
-}
-
 Result<void> check_plan(const JobPlan& plan) {
   const TileGrid& grid = plan.grid;
   if (plan.brief.job.empty()) return fail(Errc::invalid_argument, "a job needs an id");

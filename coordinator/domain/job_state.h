@@ -1,19 +1,29 @@
-// The states of a job, as the farm decides them and as users see them.
+// The states of a job, as the farm decides them and as users see them; each enumerator with its word.
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 
 namespace ls::coordinator {
 
 // queued: nothing of it has been leased yet. The last three are ends; only `done` can be extended.
 enum class JobState { queued, running, paused, done, failed, cancelled };
-std::string_view to_string(JobState state);
+constexpr std::string_view to_string(JobState state) {
+  constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
+  return kWords[static_cast<std::size_t>(state)];
+}
 
 // Why a job that is done went no further. The words of the report: "spp", "error", "time", "user".
 enum class StopReason { spp, error, time, user };
-std::string_view to_string(StopReason reason);
+constexpr std::string_view to_string(StopReason reason) {
+  constexpr std::string_view kWords[] = {"spp", "error", "time", "user"};
+  return kWords[static_cast<std::size_t>(reason)];
+}
 
 enum class WorkerState { connected, draining, lost, sick };
-std::string_view to_string(WorkerState state);
+constexpr std::string_view to_string(WorkerState state) {
+  constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};
+  return kWords[static_cast<std::size_t>(state)];
+}
 
 }  // namespace ls::coordinator
