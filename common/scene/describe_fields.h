@@ -121,6 +121,10 @@ void describe(V& v, T& s) {
   v.field(
       {.name = "use_grid_bbox", .doc = "place the grid by the bounding box in its file instead of [0, 1]^3"},
       s.use_grid_bbox);
+  v.field({.name = "node_centred",
+           .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true in "
+                  "files of version 0.x; not for `.vdb`"},
+          s.node_centred);
   v.field({.name = "raw", .doc = "no colour conversion; without effect, as volumes are linear RGB here"},
           s.raw);
   v.field({.name = "to_world", .doc = "places the grid's box in the world"}, s.to_world);
@@ -194,10 +198,6 @@ template <class V, Of<Shape> T>
 void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
   v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
-  v.field({.name = "node_centred",
-           .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true in "
-                  "files of version 0.x; not for `.vdb`"},
-          s.node_centred);
   v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
   v.field({.name = "bsdf",
            .doc = "`diffuse` if there is none, black if the shape emits light",

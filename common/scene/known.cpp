@@ -83,8 +83,6 @@ const std::map<std::string_view, PluginRow>& plugins() {
        {{"hg", "isotropic"},
         {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
   };
-      {"film", "ldrfilm", {"gamma", "exposure", "tonemap_method", "key", "burn"}, "colours stay linear"},
-      {"film", "mfilm", {"digits", "variable"}, output},
   return table;
 }
 
@@ -102,6 +100,8 @@ const std::vector<MeaninglessRow>& meaningless_table() {
        {"pixel_format", "component_format", "file_format", "banner", "attach_log", "high_quality_edges",
         "sample_border", "compensate", "fps"},
        output},
+      {"film", "ldrfilm", {"gamma", "exposure", "tonemap_method", "key", "burn"}, "colours stay linear"},
+      {"film", "mfilm", {"digits", "variable"}, output},
       {"sampler",
        "",
        {"seed", "scramble", "jitter", "dimension", "strict"},
@@ -139,7 +139,6 @@ const std::vector<MeaninglessRow>& meaningless_table() {
       {"integrator",
        "sppm",
        {"photon_count", "initial_radius", "alpha", "granularity", "max_passes"},
-      {"shape", "ply", {"srgb"}, "colours of vertices are not used"},
        sampling},
       {"integrator",
        "pssmlt",
@@ -157,6 +156,7 @@ const std::vector<MeaninglessRow>& meaningless_table() {
       {"sensor", "perspective", {"focus_distance"}, "a pinhole has everything in focus"},
       {"shape", "", {"silhouette_sampling_weight", "sampling_weight"}, sampling},
       {"shape", "obj", {"collapse"}, "files are read as they are"},
+      {"shape", "ply", {"srgb"}, "colours of vertices are not used"},
       {"bsdf", "roughconductor", {"sample_visible"}, sampling},
       {"bsdf", "roughplastic", {"sample_visible", "specular_sampling_weight"}, sampling},
       {"emitter", "", {"sampling_weight"}, sampling},
@@ -186,12 +186,6 @@ std::string_view meaningless_because(std::string_view tag, std::string_view plug
 std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin) {
   std::vector<std::string> all;
   for (const MeaninglessRow& row : meaningless_table())
-      {"medium", "material", "measured media are not known by name here; give their coefficients"},
-      {"shape", "max_smooth_angle",
-       "normals are those of the file or, with face_normals, those of its triangles"},
-      {"texture", "gamma", "only 1 is understood, for values that are linear as they are"},
-      {"texture", "wrap_mode_u", "only the same mode in both directions is understood"},
-      {"texture", "wrap_mode_v", "only the same mode in both directions is understood"},
     if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin))
       all.insert(all.end(), row.parameters.begin(), row.parameters.end());
   return all;
@@ -206,13 +200,14 @@ std::string_view replacement(std::string_view tag, std::string_view parameter) {
       {"medium", "sigma_a", kCoefficients},
       {"medium", "sigma_s", kCoefficients},
       {"medium", "density", "the density is the volume `sigma_t`; `scale` multiplies it"},
+      {"medium", "material", "measured media are not known by name here; give their coefficients"},
+      {"shape", "max_smooth_angle",
+       "normals are those of the file or, with face_normals, those of its triangles"},
+      {"texture", "gamma", "only 1 is understood, for values that are linear as they are"},
+      {"texture", "wrap_mode_u", "only the same mode in both directions is understood"},
+      {"texture", "wrap_mode_v", "only the same mode in both directions is understood"},
   };
   for (const auto& row : rows)
-bool is_supported_plugin(std::string_view tag, std::string_view plugin) {
-  const Names& names = supported_plugins(tag);
-  return std::find(names.begin(), names.end(), plugin) != names.end();
-}
-
     if (row.tag == tag && row.parameter == parameter) return row.instead;
   return {};
 }
@@ -225,6 +220,11 @@ const std::vector<std::string>& supported_plugins(std::string_view tag) {
 const std::vector<std::string>& unsupported_plugins(std::string_view tag) {
   const auto it = plugins().find(tag);
   return it == plugins().end() ? kNone : it->second.unsupported;
+}
+
+bool is_supported_plugin(std::string_view tag, std::string_view plugin) {
+  const Names& names = supported_plugins(tag);
+  return std::find(names.begin(), names.end(), plugin) != names.end();
 }
 
 bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {

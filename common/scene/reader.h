@@ -67,6 +67,7 @@ class Reader {
   std::optional<MediumIndex> read_medium(const Element& e);
   template <class T>
   std::optional<MediumIndex> read_any_medium(const Element& e);
+  void unbound_constant_density(const Element& e);
 
   void read_shape(const Element& e);
   template <class T>
@@ -76,7 +77,6 @@ class Reader {
   void check_placement(const Element& e, const Shape& shape);
 
   void read_emitter(const Element& e);
-  void unbound_constant_density(const Element& e);
   void read_directional(const Element& e);
   void read_point(const Element& e);
   void read_spot(const Element& e);
@@ -91,6 +91,7 @@ class Reader {
   ReconstructionFilter read_plain_filter(const Element& e);
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
+  void check_channels(Params& p);
 
   const Document& document_;
   AssetSource& assets_;
@@ -102,7 +103,6 @@ class Reader {
   // Films, filters and samplers of the top level, and which of them a sensor referred to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
-  void check_channels(Params& p);
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
 
   Memo<TextureIndex> textures_;

@@ -138,6 +138,7 @@ struct GridVolume {
   VolumeFilter filter = VolumeFilter::trilinear;
   Wrap wrap = Wrap::clamp;
   bool use_grid_bbox = false;
+  bool node_centred = false;  // values at nodes, the outermost on the box's faces, as in Mitsuba 0.x; not of VDB
   bool raw = true;
   Transform to_world;
   bool operator==(const GridVolume&) const = default;
@@ -175,7 +176,6 @@ using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
   bool operator==(const RectangleShape&) const = default;
 };
-  bool node_centred = false;  // values at nodes, the outermost on the box's faces, as in Mitsuba 0.x; not of VDB
 struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
   bool operator==(const CubeShape&) const = default;
 };
