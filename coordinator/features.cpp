@@ -46,8 +46,12 @@ SceneFeatures features_of(const Scene& scene) {
   say("camera inside a medium", scene.sensor.medium.has_value());
   say("thin lens", scene.sensor.aperture_radius > 0);
   say("bitmap textures", any<BitmapTexture>(scene.textures));
-  say("dielectrics", any<DielectricBsdf>(scene.bsdfs));
-  say("rough surfaces", any<RoughConductorBsdf>(scene.bsdfs) || any<RoughPlasticBsdf>(scene.bsdfs));
+  say("dielectrics", any<DielectricBsdf>(scene.bsdfs) || any<RoughDielectricBsdf>(scene.bsdfs));
+  say("rough surfaces", any<RoughConductorBsdf>(scene.bsdfs) || any<RoughPlasticBsdf>(scene.bsdfs) ||
+                            any<RoughDielectricBsdf>(scene.bsdfs));
+  say("surfaces that let light pass straight on",
+      any<MaskBsdf>(scene.bsdfs) || any<ThinDielectricBsdf>(scene.bsdfs));
+  say("normal maps", any<NormalMapBsdf>(scene.bsdfs));
   say("area lights", has_area_lights(scene));
   say("point and spot lights", any<PointEmitter>(scene.emitters) || any<SpotEmitter>(scene.emitters));
   say("directional lights", any<DirectionalEmitter>(scene.emitters));

@@ -73,10 +73,24 @@ LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
         "rough metal; `alpha` sets both alpha_u and alpha_v")
 LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water or the like")
+LS_TYPE(RoughDielectricBsdf, "bsdf", "roughdielectric", "",
+        "rough boundary of glass, water or the like; `alpha` sets both alpha_u and alpha_v. Indices within a "
+        "thousandth of each other, or a roughness below one, make it a `dielectric`")
+LS_TYPE(ThinDielectricBsdf, "bsdf", "thindielectric", "",
+        "a sheet of glass as one surface, reflections within the sheet included: light passes straight on, "
+        "which counts as no scattering")
+LS_TYPE(PlasticBsdf, "bsdf", "plastic", "", "diffuse base under a smooth dielectric coat")
 LS_TYPE(RoughPlasticBsdf, "bsdf", "roughplastic", "", "diffuse base under a rough dielectric coat")
 LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light passes unchanged")
 LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
         "gives each side of a surface a bsdf; one nested bsdf serves both")
+LS_TYPE(MaskBsdf, "bsdf", "mask", "",
+        "lets a share of the light pass straight on, shadows included; that counts as no scattering, and an "
+        "emitter on the surface is not masked")
+LS_TYPE(BlendBsdf, "bsdf", "blendbsdf", "", "a mixture of two bsdfs")
+LS_TYPE(NormalMapBsdf, "bsdf", "normalmap", "",
+        "turns the normal that a bsdf sees by an image (`raw` as a rule); light that the turned and the true "
+        "normal put on different sides is left out")
 LS_TYPE(ConstVolume, "volume", "constvolume", "",
         "one value: everywhere as an albedo or in a `homogeneous` medium, in [0, 1]^3 as the density of a "
         "`heterogeneous` one; also written as a plain `<rgb>` or `<float>`")

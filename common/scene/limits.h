@@ -21,6 +21,7 @@ inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;  // one att
 inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;  // all attributes together
 inline constexpr std::size_t kMaxSearchPaths = 64;                          // <path>
 inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, by reference too
+inline constexpr int kMaxBsdfNesting = 8;      // bsdfs within bsdfs: a blend of blends is 2^7 of them
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxNameWork = 4'000'000;  // cells of edit distance tables for one suggestion
 inline constexpr std::size_t kMaxExcerptBytes = 160;    // of a source line in a message

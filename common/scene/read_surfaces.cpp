@@ -1,7 +1,11 @@
 // Textures and bsdfs.
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "common/scene/bsdf_traits.h"
 #include "common/scene/known.h"
+#include "common/scene/limits.h"
 #include "common/scene/materials.h"
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
@@ -39,17 +43,54 @@ std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::
   return add_constant_texture(value);
 }
 
+namespace {
+
+// Reads all that the table says of T; `alpha` stands for alpha_u and alpha_v.
+template <class T>
+void bind_with_alpha(Params& p, T& b, Report& report) {
+  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
+    report.error(p.object().at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
+  bind(p, b);
+  if (const Element* alpha = p.take("alpha")) {
+    p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
+    b.alpha_v = b.alpha_u;
+  }
+}
+
+}  // namespace
+
 std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
   const std::string_view type = e.get("type");
   if (type == "diffuse") return read_plain_bsdf<DiffuseBsdf>(e);
   if (type == "null") return read_plain_bsdf<NullBsdf>(e);
   if (type == "dielectric") return read_plain_bsdf<DielectricBsdf>(e);
+  if (type == "thindielectric") return read_plain_bsdf<ThinDielectricBsdf>(e);
+  if (type == "roughdielectric") return read_rough<RoughDielectricBsdf>(e);
+  if (type == "plastic") return read_plain_bsdf<PlasticBsdf>(e);
   if (type == "roughplastic") return read_plain_bsdf<RoughPlasticBsdf>(e);
   if (type == "conductor") return read_metal<ConductorBsdf>(e);
   if (type == "roughconductor") return read_metal<RoughConductorBsdf>(e);
   if (type == "twosided") return read_twosided(e);
+  if (type == "mask") return read_mask(e);
+  if (type == "blendbsdf") return read_blend(e);
+  if (type == "normalmap") return read_normal_map(e);
   unknown_plugin(e, report_);
   return std::nullopt;
+}
+
+std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
+  scene_.bsdfs.push_back(bsdf);
+  const BsdfIndex index{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  if (traits(index).depth <= kMaxBsdfNesting) return index;
+  report_.error(e.at, fmt::format("bsdfs are nested more than {} deep", kMaxBsdfNesting));
+  return std::nullopt;
+}
+
+const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
+  // What a bsdf contains stands before it in the list.
+  for (std::size_t i = bsdf_traits_.size(); i < scene_.bsdfs.size(); ++i)
+    bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_));
+  return bsdf_traits_[bsdf.value];
 }
 
 template <class T>
@@ -58,30 +99,30 @@ std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
   T b;
   bind(p, b);
   p.finish();
-  scene_.bsdfs.emplace_back(b);
-  return BsdfIndex{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  return add_bsdf(e, b);
 }
 
-// As the plain ones, but eta and k also come by the name of a metal, and `alpha` stands for alpha_u and
-// alpha_v.
+template <class T>
+std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
+  Params p(*this, e);
+  T b;
+  bind_with_alpha(p, b, report_);
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+// As the others, but eta and k also come by the name of a metal.
 template <class T>
 std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
   Params p(*this, e);
   T b;
   read_metal_preset(p, b.eta, b.k);
-  const bool has_alpha = std::is_same_v<T, RoughConductorBsdf> && p.has("alpha");
-  if (has_alpha && (p.has("alpha_u") || p.has("alpha_v")))
-    report_.error(e.at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
-  bind(p, b);
-  if constexpr (std::is_same_v<T, RoughConductorBsdf>) {
-    if (const Element* alpha = p.take("alpha")) {
-      p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
-      b.alpha_v = b.alpha_u;
-    }
-  }
+  if constexpr (std::is_same_v<T, RoughConductorBsdf>)
+    bind_with_alpha(p, b, report_);
+  else
+    bind(p, b);
   p.finish();
-  scene_.bsdfs.emplace_back(b);
-  return BsdfIndex{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  return add_bsdf(e, b);
 }
 
 void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
@@ -102,31 +143,81 @@ void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
   k = metal->k;
 }
 
-std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
-  Params p(*this, e);
-  const auto nested = p.take_nested("bsdf");
+// The bsdfs that stand in this one in the order of the file; of a blend, as in Mitsuba, of their names if
+// both have one.
+std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::size_t at_least,
+                                                               std::size_t at_most) {
+  auto nested = p.take_nested("bsdf");
   p.finish();
-  if (nested.empty() || nested.size() > 2) {
-    report_.error(e.at,
-                  fmt::format("bsdf \"twosided\" needs one or two nested bsdfs, not {}", nested.size()));
+  if (nested.size() < at_least || nested.size() > at_most) {
+    const auto wanted = at_least == at_most ? (at_most == 1 ? "one nested bsdf" : "two nested bsdfs")
+                                            : "one or two nested bsdfs";
+    report_.error(p.object().at, fmt::format("{} needs {}, not {}", p.title(), wanted, nested.size()));
     return std::nullopt;
   }
-  std::vector<BsdfIndex> sides;
+  const bool blend = p.object().get("type") == "blendbsdf";
+  const auto named = [](const auto& n) { return !n.use->get("name").empty(); };
+  if (blend && std::all_of(nested.begin(), nested.end(), named))
+    std::stable_sort(nested.begin(), nested.end(),
+                     [](const auto& a, const auto& b) { return a.use->get("name") < b.use->get("name"); });
+  const bool two_sided = p.object().get("type") == "twosided";
+  std::vector<BsdfIndex> inner;
   for (const auto& [object, use] : nested) {
     const auto index = bsdf(*object, *use);
     if (!index) return std::nullopt;
-    const Bsdf& inner = scene_.bsdfs[index->value];
-    if (std::holds_alternative<DielectricBsdf>(inner) || std::holds_alternative<NullBsdf>(inner) ||
-        std::holds_alternative<TwoSidedBsdf>(inner)) {
+    if (two_sided && (traits(*index).transmits || traits(*index).two_sided)) {
       report_.error(use->at,
                     fmt::format("bsdf \"{}\" has two sides of its own: it can't stand in \"twosided\"",
                                 object->get("type")));
       return std::nullopt;
     }
-    sides.push_back(*index);
+    inner.push_back(*index);
   }
-  scene_.bsdfs.emplace_back(TwoSidedBsdf{sides.front(), sides.back()});
-  return BsdfIndex{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  return inner;
+}
+
+std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
+  Params p(*this, e);
+  const auto sides = read_inner_bsdfs(p, 1, 2);
+  if (!sides) return std::nullopt;
+  return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
+}
+
+std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
+  Params p(*this, e);
+  MaskBsdf b;
+  bind(p, b);
+  if (const auto* image = std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value])) {
+    BitmapTexture opacity = *image;  // others may use it for its colour
+    opacity.alpha = true;
+    scene_.textures.emplace_back(opacity);
+    b.opacity = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+  }
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_blend(const Element& e) {
+  Params p(*this, e);
+  BlendBsdf b;
+  bind(p, b);
+  const auto inner = read_inner_bsdfs(p, 2, 2);
+  if (!inner) return std::nullopt;
+  b.first = inner->front();
+  b.second = inner->back();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_normal_map(const Element& e) {
+  Params p(*this, e);
+  NormalMapBsdf b;
+  bind(p, b);
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
 }
 
 }  // namespace ls::scene

@@ -8,6 +8,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "common/scene/bsdf_traits.h"
 #include "common/scene/params.h"
 #include "common/scene/structure.h"
 
@@ -60,7 +61,16 @@ class Reader {
   std::optional<BsdfIndex> read_plain_bsdf(const Element& e);
   template <class T>
   std::optional<BsdfIndex> read_metal(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_rough(const Element& e);
   std::optional<BsdfIndex> read_twosided(const Element& e);
+  std::optional<BsdfIndex> read_mask(const Element& e);
+  std::optional<BsdfIndex> read_blend(const Element& e);
+  std::optional<BsdfIndex> read_normal_map(const Element& e);
+  std::optional<std::vector<BsdfIndex>> read_inner_bsdfs(Params& p, std::size_t at_least,
+                                                         std::size_t at_most);
+  std::optional<BsdfIndex> add_bsdf(const Element& e, const Bsdf& bsdf);
+  const BsdfTraits& traits(BsdfIndex bsdf);
   void read_metal_preset(Params& p, Rgb& eta, Rgb& k);
   std::optional<VolumeIndex> read_volume(const Element& e);
   std::optional<PhaseIndex> read_phase(const Element& e);
@@ -104,6 +114,7 @@ class Reader {
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
+  std::vector<BsdfTraits> bsdf_traits_;                // of the first bsdfs of scene_
 
   Memo<TextureIndex> textures_;
   Memo<BsdfIndex> bsdfs_;

@@ -68,6 +68,8 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
   UvTransform to_uv;
+  // For an opacity: the image's alpha channel, if that falls below 1/2 somewhere, and else its colour.
+  bool alpha = false;
   bool operator==(const BitmapTexture&) const = default;
 };
 // color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's
@@ -104,6 +106,24 @@ struct DielectricBsdf {
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const DielectricBsdf&) const = default;
 };
+struct RoughDielectricBsdf {
+  Microfacet distribution = Microfacet::beckmann;
+  TextureIndex alpha_u, alpha_v;
+  double int_ior = 1.5046, ext_ior = 1.000277;
+  TextureIndex specular_reflectance, specular_transmittance;
+  bool operator==(const RoughDielectricBsdf&) const = default;
+};
+struct ThinDielectricBsdf {  // both sides of a sheet in one surface: light passes without being bent
+  double int_ior = 1.5046, ext_ior = 1.000277;
+  TextureIndex specular_reflectance, specular_transmittance;
+  bool operator==(const ThinDielectricBsdf&) const = default;
+};
+struct PlasticBsdf {
+  double int_ior = 1.49, ext_ior = 1.000277;
+  bool nonlinear = false;
+  TextureIndex diffuse_reflectance, specular_reflectance;
+  bool operator==(const PlasticBsdf&) const = default;
+};
 struct RoughPlasticBsdf {
   Microfacet distribution = Microfacet::beckmann;
   double alpha = .1;
@@ -119,8 +139,25 @@ struct TwoSidedBsdf {
   BsdfIndex front, back;
   bool operator==(const TwoSidedBsdf&) const = default;
 };
-using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughPlasticBsdf,
-                          NullBsdf, TwoSidedBsdf>;
+// Bsdfs that hold others do so at most scene::kMaxBsdfNesting deep.
+struct MaskBsdf {  // the share 1 - opacity of the light passes straight on
+  TextureIndex opacity;
+  BsdfIndex bsdf;
+  bool operator==(const MaskBsdf&) const = default;
+};
+struct BlendBsdf {  // (1 - weight) first + weight second
+  TextureIndex weight;
+  BsdfIndex first, second;
+  bool operator==(const BlendBsdf&) const = default;
+};
+struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
+  TextureIndex normalmap;
+  BsdfIndex bsdf;
+  bool operator==(const NormalMapBsdf&) const = default;
+};
+using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughDielectricBsdf,
+                          ThinDielectricBsdf, PlasticBsdf, RoughPlasticBsdf, NullBsdf, TwoSidedBsdf, MaskBsdf,
+                          BlendBsdf, NormalMapBsdf>;
 
 // ---- volumes and media
 // ----------------------------------------------------------------------------------------------
@@ -138,7 +175,7 @@ struct GridVolume {
   VolumeFilter filter = VolumeFilter::trilinear;
   Wrap wrap = Wrap::clamp;
   bool use_grid_bbox = false;
-  bool node_centred = false;  // values at nodes, the outermost on the box's faces, as in Mitsuba 0.x; not of VDB
+  bool node_centred = false;  // the outermost values on the faces of the box (Mitsuba 0.x); not of VDB
   bool raw = true;
   Transform to_world;
   bool operator==(const GridVolume&) const = default;

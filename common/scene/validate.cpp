@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/scene/bsdf_traits.h"
 #include "common/scene/describe_fields.h"
 #include "common/scene/limits.h"
 
@@ -95,7 +96,7 @@ class Checker {
     check_list("emitters", s_.emitters);
     IndexWalker walker([&](const auto& i) { check("sensor", i); });
     walker.walk(s_.sensor);
-    if (wrong_.empty()) check_twosided();
+    if (wrong_.empty()) check_bsdf_nesting();
     if (wrong_.empty()) check_texture_nesting();
     if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
@@ -116,17 +117,20 @@ class Checker {
       wrong_ =
           fmt::format("scene.{} refers to object {} of a list of {}", where, i.value, pool(s_, i).size());
   }
-  // Also what keeps bsdfs from containing themselves.
-  void check_twosided() {
+  void check_bsdf_nesting() {
+    const auto traits = bsdf_traits(s_);
+    if (!traits) {
+      wrong_ = fmt::format(
+          "scene.bsdfs (twosided, mask, ...) contain each other in a circle or more than {} deep",
+          kMaxBsdfNesting);
+      return;
+    }
     for (const Bsdf& b : s_.bsdfs) {
       const auto* two = std::get_if<TwoSidedBsdf>(&b);
       if (!two) continue;
-      for (const BsdfIndex side : {two->front, two->back}) {
-        const Bsdf& inner = s_.bsdfs[side.value];
-        if (std::holds_alternative<TwoSidedBsdf>(inner) || std::holds_alternative<DielectricBsdf>(inner) ||
-            std::holds_alternative<NullBsdf>(inner))
+      for (const BsdfIndex side : {two->front, two->back})
+        if ((*traits)[side.value].transmits || (*traits)[side.value].two_sided)
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
-      }
     }
   }
   // Depth of each texture by relaxation over the list, as often as textures may nest.

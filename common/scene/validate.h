@@ -7,8 +7,8 @@
 
 namespace ls::scene {
 
-// The first thing wrong: an index out of its list, textures that contain themselves, a bsdf within `twosided`
-// that may not be there, a frame too large, matrices that are not finite; empty if all is well.
+// The first thing wrong: an index out of its list, textures or bsdfs that contain themselves, a bsdf within
+// `twosided` that may not be there, a frame too large, matrices that are not finite; empty if all is well.
 std::string find_inconsistency(const Scene& scene);
 
 // Pools reduced to what shapes, emitters and the sensor reach, in the order in which they are first reached;

@@ -23,7 +23,7 @@ class Accel {
 
   // The nearest primitive in (0, t_max); directions need not be of unit length.
   std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const;
-  // The nearest null boundary in (0, t_max).
+  // The nearest boundary that lets light pass, all or a share of it, in (0, t_max).
   std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const;
   // Whether an opaque primitive is met in (0, t_max).
   bool occluded(const V3& o, const V3& d, float t_max) const;

@@ -23,12 +23,12 @@ struct SurfaceInfo {  // one per scene shape
   std::uint32_t interior = kNone, exterior = kNone;  // media
   bool transition = false;                           // crossing it changes the medium
   bool null = false;                                 // index-matched: rays pass
+  bool veil = false;                                 // a share of the light passes (BsdfTable::veil)
   bool normals = false, uvs = false;                 // triangles: per-vertex data
   // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
   // frame.
   bool wants_uv = true, wants_tangent = true;
-  // Of its material: next-event estimation makes sense; light crosses it.
-  bool smooth = true, transmits = true;
+  bool smooth = true;      // of its material: next-event estimation makes sense
   float orientation = 1;  // -1: normals are flipped against winding or the outward direction
 };
 
@@ -65,7 +65,7 @@ class Geometry {
   // Reads the scene's shapes. Fails on files and transforms that no surface can be made of.
   static Result<Geometry> build(const Scene& scene, const AssetLoader& files);
 
-  // Triangles, spheres and disks are sorted: first the opaque ones, then the null boundaries.
+  // Triangles, spheres and disks are sorted: first the opaque ones, then those that light passes.
   std::vector<V3> positions;
   std::vector<V3> normals;             // parallel to positions if any surface has normals, else empty
   std::vector<V2> uvs;                 // likewise

@@ -6,6 +6,7 @@
 
 #include "common/assets/mesh.h"
 #include "common/base/overloaded.h"
+#include "common/scene/bsdf_traits.h"
 #include "worker/render/geometry.h"
 #include "worker/render/transform.h"
 
@@ -245,10 +246,12 @@ void append(Geometry& g, Placed& p, std::uint32_t surface) {
   }
 }
 
-SurfaceInfo surface_info(const Scene& scene, const Shape& s, bool vertex_normals) {
+SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits>& traits, const Shape& s,
+                         bool vertex_normals) {
   SurfaceInfo info;
   info.bsdf = s.bsdf;
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
+  info.veil = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;
@@ -273,13 +276,15 @@ void choose_world(Geometry& g, const Bounds& b) {
 
 Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
   Geometry g;
+  const auto traits = scene::bsdf_traits(scene);
+  if (!traits) return fail(Errc::invalid_argument, "the scene's materials contain themselves");
   std::vector<Placed> placed;
   Bounds bounds;
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
     auto p = place(scene.shapes[i], files);
     if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
     add_bounds(*p, bounds);
-    g.surfaces.push_back(surface_info(scene, scene.shapes[i], p->normals_given));
+    g.surfaces.push_back(surface_info(scene, *traits, scene.shapes[i], p->normals_given));
     placed.push_back(std::move(*p));
   }
   if (!bounds.empty() && !(std::isfinite(bounds.lo.x + bounds.lo.y + bounds.lo.z) &&
@@ -288,11 +293,11 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
                 "the scene's shapes reach to infinity: check transforms and mesh vertices");
   }
   choose_world(g, bounds);
-  for (const bool null : {false, true}) {
+  for (const bool passes : {false, true}) {
     for (std::uint32_t i = 0; i < placed.size(); ++i) {
-      if (g.surfaces[i].null == null) append(g, placed[i], i);
+      if ((g.surfaces[i].null || g.surfaces[i].veil) == passes) append(g, placed[i], i);
     }
-    if (!null) {
+    if (!passes) {
       g.opaque_triangles = g.triangle_count();
       g.opaque_spheres = static_cast<std::uint32_t>(g.spheres.size());
       g.opaque_disks = static_cast<std::uint32_t>(g.disks.size());

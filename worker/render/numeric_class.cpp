@@ -146,7 +146,11 @@ void add_bsdf_samples(Sha256& h) {
   for (const Microfacet type : {Microfacet::ggx, Microfacet::beckmann}) {
     scene.bsdfs.push_back(RoughConductorBsdf{type, smooth, rough, eta, k, colour});
     scene.bsdfs.push_back(RoughPlasticBsdf{type, .2, 1.5, 1, true, colour, colour});
+    scene.bsdfs.push_back(RoughDielectricBsdf{type, smooth, rough, 1.5, 1, colour, colour});
   }
+  scene.bsdfs.push_back(ThinDielectricBsdf{1.5, 1, colour, colour});
+  scene.bsdfs.push_back(PlasticBsdf{1.5, 1, true, colour, colour});
+  scene.bsdfs.push_back(NormalMapBsdf{colour, {0}});
   const auto textures = TextureTable::build(scene, {});
   if (!textures) return;
   const auto bsdfs = BsdfTable::build(scene, *textures);

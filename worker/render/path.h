@@ -56,6 +56,7 @@ class PathTracer {
   std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
   void focus_on_light(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
+  bool passes_veil(const SurfaceHit& hit);
   void pass_boundary(const SurfaceHit& hit);
   void light_surface(const SurfaceHit& hit, const V3& wo);
   void light_medium(const Medium& medium, const V3& p, const V3& d);
@@ -63,6 +64,8 @@ class PathTracer {
   void add_environment();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
                 RandomStream stream);
+  C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left, std::uint32_t medium,
+                        RandomStream stream);
   bool survives(float u);
 
   void add(const C3& weighted) {
@@ -149,8 +152,10 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
       break;
     }
     add_emission(hit);
-    if (world_.geometry.surfaces[hit.surface].null) {
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (surface.null || (surface.veil && passes_veil(hit))) {
       pass_boundary(hit);
+      if (is_black(beta_)) break;
       continue;
     }
     const auto u = scatter_on_surface(hit);
@@ -253,8 +258,9 @@ void PathTracer<F>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
-  // The shading normal must not let light through a surface that the geometric one closes.
-  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0) && !surface.transmits) return;
+  // The shading normal must not let light through a surface that the geometric one closes; the same for
+  // sampled directions.
+  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv, wo, wi);
   if (is_black(f.f_cos)) return;
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
@@ -293,6 +299,24 @@ std::optional<float> PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
   return g.u(3);
 }
 
+// Whether the path goes straight on through a surface that lets a share of the light pass. Then it was not
+// scattered there: it has no vertex, does not grow deeper, and a light that it finds is weighted against
+// next-event estimation from the vertex before, whose shadow rays pass the surface with the same share
+// (through_boundaries). The decision is keyed by the segment: the numbers of a vertex would be used again at
+// the next one.
+template <Features F>
+bool PathTracer<F>::passes_veil(const SurfaceHit& hit) {
+  const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
+  const Veil veil = world_.bsdfs.veil(bsdf, hit.uv, hit.shading.to_local(-d_));
+  if (!(veil.probability > 0)) return false;
+  if (stream_.group(segment_, Purpose::veil).u(0) < veil.probability) {
+    beta_ *= veil.transmission / veil.probability;
+    return true;
+  }
+  beta_ /= 1 - veil.probability;
+  return false;
+}
+
 template <Features F>
 void PathTracer<F>::pass_boundary(const SurfaceHit& hit) {
   start_ = hit.p;
@@ -319,48 +343,6 @@ void PathTracer<F>::add_environment() {
   add(beta_ * world_.lights.environment());
 }
 
-// Light that gets from the sampled light to `start`, through null boundaries and media. p is `start`, moved
-// off its surface after the light was sampled: the ray is aimed anew, so that it ends in front of the light
-// and not on it.
-template <Features F>
-C3 PathTracer<F>::unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
-                             RandomStream stream) {
-  V3 d = light.direction;
-  float left = light.distance;
-  if (std::isfinite(left)) {
-    const V3 f = light.target - p;
-    left = std::sqrt(dot(f, f));
-    if (!(left > 0)) return light.radiance;
-    d = f / left;
-  }
-  if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
-  C3 value = light.radiance;
-  if constexpr (F.media) {
-    if (!world_.use_media || (medium == kNone && !world_.accel.has_boundaries())) return value;
-    V3 from = start, o = p;
-    for (int i = 0; i < kMaxSegments; ++i) {
-      SurfaceHit hit;
-      const auto primitive = world_.accel.nearest_boundary(o, d, left);
-      const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
-      if (medium != kNone) {
-        const float t = (met ? std::min(hit.t, left) : left) + dot(o - from, d);
-        value *= transmittance<F>(world_.media[medium], from, d, 0, t, RandomStream(stream.next()));
-        if (is_black(value)) return value;
-      }
-      if (!met) return value;
-      medium = medium_beyond(hit, d, medium);
-      const V3 next = offset_point(hit.p, hit.ng, d);
-      if (std::isfinite(left)) left -= dot(next - o, d);
-      from = hit.p;
-      o = next;
-      if (!(left > 0)) return value;
-    }
-    outcome_.cut_off = true;
-    return {0, 0, 0};
-  }
-  return value;
-}
-
 // Russian roulette; false ends the path.
 template <Features F>
 bool PathTracer<F>::survives(float u) {
@@ -377,3 +359,5 @@ bool PathTracer<F>::survives(float u) {
 }
 
 }  // namespace ls::render
+
+#include "worker/render/path_shadow.h"

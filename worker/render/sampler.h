@@ -21,7 +21,8 @@ enum class Purpose : std::uint32_t {
   segment,
   track_flight,
   track_shadow,
-  track_segment
+  track_segment,
+  veil
 };
 
 // Four numbers of one purpose at one path vertex.

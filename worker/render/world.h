@@ -37,6 +37,7 @@ class World {
   Features need;
   bool use_media = true;     // false: the integrator `path`, which sees no media
   bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too
+  bool veils = false;        // some surface lets a share of the light pass: shadow rays collect it
   bool hide_emitters = false;
   int max_depth = -1;  // segments; -1: unlimited
   int rr_depth = 5;

@@ -162,7 +162,7 @@ void note_surface_needs(const Scene& scene, World& w) {
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.smooth = w.bsdfs.has_smooth(s.bsdf);
-    s.transmits = w.bsdfs.transmits(s.bsdf);
+    w.veils = w.veils || s.veil;
   }
 }
 

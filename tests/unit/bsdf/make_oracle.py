@@ -35,6 +35,18 @@ for dist in ("beckmann", "ggx"):
                                               "int_ior": 1.9, "ext_ior": 1.0, "nonlinear": True,
                                               "diffuse_reflectance": rgb(0.1, 0.27, 0.9),
                                               "specular_reflectance": rgb(1, 0.5, 0.25)}
+    for a in (0.1, 0.5):
+        MATERIALS[f"glass_{dist}_{a}"] = {"type": "roughdielectric", "distribution": dist, "alpha": a, "int_ior": 1.5, "ext_ior": 1.0,
+                                          "specular_reflectance": rgb(0.9, 0.8, 0.7), "specular_transmittance": rgb(0.5, 0.6, 0.7)}
+    MATERIALS[f"glass_{dist}_aniso"] = {"type": "roughdielectric", "distribution": dist, "alpha_u": 0.4, "alpha_v": 0.1,
+                                        "int_ior": 1.333, "ext_ior": 1.0}
+for ior in (1.49, 1.9):
+    MATERIALS[f"smooth_plastic_{ior}"] = {"type": "plastic", "int_ior": ior, "ext_ior": 1.0, "diffuse_reflectance": rgb(0.1, 0.27, 0.9)}
+MATERIALS["smooth_plastic_nonlinear"] = {"type": "plastic", "int_ior": 1.49, "ext_ior": 1.0, "nonlinear": True,
+                                         "diffuse_reflectance": rgb(0.1, 0.27, 0.9)}
+MATERIALS["mask"] = {"type": "mask", "opacity": 0.3, "bsdf": {"type": "diffuse", "reflectance": rgb(0.2, 0.5, 0.9)}}
+MATERIALS["blend"] = {"type": "blendbsdf", "weight": 0.25, "bsdf_0": {"type": "diffuse", "reflectance": rgb(0.2, 0.5, 0.9)},
+                      "bsdf_1": dict(GOLD, type="roughconductor", distribution="ggx", alpha=0.3)}
 
 
 def direction(cos_theta, phi):
@@ -51,7 +63,12 @@ def pairs(name, material):
             wi = [m + spread * rng.gauss(0, 1) for m in mirror]
             wi[2] = abs(wi[2])
             n = math.sqrt(sum(x * x for x in wi))
-            yield wo, [x / n for x in wi]
+            wi = [x / n for x in wi]
+            yield wo, wi
+            if name.startswith("glass"):  # both sides, in and out
+                yield [wo[0], wo[1], -wo[2]], [wi[0], wi[1], -wi[2]]
+                yield wo, [wi[0] / 2, wi[1] / 2, -math.sqrt(1 - (wi[0] ** 2 + wi[1] ** 2) / 4)]
+                yield [wo[0], wo[1], -wo[2]], wi
     if name == "twosided":
         yield [0.6, 0, -0.8], [0, 0.6, -0.8]
 

@@ -75,6 +75,58 @@ inline Scene glass(double int_ior, double ext_ior) {
   return s;
 }
 
+inline Scene plastic(double int_ior, double ext_ior, bool nonlinear, const Rgb& diffuse,
+                     const Rgb& tint = {1, 1, 1}) {
+  Scene s;
+  add(s, PlasticBsdf{int_ior, ext_ior, nonlinear, texture(s, diffuse), texture(s, tint)});
+  return s;
+}
+inline Scene rough_glass(Microfacet d, double au, double av, double int_ior, double ext_ior,
+                         const Rgb& reflectance = {1, 1, 1}, const Rgb& transmittance = {1, 1, 1}) {
+  Scene s;
+  add(s, RoughDielectricBsdf{d, texture(s, au), texture(s, av), int_ior, ext_ior, texture(s, reflectance),
+                             texture(s, transmittance)});
+  return s;
+}
+inline Scene thin_glass(double ior, const Rgb& reflectance = {1, 1, 1},
+                        const Rgb& transmittance = {1, 1, 1}) {
+  Scene s;
+  add(s, ThinDielectricBsdf{ior, 1, texture(s, reflectance), texture(s, transmittance)});
+  return s;
+}
+// Of the last material.
+inline BsdfIndex last(const Scene& s) { return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)}; }
+inline Scene masked(Scene s, double opacity) {
+  add(s, MaskBsdf{texture(s, opacity), last(s)});
+  return s;
+}
+inline Scene two_sided(Scene s) {
+  add(s, TwoSidedBsdf{last(s), last(s)});
+  return s;
+}
+// By a constant normal.
+inline Scene turned(Scene s, const V3& n) {
+  add(s, NormalMapBsdf{texture(s, Rgb{.5 + .5 * n.x, .5 + .5 * n.y, .5 + .5 * n.z}), last(s)});
+  return s;
+}
+// The materials of `b` go behind those of `a`; those that contain others are not moved along.
+inline Scene blend(Scene a, const Scene& b, double weight) {
+  const auto shift = static_cast<std::uint32_t>(a.textures.size());
+  const BsdfIndex first = last(a);
+  a.textures.insert(a.textures.end(), b.textures.begin(), b.textures.end());
+  const auto move = [&](auto&... texture) { ((texture.value += shift), ...); };
+  Bsdf second = b.bsdfs.at(0);
+  if (auto* m = std::get_if<DiffuseBsdf>(&second)) move(m->reflectance);
+  if (auto* m = std::get_if<ConductorBsdf>(&second)) move(m->specular_reflectance);
+  if (auto* m = std::get_if<RoughConductorBsdf>(&second))
+    move(m->alpha_u, m->alpha_v, m->specular_reflectance);
+  if (auto* m = std::get_if<RoughDielectricBsdf>(&second))
+    move(m->alpha_u, m->alpha_v, m->specular_reflectance, m->specular_transmittance);
+  add(a, second);
+  add(a, BlendBsdf{texture(a, weight), first, last(a)});
+  return a;
+}
+
 inline V3 direction(double cos_theta, double phi) {
   const double sin = std::sqrt(std::max(0., 1 - cos_theta * cos_theta));
   return {static_cast<float>(sin * std::cos(phi)), static_cast<float>(sin * std::sin(phi)),

@@ -18,16 +18,10 @@ constexpr OracleRow kOracle[] = {
 #include "tests/unit/bsdf/oracle_values.inc"
 };
 
-Scene two_sided() {
-  Scene s = diffuse({.2, .5, .9});
-  add(s, TwoSidedBsdf{{0}, {0}});
-  return s;
-}
-
 std::map<std::string, Scene> materials() {
   std::map<std::string, Scene> m;
   m["diffuse"] = diffuse({.2, .5, .9});
-  m["twosided"] = two_sided();
+  m["twosided"] = two_sided(diffuse({.2, .5, .9}));
   for (const auto& [d, name] :
        {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
     for (const auto& [a, text] :
@@ -38,7 +32,15 @@ std::map<std::string, Scene> materials() {
       m[fmt::format("plastic_{}_{}", name, a)] = rough_plastic(d, a, 1.49, 1.000277, false, {.1, .27, .9});
     m[fmt::format("plastic_{}_nonlinear", name)] =
         rough_plastic(d, .2, 1.9, 1, true, {.1, .27, .9}, {1, .5, .25});
+    for (const double a : {.1, .5})
+      m[fmt::format("glass_{}_{}", name, a)] = rough_glass(d, a, a, 1.5, 1, {.9, .8, .7}, {.5, .6, .7});
+    m[fmt::format("glass_{}_aniso", name)] = rough_glass(d, .4, .1, 1.333, 1);
   }
+  for (const double ior : {1.49, 1.9})
+    m[fmt::format("smooth_plastic_{}", ior)] = plastic(ior, 1, false, {.1, .27, .9});
+  m["smooth_plastic_nonlinear"] = plastic(1.49, 1, true, {.1, .27, .9});
+  m["mask"] = masked(diffuse({.2, .5, .9}), .3);
+  m["blend"] = blend(diffuse({.2, .5, .9}), rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .25);
   return m;
 }
 
@@ -49,7 +51,8 @@ V3 vec(const double (&v)[3]) {
 // Both sides work in float32. The half vector is good to about 1e-7 absolute, which an exponent e =
 // (tan/alpha)^2 turns into a relative error of 2 sqrt(e) 1e-7 / alpha of the lobe: below 1e-4 for alpha >=
 // .02 and e < 87. Plastic: Mitsuba integrates its tables in float32 with fewer nodes; 1e-3 is what we ask
-// there.
+// there. Smooth plastic: Mitsuba takes the internal reflectance from a fit that is good to 1e-3, we the
+// integral; a share of (1 - r) near .4 makes it 2e-3.
 TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
   std::map<std::string, std::unique_ptr<Bench>> benches;
   for (auto& [name, scene] : materials()) benches[name] = bench(scene);
@@ -59,7 +62,9 @@ TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
     const std::string name(row.material);
     ASSERT_TRUE(benches.contains(name)) << name;
     ++rows[name];
-    const double tolerance = name.starts_with("plastic") ? 1e-3 : 1e-4;
+    const double tolerance = name.starts_with("smooth_plastic") ? 2e-3
+                             : name.starts_with("plastic")      ? 1e-3
+                                                                : 1e-4;
 
     const BsdfEval e = benches[name]->eval(vec(row.wo), vec(row.wi));
 

@@ -193,5 +193,19 @@ TEST(Checkerboard, MayHoldOthersAsDeepAsTheReaderLetsThem) {
   EXPECT_THAT(build_error(chain(scene::kMaxReferenceDepth + 1)), HasSubstr("deep"));
 }
 
+TEST(Bitmap, AnOpacityIsTheAlphaChannelIfThatMasks) {
+  BitmapTexture opacity{{0}, TextureFilter::nearest};
+  opacity.alpha = true;
+  const V2 left(.25f, .5f), right(.75f, .5f);
+  const TextureTable masks = table(with(opacity), {2, 1, 4, {10, 20, 30, 0, 40, 50, 60, 102}, {}, true});
+  EXPECT_EQ(masks.eval({0}, left), C3(0));
+  EXPECT_EQ(masks.eval({0}, right), C3(102 / 255.f)) << "linear, whatever the colours are";
+  const TextureTable grey = table(with(opacity), {2, 1, 2, {0, 249, 255, 255}, {}, true});
+  EXPECT_EQ(grey.eval({0}, left), C3(0)) << "an alpha that hides nothing: the colour is the mask";
+  EXPECT_EQ(grey.eval({0}, right), C3(1));
+  const TextureTable plain = table(with(opacity), {2, 1, 3, {}, {0, 0, 0, .5f, .5f, .5f}, false});
+  EXPECT_EQ(plain.eval({0}, right), C3(.5f));
+}
+
 }  // namespace
 }  // namespace ls::render

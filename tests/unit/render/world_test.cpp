@@ -58,6 +58,21 @@ SceneKit with_medium(auto make) {
 }
 const Transform kBox = translate({-1, -1, -1}) * test::scale(2);
 
+// Panes and masks in front of everything, and around a medium if there is one.
+SceneKit veiled(SceneKit kit) {
+  const TextureIndex white = kit.texture({1, 1, 1}), tint = kit.texture({.9, .5, .7}),
+                     rough = kit.texture({.2, .2, .2});
+  const BsdfIndex pane = kit.bsdf(ThinDielectricBsdf{1.5, 1, white, tint});
+  const BsdfIndex glass = kit.bsdf(RoughDielectricBsdf{Microfacet::ggx, rough, rough, 1.5, 1, white, tint});
+  const BsdfIndex grey = kit.diffuse(.5);
+  const BsdfIndex mask = kit.bsdf(MaskBsdf{kit.texture({.3, .3, .3}), kit.bsdf(TwoSidedBsdf{grey, grey})});
+  const BsdfIndex blend = kit.bsdf(BlendBsdf{kit.texture({.4, .4, .4}), mask, glass});
+  kit.shape(RectangleShape{}, translate({0, 0, 1}) * test::scale(2), mask);
+  kit.shape(RectangleShape{}, translate({0, -2, 0}) * test::rotate_x(90) * test::scale(2), pane);
+  kit.shape(SphereShape{}, translate({.2, -.9, -.6}) * test::scale(.3), blend);
+  return kit;
+}
+
 std::vector<Named> scenes() {
   std::vector<Named> all;
   all.push_back({"surfaces", room(), 5});
@@ -89,6 +104,11 @@ std::vector<Named> scenes() {
                    return k.heterogeneous(k.constant({0, 1, 4}), {.9, .9, .9}, 1, .5);
                  }),
                  1});
+  all.push_back({"veils", veiled(room()), 5});
+  all.push_back({"veils and a chromatic medium", veiled(with_medium([](SceneKit& k) {
+                   return k.homogeneous({0, .8, 3}, {.9, .9, .9}, -.3);
+                 })),
+                 2});
   return all;
 }
 

@@ -2,6 +2,10 @@
 // constant. Values are Mitsuba 3's (separable Smith masking, its Beckmann rational fit, its rough plastic
 // tables).
 //
+// Some surfaces let a share of the light pass straight on (mask, thin dielectric): the veil. Paths and shadow
+// rays go through it without a vertex, so that next-event estimation reaches lights behind; eval() and
+// sample() are about the rest of the light, whose weights keep their share of the whole.
+//
 // Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer
 // or the previous vertex) and wi (where the path goes next, or the light) are unit vectors that point AWAY
 // from the surface. All values are for radiance carried from wi to wo: refraction includes the factor 1 /
@@ -33,6 +37,11 @@ struct BsdfSample {
   float eta = 1;  // refractive index on the side of wi over that on the side of wo; 1 unless refracted
 };
 
+struct Veil {
+  C3 transmission{0, 0, 0};  // the share of light that passes straight on
+  float probability = 0;     // that a path should; 1 - probability is positive wherever anything else happens
+};
+
 class BsdfTable {
  public:
   BsdfTable();
@@ -40,17 +49,21 @@ class BsdfTable {
   BsdfTable(BsdfTable&&) noexcept;
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
-  // `textures` must outlive the table. invalid_argument: an index out of range, a two-sided material whose
-  // side lets light through, an index of refraction or roughness that is not a positive finite number.
+  // `textures` must outlive the table. invalid_argument: an index out of range, materials that contain
+  // themselves, a two-sided one whose side lets light through, an index of refraction or roughness that is
+  // not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const;
   // Nothing: absorbed, or the sampled direction is on the wrong side. u_lobe and u are in [0, 1).
   std::optional<BsdfSample> sample(BsdfIndex i, V2 uv, const V3& wo, float u_lobe, V2 u) const;
 
-  bool is_null(BsdfIndex i) const;     // index-matched boundary: light passes unchanged
-  bool has_smooth(BsdfIndex i) const;  // any lobe that is not a delta: next-event estimation makes sense
-  bool transmits(BsdfIndex i) const;   // light can cross the surface (null, dielectric)
+  // For light along w, from either side.
+  Veil veil(BsdfIndex i, V2 uv, const V3& w) const;
+
+  bool is_null(BsdfIndex i) const;      // index-matched boundary: light passes unchanged
+  bool has_veil(BsdfIndex i) const;     // some light passes straight on, some does not
+  bool has_smooth(BsdfIndex i) const;   // any lobe that is not a delta: next-event estimation makes sense
   bool reads_uv(BsdfIndex i) const;     // some value of it is a texture
   bool anisotropic(BsdfIndex i) const;  // the tangents of the local frame matter
   std::size_t size() const;
@@ -60,6 +73,12 @@ class BsdfTable {
   struct Material;
 
  private:
+  BsdfEval eval_wide(const Material& m, V2 uv, const V3& wo, const V3& wi) const;
+  std::optional<BsdfSample> sample_wide(const Material& m, V2 uv, const V3& wo, float u_lobe, V2 u) const;
+  std::optional<BsdfSample> sample_part(std::uint32_t part, V2 uv, const V3& wo, float u_lobe, V2 u) const;
+  struct Mixture;
+  Mixture mixture(const Material& m, V2 uv, const V3& wo) const;
+
   std::vector<Material> materials_;
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;

@@ -4,6 +4,9 @@
 #include <tuple>
 
 #include "common/base/overloaded.h"
+#include "common/scene/bsdf_traits.h"
+#include "common/scene/limits.h"
+#include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
 
 namespace ls::render {
@@ -20,7 +23,8 @@ using Material = BsdfTable::Material;
 // Collects the first error, so that the conversions below read as tables.
 class Builder {
  public:
-  Builder(const Scene& scene, const TextureTable& textures) : scene_(scene), textures_(textures) {}
+  Builder(const Scene& scene, const TextureTable& textures, const std::vector<scene::BsdfTraits>& traits)
+      : scene_(scene), textures_(textures), traits_(traits) {}
 
   std::optional<Error> error;
   std::uint64_t clamped = 0;
@@ -51,6 +55,37 @@ class Builder {
     m.second_slot = reflectance(b.specular_transmittance);
     return m;
   }
+  Material operator()(const RoughDielectricBsdf& b) {
+    Material m = make(MaterialKind::rough_dielectric);
+    m.ior = static_cast<float>(index(b.int_ior, b.ext_ior));
+    m.distribution = b.distribution;
+    m.alpha_u = roughness(b.alpha_u);
+    m.alpha_v = roughness(b.alpha_v);
+    m.specular_slot = reflectance(b.specular_reflectance);
+    m.second_slot = reflectance(b.specular_transmittance);
+    // Facets of slope t bend light by about (ior - 1) t: nothing to be seen, but a lobe too narrow for
+    // float32.
+    if (mirror(m) || std::abs(m.ior - 1) < kSpecularAlpha) m.kind = MaterialKind::dielectric;
+    return m;
+  }
+  Material operator()(const ThinDielectricBsdf& b) {
+    Material m = make(MaterialKind::thin_dielectric);
+    m.veil = true;
+    m.ior = static_cast<float>(index(b.int_ior, b.ext_ior));
+    m.specular_slot = reflectance(b.specular_reflectance);
+    m.second_slot = reflectance(b.specular_transmittance);
+    return m;
+  }
+  Material operator()(const PlasticBsdf& b) {
+    Material m = make(MaterialKind::plastic);
+    const double eta = index(b.int_ior, b.ext_ior);
+    m.nonlinear = b.nonlinear;
+    m.ior = static_cast<float>(eta);
+    m.specular = true;
+    coat_and_base(m, b.diffuse_reflectance, b.specular_reflectance);
+    m.coat.internal_reflectance = static_cast<float>(internal_diffuse_reflectance(eta));
+    return m;
+  }
   Material operator()(const RoughPlasticBsdf& b) {
     Material m = make(MaterialKind::rough_plastic);
     const double eta = index(b.int_ior, b.ext_ior);
@@ -62,11 +97,8 @@ class Builder {
     m.ior = static_cast<float>(eta);
     m.specular = b.alpha < kSpecularAlpha;
     m.alpha_u = m.alpha_v = Slot{C3(static_cast<float>(b.alpha)), {}, true};
-    m.second_slot = reflectance(b.diffuse_reflectance);
-    m.specular_slot = reflectance(b.specular_reflectance);
+    coat_and_base(m, b.diffuse_reflectance, b.specular_reflectance);
     if (error) return m;
-    const float d = mean(m.second_slot), s = mean(m.specular_slot);
-    m.specular_weight = d + s > 0 ? s / (d + s) : 1;
     m.coat = coat(b.distribution, b.alpha, eta);
     return m;
   }
@@ -75,6 +107,28 @@ class Builder {
     Material m = make(MaterialKind::two_sided);
     m.front = side(b.front);
     m.back = side(b.back);
+    return m;
+  }
+  Material operator()(const MaskBsdf& b) {
+    Material m = make(MaterialKind::mask);
+    m.veil = true;
+    m.specular_slot = reflectance(b.opacity);
+    m.front = b.bsdf.value;
+    return m;
+  }
+  Material operator()(const BlendBsdf& b) {
+    Material m = make(MaterialKind::blend);
+    m.veil = traits_[b.first.value].passes || traits_[b.second.value].passes;
+    m.specular_slot = reflectance(b.weight);
+    m.front = b.first.value;
+    m.back = b.second.value;
+    return m;
+  }
+  Material operator()(const NormalMapBsdf& b) {
+    Material m = make(MaterialKind::normal_map);
+    m.veil = traits_[b.bsdf.value].passes;
+    m.specular_slot = slot(b.normalmap);
+    m.front = b.bsdf.value;
     return m;
   }
 
@@ -87,7 +141,15 @@ class Builder {
   void refuse(std::string text) {
     if (!error) error = Error{Errc::invalid_argument, std::move(text)};
   }
-  // Integrated once for all materials alike: a table takes 30 ms, and scenes colour many objects the same way.
+  void coat_and_base(Material& m, TextureIndex diffuse, TextureIndex specular) {
+    m.second_slot = reflectance(diffuse);
+    m.specular_slot = reflectance(specular);
+    if (error) return;
+    const float d = mean(m.second_slot), s = mean(m.specular_slot);
+    m.specular_weight = d + s > 0 ? s / (d + s) : 1;
+  }
+  // Integrated once for all materials alike: a table takes 30 ms, and scenes colour many objects the same
+  // way.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta) {
     const auto [it, fresh] = coats_.try_emplace({type, alpha, eta});
     if (fresh) it->second = make_rough_plastic_table(type, alpha, eta);
@@ -146,32 +208,45 @@ class Builder {
   }
   // What a side of a two-sided material really is. A two-sided one there shows its front, from both sides.
   std::uint32_t side(BsdfIndex b) {
-    for (std::size_t steps = 0; steps <= scene_.bsdfs.size(); ++steps) {
-      if (b.value >= scene_.bsdfs.size()) break;
-      const Bsdf& bsdf = scene_.bsdfs[b.value];
-      if (std::holds_alternative<NullBsdf>(bsdf) || std::holds_alternative<DielectricBsdf>(bsdf)) {
-        refuse("a two-sided material cannot hold one that lets light through");
-        return 0;
-      }
-      const auto* nested = std::get_if<TwoSidedBsdf>(&bsdf);
-      if (!nested) return b.value;
-      b = nested->front;
-    }
-    refuse("a two-sided material names a material that does not exist, or itself");
-    return 0;
+    if (traits_[b.value].transmits) refuse("a two-sided material cannot hold one that lets light through");
+    while (const auto* nested = std::get_if<TwoSidedBsdf>(&scene_.bsdfs[b.value])) b = nested->front;
+    return b.value;
   }
 
   const Scene& scene_;
   const TextureTable& textures_;
+  const std::vector<scene::BsdfTraits>& traits_;
   std::map<std::tuple<Microfacet, double, double>, RoughPlasticTable> coats_;
 };
+
+// Whether it holds for a part that the material consists of.
+template <class F>
+bool any_part(const Material& m, F holds) {
+  switch (m.kind) {
+    case MaterialKind::two_sided:
+    case MaterialKind::blend:
+      return holds(BsdfIndex{m.front}) || holds(BsdfIndex{m.back});
+    case MaterialKind::mask:
+    case MaterialKind::normal_map:
+      return holds(BsdfIndex{m.front});
+    default:
+      return false;
+  }
+}
 
 }  // namespace
 
 Result<BsdfTable> BsdfTable::build(const Scene& scene, const TextureTable& textures) {
   BsdfTable table;
   table.textures_ = &textures;
-  Builder builder(scene, textures);
+  const auto traits = scene::bsdf_traits(scene);
+  if (!traits)
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("a material contains one that does not exist, or itself, or materials nested more "
+                    "than {} deep",
+                    scene::kMaxBsdfNesting));
+  Builder builder(scene, textures, *traits);
   table.materials_.reserve(scene.bsdfs.size());
   for (const Bsdf& b : scene.bsdfs) {
     table.materials_.push_back(std::visit(builder, b));
@@ -188,34 +263,32 @@ std::uint64_t BsdfTable::bytes() const { return materials_.size() * sizeof(Mater
 std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 
 bool BsdfTable::is_null(BsdfIndex i) const { return materials_[i.value].kind == MaterialKind::null; }
-bool BsdfTable::transmits(BsdfIndex i) const {
-  const MaterialKind k = materials_[i.value].kind;
-  return k == MaterialKind::null || k == MaterialKind::dielectric;
-}
+bool BsdfTable::has_veil(BsdfIndex i) const { return materials_[i.value].veil; }
 bool BsdfTable::has_smooth(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   switch (m.kind) {
     case MaterialKind::diffuse:
     case MaterialKind::rough_conductor:
     case MaterialKind::rough_plastic:
+    case MaterialKind::plastic:
+    case MaterialKind::rough_dielectric:
       return true;
-    case MaterialKind::two_sided:
-      return has_smooth({m.front}) || has_smooth({m.back});
     default:
-      return false;
+      return any_part(m, [&](BsdfIndex part) { return has_smooth(part); });
   }
 }
 bool BsdfTable::reads_uv(BsdfIndex i) const {
   const Material& m = materials_[i.value];
-  if (m.kind == MaterialKind::two_sided) return reads_uv({m.front}) || reads_uv({m.back});
-  return !(m.specular_slot.constant && m.second_slot.constant && m.alpha_u.constant && m.alpha_v.constant);
+  return !(m.specular_slot.constant && m.second_slot.constant && m.alpha_u.constant && m.alpha_v.constant) ||
+         any_part(m, [&](BsdfIndex part) { return reads_uv(part); });
 }
 bool BsdfTable::anisotropic(BsdfIndex i) const {
   const Material& m = materials_[i.value];
-  if (m.kind == MaterialKind::two_sided) return anisotropic({m.front}) || anisotropic({m.back});
+  if (m.kind == MaterialKind::normal_map) return true;
   const bool same = m.alpha_u.constant ? m.alpha_v.constant && m.alpha_u.value == m.alpha_v.value
                                        : !m.alpha_v.constant && m.alpha_u.texture == m.alpha_v.texture;
-  return m.kind == MaterialKind::rough_conductor && !same;
+  return ((m.kind == MaterialKind::rough_conductor || m.kind == MaterialKind::rough_dielectric) && !same) ||
+         any_part(m, [&](BsdfIndex part) { return anisotropic(part); });
 }
 
 }  // namespace ls::render

@@ -13,9 +13,17 @@ enum class MaterialKind : std::uint8_t {
   rough_conductor,
   dielectric,
   rough_plastic,
+  plastic,
   null,
-  two_sided
+  two_sided,
+  // From here on "wide": they scatter to both sides, or consist of others (scatter_wide.cpp).
+  thin_dielectric,
+  rough_dielectric,
+  mask,
+  blend,
+  normal_map
 };
+inline constexpr MaterialKind kFirstWide = MaterialKind::thin_dielectric;
 
 // A reflectance or roughness: its value if constant, else where to read it.
 struct Slot {
@@ -28,15 +36,17 @@ struct BsdfTable::Material {
   MaterialKind kind = MaterialKind::diffuse;
   Microfacet distribution = Microfacet::beckmann;
   bool nonlinear = false;
-  bool specular = false;              // rough plastic with a smooth coat
-  std::uint32_t front = 0, back = 0;  // two_sided: materials that are not two-sided themselves
-  Slot specular_slot;                 // specular_reflectance
-  Slot second_slot;  // specular_transmittance; diffuse reflectance of diffuse and rough_plastic
+  bool specular = false;  // rough plastic with a smooth coat
+  bool veil = false;      // some light passes straight on, and some does not
+  std::uint32_t front = 0,
+                back = 0;  // two_sided: materials that are not two-sided themselves; parts of others
+  Slot specular_slot;      // specular_reflectance; opacity of mask, weight of blend, colours of normal_map
+  Slot second_slot;        // specular_transmittance; diffuse reflectance of diffuse and plastics
   Slot alpha_u, alpha_v;
   C3 eta{0, 0, 0}, k{1, 1, 1};  // conductors
   float ior = 1;                // inside over outside
-  float specular_weight = 1;    // rough_plastic: how often the coat is sampled, before Fresnel
-  RoughPlasticTable coat;
+  float specular_weight = 1;    // plastics: how often the coat is sampled, before Fresnel
+  RoughPlasticTable coat;       // of plastic only its internal reflectance
 };
 
 }  // namespace ls::render

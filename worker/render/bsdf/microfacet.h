@@ -39,9 +39,10 @@ inline float pdf_over_D(const V3& wo, float ax, float ay) {
   const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
   return .5f / (bound_k(wo, ax, ay) * wo.z + t);
 }
-inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u) {
+// k: 1 for all visible normals, bound_k for those that reflect upwards.
+inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
-  const float b = bound_k(wo, ax, ay) * i.z;
+  const float b = k * i.z;
   const float z = (1 - u.y) * (1 + b) - b, r = safe_sqrt((1 - z) * (1 + z));
   const V2 c = unit_circle(u.x) * r;
   const V3 m = V3(c.x, c.y, z) + i;
@@ -89,8 +90,17 @@ struct Microfacets {
     return type == Microfacet::ggx ? ggx::pdf_over_D(wo, ax, ay) : beckmann::pdf_over_D(wo, ax, ay);
   }
   V3 sample_normal(const V3& wo, const V2& u) const {
-    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u)
+    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, ggx::bound_k(wo, ax, ay))
                                    : beckmann::sample_normal(wo, ax, ay, u);
+  }
+  // For refraction, which sends light down from normals that would reflect it down: all visible normals m,
+  // with the density D(m) visible_over_D(wo) dot(wo, m).
+  V3 sample_visible(const V3& wo, const V2& u) const {
+    return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, 1)
+                                   : beckmann::sample_normal(wo, ax, ay, u);
+  }
+  float visible_over_D(const V3& wo) const {
+    return type == Microfacet::ggx ? ggx::G1_over_cos(wo, ax, ay) : beckmann::exact_G1_over_cos(wo, ax, ay);
   }
 };
 

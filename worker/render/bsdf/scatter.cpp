@@ -1,38 +1,12 @@
-// eval() and sample(): the lobes of each kind of material.
+// eval() and sample(): the lobes of one-sided kinds of material, and the way to the others.
 #include "worker/render/bsdf/fresnel.h"
-#include "worker/render/bsdf/material.h"
+#include "worker/render/bsdf/lobes.h"
 
 namespace ls::render {
 
 namespace {
 
 using Material = BsdfTable::Material;
-
-struct Lookup {
-  const TextureTable& textures;
-  V2 uv;
-
-  C3 reflectance(const Slot& s) const {
-    if (s.constant) return s.value;
-    const C3 c = textures.eval(s.texture, uv);
-    return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
-  }
-  float alpha(const Slot& s) const {
-    const C3 c = s.constant ? s.value : textures.eval(s.texture, uv);
-    return c.x == c.y && c.y == c.z ? c.x : luminance(c);
-  }
-  struct Roughness {
-    Microfacets facets;
-    bool mirror;
-  };
-  Roughness roughness(const Material& m) const {
-    const float u = alpha(m.alpha_u), v = alpha(m.alpha_v);
-    return {{m.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)},
-            u < kSpecularAlpha && v < kSpecularAlpha};
-  }
-};
-
-V3 mirrored(const V3& w) { return {-w.x, -w.y, w.z}; }
 
 // ---- diffuse
 // --------------------------------------------------------------------------------------------------------
@@ -69,39 +43,14 @@ std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microface
   return s;
 }
 
-std::optional<BsdfSample> sample_mirror(const C3& weight, const V3& wo) {
-  BsdfSample s;
-  s.wi = mirrored(wo);
-  s.weight = weight;
-  s.pdf = 1;
-  s.delta = true;
-  return s;
-}
-
-// ---- dielectric
-// -----------------------------------------------------------------------------------------------------
-std::optional<BsdfSample> sample_dielectric(const Material& m, const Lookup& look, const V3& wo,
-                                            float u_lobe) {
-  const DielectricFresnel f = fresnel_dielectric(wo.z, m.ior);
-  const float R = static_cast<float>(f.reflectance);
-  if (u_lobe < R) {
-    auto s = sample_mirror(look.reflectance(m.specular_slot), wo);
-    s->pdf = R;
-    return s;
-  }
-  const float eta_ti = static_cast<float>(f.eta_ti);
-  BsdfSample s;
-  s.wi = m.ior == 1 ? -wo : normalize(V3(-eta_ti * wo.x, -eta_ti * wo.y, static_cast<float>(f.cos_t)));
-  s.weight = look.reflectance(m.second_slot) * static_cast<float>(f.eta_ti * f.eta_ti);
-  s.pdf = 1 - R;
-  s.delta = true;
-  s.transmitted = true;
-  s.eta = static_cast<float>(f.eta_it);
-  return s;
-}
-
-// ---- rough plastic
+// ---- plastics
 // --------------------------------------------------------------------------------------------------
+float coat_reflectance(float cos, float ior) {
+  return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
+}
+
+// kSmooth: the coat is a plane boundary, by Fresnel's formulas; else a rough one, by tables.
+template <bool kSmooth>
 struct Plastic {
   const Material& m;
   C3 diffuse, tint;
@@ -114,24 +63,24 @@ struct Plastic {
         diffuse(look.reflectance(m.second_slot)),
         tint(look.reflectance(m.specular_slot)),
         facets{m.distribution, m.alpha_u.value.x, m.alpha_v.value.x},
-        t_o(m.coat.at(wo.z)) {
+        t_o(through(m, wo.z)) {
     const float s = (1 - t_o) * m.specular_weight, d = t_o * (1 - m.specular_weight);
     p_specular = s + d > 0 ? s / (s + d) : .5f;
   }
 
+  static float through(const Material& m, float cos) {
+    return kSmooth ? 1 - coat_reflectance(cos, m.ior) : m.coat.at(cos);
+  }
   // Light that entered, was scattered any number of times below the coat, and left.
   C3 diffuse_f_cos(const V3& wi) const {
     const float r = m.coat.internal_reflectance;
     const C3 inside = m.nonlinear ? C3(1) - diffuse * r : C3(1 - r);
-    return diffuse / inside * (kInvPi / (m.ior * m.ior) * wi.z * t_o * m.coat.at(wi.z));
+    return diffuse / inside * (kInvPi / (m.ior * m.ior) * wi.z * t_o * through(m, wi.z));
   }
 };
 
-float coat_reflectance(float cos, float ior) {
-  return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
-}
-
-BsdfEval eval_plastic(const Plastic& p, const V3& wo, const V3& wi) {
+template <bool kSmooth>
+BsdfEval eval_plastic(const Plastic<kSmooth>& p, const V3& wo, const V3& wi) {
   BsdfEval e{p.diffuse_f_cos(wi), (1 - p.p_specular) * wi.z * kInvPi};
   if (p.m.specular) return e;
   const V3 h = normalize(wo + wi);
@@ -141,7 +90,8 @@ BsdfEval eval_plastic(const Plastic& p, const V3& wo, const V3& wi) {
   return e;
 }
 
-std::optional<BsdfSample> sample_plastic(const Plastic& p, const V3& wo, float u_lobe, const V2& u) {
+template <bool kSmooth>
+std::optional<BsdfSample> sample_plastic(const Plastic<kSmooth>& p, const V3& wo, float u_lobe, const V2& u) {
   const bool coat = u_lobe < p.p_specular;
   if (coat && p.m.specular) {
     auto s = sample_mirror(p.tint * (coat_reflectance(wo.z, p.m.ior) / p.p_specular), wo);
@@ -178,7 +128,8 @@ BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
     m = &materials_[o.z < 0 ? m->back : m->front];
     if (o.z < 0) o = flipped(o), in = flipped(in);
   }
-  if (!(o.z > 0) || !(in.z > 0)) return {};  // no smooth lobe of ours transmits, and none shines on the back
+  if (m->kind >= kFirstWide) return eval_wide(*m, uv, o, in);
+  if (!(o.z > 0) || !(in.z > 0)) return {};  // none of the others has a smooth lobe on the back
   const Lookup look{*textures_, uv};
   switch (m->kind) {
     case MaterialKind::diffuse:
@@ -189,7 +140,9 @@ BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
       return eval_rough_metal({m->eta, m->k, look.reflectance(m->specular_slot)}, rough.facets, o, in);
     }
     case MaterialKind::rough_plastic:
-      return eval_plastic(Plastic(*m, look, o), o, in);
+      return eval_plastic(Plastic<false>(*m, look, o), o, in);
+    case MaterialKind::plastic:
+      return eval_plastic(Plastic<true>(*m, look, o), o, in);
     default:
       return {};
   }
@@ -212,8 +165,13 @@ std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, V2 uv, const V3& wo, fl
   const Lookup look{*textures_, uv};
   if (m->kind == MaterialKind::dielectric)
     return o.z != 0 ? sample_dielectric(*m, look, o, u_lobe) : std::nullopt;
-  if (!(o.z > 0)) return std::nullopt;
   std::optional<BsdfSample> s;
+  if (m->kind >= kFirstWide) {
+    s = sample_wide(*m, uv, o, u_lobe, u);
+    if (s && from_behind) s->wi = flipped(s->wi);
+    return s;
+  }
+  if (!(o.z > 0)) return std::nullopt;
   const auto metal = [&] { return Metal{m->eta, m->k, look.reflectance(m->specular_slot)}; };
   switch (m->kind) {
     case MaterialKind::diffuse:
@@ -229,7 +187,10 @@ std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, V2 uv, const V3& wo, fl
       break;
     }
     case MaterialKind::rough_plastic:
-      s = sample_plastic(Plastic(*m, look, o), o, u_lobe, u);
+      s = sample_plastic(Plastic<false>(*m, look, o), o, u_lobe, u);
+      break;
+    case MaterialKind::plastic:
+      s = sample_plastic(Plastic<true>(*m, look, o), o, u_lobe, u);
       break;
     default:
       break;

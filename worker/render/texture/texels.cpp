@@ -56,15 +56,27 @@ C3 mean_of(const Texels& t) {
   return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
 }
 
-// Keeps the first `keep` of `have` interleaved channels.
+// Keeps `keep` of `have` interleaved channels, from `first` on.
 template <class T>
-void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t keep) {
+void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, std::uint32_t keep) {
   if (have == keep) return;
   const std::size_t n = v.size() / have;
   for (std::size_t i = 0; i < n; ++i)
-    for (std::uint32_t k = 0; k < keep; ++k) v[i * keep + k] = v[i * have + k];
+    for (std::uint32_t k = 0; k < keep; ++k) v[i * keep + k] = v[i * have + first + k];
   v.resize(n * keep);
   v.shrink_to_fit();
+}
+
+// Whether the last channel is an alpha that masks: images whose colour is the mask also come with one that is
+// all but opaque.
+bool has_alpha(const ImageData& image) {
+  if (image.channels % 2) return false;
+  const auto transparent = [&](const auto& v, auto half) {
+    for (std::size_t i = image.channels - 1; i < v.size(); i += image.channels)
+      if (v[i] < half) return true;
+    return false;
+  };
+  return transparent(image.u8, std::uint8_t{128}) || transparent(image.f32, .5f);
 }
 
 Result<void> check_texels(std::string_view name, Texels& t) {
@@ -96,22 +108,23 @@ C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
   return top * (1 - y.t) + bottom * y.t;
 }
 
-Result<Texels> make_texels(std::string_view name, ImageData image, bool raw) {
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha) {
   const std::uint64_t values = std::uint64_t{image.width} * image.height * image.channels;
   if (values == 0 || image.channels > 4 || (image.u8.empty() ? image.f32.size() : image.u8.size()) != values)
     return fail(Errc::invalid_argument, fmt::format("texture '{}' has no pixels", name));
-  const std::uint32_t keep = image.channels < 3 ? 1 : 3;
+  alpha = alpha && has_alpha(image);
+  const std::uint32_t keep = image.channels < 3 || alpha ? 1 : 3, first = alpha ? image.channels - 1 : 0;
   Texels t;
   t.width = image.width;
   t.height = image.height;
   t.channels = keep;
-  const bool decode = image.srgb && !raw;
+  const bool decode = image.srgb && !raw && !alpha;
   for (int i = 0; i < 256; ++i)
     t.decode[i] = static_cast<float>(decode ? srgb_to_linear(i / 255.) : i / 255.);
   t.u8 = std::move(image.u8);
   t.f32 = std::move(image.f32);
-  drop_channels(t.u8, image.channels, keep);
-  drop_channels(t.f32, image.channels, keep);
+  drop_channels(t.u8, image.channels, first, keep);
+  drop_channels(t.f32, image.channels, first, keep);
   if (auto ok = check_texels(name, t); !ok) return tl::unexpected(ok.error());
   if (decode)
     for (float& v : t.f32) v = static_cast<float>(srgb_to_linear(v));

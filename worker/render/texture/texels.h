@@ -37,7 +37,8 @@ struct Texels {
   C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
 };
 
-// Drops alpha, decodes sRGB unless raw, refuses NaN and infinity with the texel's place.
-Result<Texels> make_texels(std::string_view name, ImageData image, bool raw);
+// Drops alpha, decodes sRGB unless raw, refuses NaN and infinity with the texel's place. With `alpha` it is
+// the colour that is dropped, if the image has an alpha channel that falls below 1/2 somewhere.
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false);
 
 }  // namespace ls::render

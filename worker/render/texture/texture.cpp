@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -53,19 +54,19 @@ struct TextureTable::Data {
 
 namespace {
 
-using TexelsKey = std::pair<std::uint32_t, bool>;  // asset, raw
+using TexelsKey = std::tuple<std::uint32_t, bool, bool>;  // asset, raw, alpha
 
 Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
                                   TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {
   if (b.file.value >= scene.assets.size())
     return fail(Errc::invalid_argument,
                 fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
-  const TexelsKey key{b.file.value, b.raw};
+  const TexelsKey key{b.file.value, b.raw, b.alpha};
   if (const auto it = loaded.find(key); it != loaded.end()) return it->second;
   const Asset& asset = scene.assets[b.file.value];
   auto image = load(asset);
   if (!image) return tl::unexpected(image.error());
-  auto texels = make_texels(asset.name, std::move(*image), b.raw);
+  auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha);
   if (!texels) return tl::unexpected(texels.error());
   data.clamped += texels->clamped;
   data.texels.push_back(std::move(*texels));

@@ -1,0 +1,161 @@
+// Surfaces as they are read: defaults, nesting, what is refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/bsdf_traits.h"
+#include "common/scene/limits.h"
+#include "tests/unit/scene/scene_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string sphere(const std::string& bsdf) {
+  return with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>");
+}
+Scene with_bsdf(const std::string& bsdf) { return must_read(sphere(bsdf)); }
+std::string error_of(const std::string& bsdf) {
+  const ReadResult r = read(sphere(bsdf));
+  return r.scene ? "" : messages(r);
+}
+template <class T>
+const T& bsdf_of(const Scene& s) {
+  return std::get<T>(s.bsdfs.at(s.shapes.at(0).bsdf.value));
+}
+template <class T>
+const T& at(const Scene& s, BsdfIndex i) {
+  return std::get<T>(s.bsdfs.at(i.value));
+}
+Rgb colour(const Scene& s, TextureIndex i) { return std::get<ConstantTexture>(s.textures.at(i.value)).value; }
+
+constexpr char kDiffuse[] = "<bsdf type=\"diffuse\"/>", kGlass[] = "<bsdf type=\"thindielectric\"/>";
+
+// Mitsuba 3.9.1's, as its plugins print them.
+TEST(Surfaces, WhatIsNotGivenIsMitsubasDefault) {
+  const Scene plastic = with_bsdf("<bsdf type=\"plastic\"/>");
+  const auto& p = bsdf_of<PlasticBsdf>(plastic);
+  EXPECT_EQ(p.int_ior, 1.49);
+  EXPECT_EQ(p.ext_ior, 1.000277);
+  EXPECT_FALSE(p.nonlinear);
+  EXPECT_EQ(colour(plastic, p.diffuse_reflectance), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(colour(plastic, p.specular_reflectance), (Rgb{1, 1, 1}));
+
+  const Scene rough = with_bsdf("<bsdf type=\"roughdielectric\"/>");
+  const auto& r = bsdf_of<RoughDielectricBsdf>(rough);
+  EXPECT_EQ(r.distribution, Microfacet::beckmann);
+  EXPECT_EQ(r.int_ior, 1.5046);
+  EXPECT_EQ(colour(rough, r.alpha_u), (Rgb{.1, .1, .1}));
+  EXPECT_EQ(colour(rough, r.alpha_v), (Rgb{.1, .1, .1}));
+  EXPECT_EQ(colour(rough, r.specular_transmittance), (Rgb{1, 1, 1}));
+
+  EXPECT_EQ(bsdf_of<ThinDielectricBsdf>(with_bsdf(kGlass)).int_ior, 1.5046);
+  const Scene mask = with_bsdf(fmt::format("<bsdf type=\"mask\">{}</bsdf>", kDiffuse));
+  EXPECT_EQ(colour(mask, bsdf_of<MaskBsdf>(mask).opacity), (Rgb{.5, .5, .5}));
+}
+
+TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
+  const Scene one = with_bsdf(
+      "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\".3\"/><string name=\"int_ior\" "
+      "value=\"water\"/><string name=\"distribution\" value=\"ggx\"/></bsdf>");
+  const auto& b = bsdf_of<RoughDielectricBsdf>(one);
+  EXPECT_EQ(b.alpha_u, b.alpha_v);
+  EXPECT_EQ(colour(one, b.alpha_u), (Rgb{.3, .3, .3}));
+  EXPECT_EQ(b.int_ior, 1.333);
+  EXPECT_EQ(b.distribution, Microfacet::ggx);
+  EXPECT_THAT(error_of("<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\".3\"/><float "
+                       "name=\"alpha_u\" value=\".3\"/></bsdf>"),
+              HasSubstr("gives both alpha and alpha_u"));
+}
+
+TEST(Surfaces, AnOpacityTakesAlphaFromItsImageAndOthersStillItsColour) {
+  const Scene s = with_bsdf(
+      "<bsdf type=\"mask\"><texture type=\"bitmap\" name=\"opacity\" id=\"leaf\"><string name=\"filename\" "
+      "value=\"wood.png\"/></texture><bsdf type=\"diffuse\"><ref name=\"reflectance\" "
+      "id=\"leaf\"/></bsdf></bsdf>");
+  const auto& m = bsdf_of<MaskBsdf>(s);
+  EXPECT_TRUE(std::get<BitmapTexture>(s.textures.at(m.opacity.value)).alpha);
+  EXPECT_FALSE(std::get<BitmapTexture>(s.textures.at(at<DiffuseBsdf>(s, m.bsdf).reflectance.value)).alpha);
+  EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
+}
+
+TEST(Surfaces, BlendsAreOrderedByNameOrElseByPlace) {
+  const std::string weight = "<float name=\"weight\" value=\".2\"/>";
+  const Scene placed = with_bsdf(
+      fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\"/>{}</bsdf>", weight, kDiffuse));
+  EXPECT_EQ(colour(placed, bsdf_of<BlendBsdf>(placed).weight), (Rgb{.2, .2, .2}));
+  at<PlasticBsdf>(placed, bsdf_of<BlendBsdf>(placed).first);
+  at<DiffuseBsdf>(placed, bsdf_of<BlendBsdf>(placed).second);
+  const Scene named =
+      with_bsdf(fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\" name=\"b\"/><bsdf "
+                            "type=\"diffuse\" name=\"a\"/></bsdf>",
+                            weight));
+  at<DiffuseBsdf>(named, bsdf_of<BlendBsdf>(named).first);
+  at<PlasticBsdf>(named, bsdf_of<BlendBsdf>(named).second);
+  EXPECT_EQ(deserialize_scene(serialize(named)).value(), named);
+}
+
+TEST(Surfaces, WhatCannotBeNestedIsRefusedWithItsPlace) {
+  EXPECT_THAT(error_of("<bsdf type=\"mask\"/>"), HasSubstr("needs one nested bsdf, not 0"));
+  EXPECT_THAT(error_of(fmt::format("<bsdf type=\"blendbsdf\">{}</bsdf>", kDiffuse)),
+              HasSubstr("needs two nested bsdfs, not 1"));
+  for (const char* type : {"roughdielectric", "thindielectric"})
+    EXPECT_THAT(error_of(fmt::format("<bsdf type=\"twosided\"><bsdf type=\"{}\"/></bsdf>", type)),
+                HasSubstr("it can't stand in \"twosided\""));
+  EXPECT_THAT(error_of(fmt::format("<bsdf type=\"twosided\"><bsdf type=\"mask\">{}</bsdf></bsdf>", kDiffuse)),
+              HasSubstr("it can't stand in \"twosided\""));
+  EXPECT_THAT(
+      error_of(fmt::format("<bsdf type=\"mask\"><float name=\"opacity\" value=\"2\"/>{}</bsdf>", kDiffuse)),
+      HasSubstr("out of its range"));
+  EXPECT_EQ(error_of(fmt::format(
+                "<bsdf type=\"twosided\"><bsdf type=\"blendbsdf\">{0}<bsdf type=\"plastic\"/></bsdf></bsdf>",
+                kDiffuse)),
+            "");
+}
+
+TEST(Surfaces, ANormalMapHoldsImageAndBsdf) {
+  const Scene s = with_bsdf(
+      "<bsdf type=\"twosided\"><bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\"><boolean "
+      "name=\"raw\" value=\"true\"/><string name=\"filename\" value=\"wood.png\"/></texture><bsdf "
+      "type=\"plastic\"/></bsdf></bsdf>");
+  const auto& n = at<NormalMapBsdf>(s, bsdf_of<TwoSidedBsdf>(s).front);
+  EXPECT_TRUE(std::get<BitmapTexture>(s.textures.at(n.normalmap.value)).raw);
+  at<PlasticBsdf>(s, n.bsdf);
+  EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
+}
+
+std::string masks(int count) {
+  std::string s = kDiffuse;
+  for (int i = 0; i < count; ++i) s = fmt::format("<bsdf type=\"mask\">{}</bsdf>", s);
+  return s;
+}
+
+TEST(Surfaces, NestOnlySoDeep) {
+  EXPECT_EQ(error_of(masks(scene::kMaxBsdfNesting - 1)), "");
+  EXPECT_THAT(error_of(masks(scene::kMaxBsdfNesting)), HasSubstr("bsdfs are nested more than 8 deep"));
+  // The same in the form that travels.
+  Scene s = with_bsdf(masks(scene::kMaxBsdfNesting - 1));
+  s.bsdfs.push_back(MaskBsdf{{0}, s.shapes[0].bsdf});
+  EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("more than 8 deep"));
+  s.bsdfs = {BlendBsdf{{0}, {1}, {1}}, MaskBsdf{{0}, {0}}};
+  s.shapes[0].bsdf = {0};
+  EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("circle"));
+}
+
+TEST(Surfaces, TraitsFollowFromWhatIsContained) {
+  Scene s;
+  s.textures = {ConstantTexture{}};
+  s.bsdfs = {DiffuseBsdf{},      RoughDielectricBsdf{},  BlendBsdf{{0}, {0}, {1}},
+             MaskBsdf{{0}, {2}}, TwoSidedBsdf{{0}, {0}}, NullBsdf{}};
+  const auto traits = scene::bsdf_traits(s);
+  ASSERT_TRUE(traits);
+  EXPECT_EQ((*traits)[0], (scene::BsdfTraits{1, false, false, false}));
+  EXPECT_EQ((*traits)[1], (scene::BsdfTraits{1, true, false, false}));
+  EXPECT_EQ((*traits)[2], (scene::BsdfTraits{2, true, false, false}));
+  EXPECT_EQ((*traits)[3], (scene::BsdfTraits{3, true, true, false}));
+  EXPECT_EQ((*traits)[4], (scene::BsdfTraits{2, false, false, true}));
+  EXPECT_EQ((*traits)[5], (scene::BsdfTraits{1, true, true, false}));
+}
+
+}  // namespace
+}  // namespace ls

@@ -1,0 +1,74 @@
+// A rough boundary between two dielectrics: microfacets that reflect and refract (Walter et al. 2007),
+// sampled by their visible normals (Heitz and d'Eon 2014). A sampled reflection below the surface, or
+// refraction above it, is light that other microfacets would take up: absorbed, as in all of this model.
+//
+// Seen from wo's side, whatever it is: eta is the index beyond over the index here. With m the microfacet's
+// normal, V = visible_over_D(wo) and q = dot(wo, m) + eta dot(wi, m) = +-|wo + eta wi|:
+//   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
+//   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
+// where 1 / eta^2, for radiance, cancels the eta^2 of the value.
+#pragma once
+
+#include "worker/render/bsdf/lobes.h"
+
+namespace ls::render {
+
+struct RoughDielectric {
+  Microfacets facets;
+  C3 reflectance, transmittance;
+  float eta;
+
+  RoughDielectric(const BsdfTable::Material& m, const Lookup& look, const Microfacets& f, bool outside)
+      : facets(f),
+        reflectance(look.reflectance(m.specular_slot)),
+        transmittance(look.reflectance(m.second_slot)),
+        eta(outside ? m.ior : 1 / m.ior) {}
+
+  // wo above the surface, wi on either side.
+  BsdfEval eval(const V3& wo, const V3& wi) const {
+    const bool reflected = wi.z > 0;
+    V3 h = wo + wi * (reflected ? 1.f : eta);
+    if (h.z < 0) h = -h;
+    const float q2 = dot(h, h);
+    const V3 m = normalize(h);
+    const float om = dot(wo, m), im = dot(wi, m);
+    // Facets seen from behind, by either; wi in the plane sends nothing.
+    if (!(om > 0) || !(reflected ? im > 0 : im < 0) || wi.z == 0) return {};
+    const auto F = static_cast<float>(fresnel_dielectric(om, eta).reflectance);
+    const float D = facets.D(m), V = facets.visible_over_D(wo);
+    const V3 up(wi.x, wi.y, std::abs(wi.z));
+    const float G = facets.G1_over_cos(wo) * facets.G1_over_cos(up) * up.z;
+    if (reflected) return {reflectance * (.25f * F * D * G), .25f * F * D * V};
+    const float density = (1 - F) * D * om * -im / q2;
+    return {transmittance * (density * G), density * V * eta * eta};
+  }
+
+  std::optional<BsdfSample> sample(const V3& wo, float u_lobe, const V2& u) const {
+    const V3 m = facets.sample_visible(wo, u);
+    const float om = dot(wo, m), D = facets.D(m), V = facets.visible_over_D(wo);
+    if (!(om > 0)) return std::nullopt;
+    const DielectricFresnel f = fresnel_dielectric(om, eta);
+    const auto F = static_cast<float>(f.reflectance);
+    const float ratio = facets.G1_over_cos(wo) / V;
+    BsdfSample s;
+    if (u_lobe < F) {
+      s.wi = normalize(reflect(wo, m));
+      if (!(s.wi.z > 0)) return std::nullopt;
+      s.weight = reflectance * (ratio * facets.G1_over_cos(s.wi) * s.wi.z);
+      s.pdf = .25f * F * D * V;
+    } else {
+      const auto eta_ti = static_cast<float>(f.eta_ti), im = static_cast<float>(f.cos_t);
+      s.wi = normalize(m * (om * eta_ti + im) - wo * eta_ti);
+      if (!(s.wi.z < 0)) return std::nullopt;
+      const V3 up(s.wi.x, s.wi.y, -s.wi.z);
+      s.weight = transmittance * (ratio * facets.G1_over_cos(up) * up.z * eta_ti * eta_ti);
+      s.pdf = (1 - F) * D * V * om * sqr(eta / (om + eta * im)) * -im;
+      s.transmitted = true;
+      s.eta = eta;
+    }
+    if (!(s.pdf > 0)) return std::nullopt;
+    return s;
+  }
+};
+
+}  // namespace ls::render

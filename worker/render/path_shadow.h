@@ -1,0 +1,63 @@
+// Part of path.h, which includes it: what a shadow ray brings.
+#pragma once
+
+#include "worker/render/path.h"
+
+namespace ls::render {
+
+// Light that gets from the sampled light to `start`, through boundaries and media. p is `start`, moved off
+// its surface after the light was sampled: the ray is aimed anew, so that it ends in front of the light and
+// not on it.
+template <Features F>
+C3 PathTracer<F>::unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
+                             RandomStream stream) {
+  V3 d = light.direction;
+  float left = light.distance;
+  if (std::isfinite(left)) {
+    const V3 f = light.target - p;
+    left = std::sqrt(dot(f, f));
+    if (!(left > 0)) return light.radiance;
+    d = f / left;
+  }
+  if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
+  bool walk = world_.veils;
+  if constexpr (F.media)
+    walk = walk || (world_.use_media && (medium != kNone || world_.accel.has_boundaries()));
+  return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
+}
+
+// What of `value` gets along the unoccluded ray from p: surfaces that let light pass, and media, take their
+// share.
+template <Features F>
+C3 PathTracer<F>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
+                                     std::uint32_t medium, RandomStream stream) {
+  V3 from = start, o = p;
+  for (int i = 0; i < kMaxSegments; ++i) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest_boundary(o, d, left);
+    const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
+    if constexpr (F.media) {
+      if (medium != kNone) {
+        const float t = (met ? std::min(hit.t, left) : left) + dot(o - from, d);
+        value *= transmittance<F>(world_.media[medium], from, d, 0, t, RandomStream(stream.next()));
+        if (is_black(value)) return value;
+      }
+    }
+    if (!met) return value;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (surface.veil) {
+      value *= world_.bsdfs.veil(surface.bsdf, hit.uv, hit.shading.to_local(-d)).transmission;
+      if (is_black(value)) return value;
+    }
+    if constexpr (F.media) medium = medium_beyond(hit, d, medium);
+    const V3 next = offset_point(hit.p, hit.ng, d);
+    if (std::isfinite(left)) left -= dot(next - o, d);
+    from = hit.p;
+    o = next;
+    if (!(left > 0)) return value;
+  }
+  outcome_.cut_off = true;
+  return {0, 0, 0};
+}
+
+}  // namespace ls::render
