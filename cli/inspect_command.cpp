@@ -62,7 +62,7 @@ void print_text(const LocalScene& scene, const LocalWorld& built, const render::
   for (const auto& [name, bytes] : report.bytes)
     print(fmt::format("  {}  {}", plain_text(name), show_bytes(bytes)));
   if (report.clamped_inputs > 0)
-    print(fmt::format("{} inputs were clamped (negative densities, degenerate triangles)",
+    print(fmt::format("{} inputs were clamped (negative densities and texels, degenerate triangles)",
                       report.clamped_inputs));
 }
 

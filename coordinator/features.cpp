@@ -55,7 +55,7 @@ SceneFeatures features_of(const Scene& scene) {
   say("area lights", has_area_lights(scene));
   say("point and spot lights", any<PointEmitter>(scene.emitters) || any<SpotEmitter>(scene.emitters));
   say("directional lights", any<DirectionalEmitter>(scene.emitters));
-  say("environment light", any<ConstantEmitter>(scene.emitters));
+  say("environment light", any<ConstantEmitter>(scene.emitters) || any<EnvmapEmitter>(scene.emitters));
   return features;
 }
 

@@ -72,7 +72,8 @@ bool read_row(ByteReader& r, std::vector<Rgbe>& row) {
 
 }  // namespace
 
-Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file) {
+Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels) {
   const auto bad = [&](std::string_view text) {
     return fail(Errc::invalid_argument, fmt::format("'{}': broken HDR image: {}", name, text));
   };
@@ -87,6 +88,8 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   if (!blank || !rgbe) return bad("its header is not that of a 32-bit_rle_rgbe image");
   const auto size = resolution(next_line(text));
   if (!size) return bad("its resolution line is not \"-Y height +X width\" of a believable size");
+  if (std::uint64_t{size->width} * size->height > max_pixels)
+    return too_many_pixels(name, size->width, size->height, max_pixels);
   ByteReader r(file.subspan(file.size() - text.size()));
   // Run-length codes pack at most 127 values of a plane into two bytes.
   if (std::uint64_t{size->width} * size->height / 16 > r.left() || r.left() < std::uint64_t{size->height} * 4)

@@ -7,26 +7,35 @@
 
 namespace ls {
 
-Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file) {
+Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file,
+                               std::uint64_t max_pixels) {
   const std::string_view head = as_text(file.subspan(0, std::min<std::size_t>(file.size(), 12)));
-  if (head.starts_with("\x89PNG")) return decode_png(name, file);
-  if (head.starts_with("\xff\xd8\xff")) return decode_jpeg(name, file);
-  if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file);
-  if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file);
+  if (head.starts_with("\x89PNG")) return decode_png(name, file, max_pixels);
+  if (head.starts_with("\xff\xd8\xff")) return decode_jpeg(name, file, max_pixels);
+  if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file, max_pixels);
+  if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file, max_pixels);
   return fail(Errc::invalid_argument,
               fmt::format("'{}': is no PNG, JPEG, OpenEXR or Radiance HDR image (by its first bytes)", name));
 }
 
-Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name) {
+Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,
+                             std::uint64_t max_pixels) {
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
-  return decode_image(name, *bytes);
+  return decode_image(name, *bytes, max_pixels);
 }
 
-Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file) {
+tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
+                                      std::uint64_t max_pixels) {
+  return fail(Errc::resource_exhausted, fmt::format("'{}': {} x {} pixels; at most {} may be read here", name,
+                                                    width, height, max_pixels));
+}
+
+Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels) {
   auto image = read_exr_rgb(
       file, std::string(name),
-      ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = kMaxImagePixels, .max_side = kMaxImageSide});
+      ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = max_pixels, .max_side = kMaxImageSide});
   if (!image) return tl::unexpected(image.error());
   ImageData out;
   out.width = static_cast<std::uint32_t>(image->size.width);

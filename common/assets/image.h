@@ -1,4 +1,5 @@
-// PNG, JPEG, OpenEXR and Radiance HDR, told apart by their first bytes.
+// PNG, JPEG, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels is
+// refused (resource_exhausted) before memory is spent on it.
 #pragma once
 
 #include <cstddef>
@@ -10,16 +11,27 @@
 
 namespace ls {
 
-Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file);
-Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name);
+Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file,
+                               std::uint64_t max_pixels = kMaxImagePixels);
+Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,
+                             std::uint64_t max_pixels = kMaxImagePixels);
 
 // One a format, for tests and for callers that know.
-Result<ImageData> decode_png(std::string_view name,
-                             std::span<const std::byte> file);  // 1..16 bits, palette, alpha
-Result<ImageData> decode_jpeg(std::string_view name,
-                              std::span<const std::byte> file);  // grey or colour, 8 bits
-Result<ImageData> decode_exr(std::string_view name,
-                             std::span<const std::byte> file);  // R G B A, or Y; half and float
-Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file);  // RGBE
+// 1..16 bits, palette, alpha
+Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+// grey or colour, 8 bits
+Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file,
+                              std::uint64_t max_pixels = kMaxImagePixels);
+// R G B A, or Y; half and float
+Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+// RGBE
+Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+
+// What they say of more than max_pixels.
+tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
+                                      std::uint64_t max_pixels);
 
 }  // namespace ls

@@ -63,7 +63,8 @@ bool read_rows(Decoder& d, unsigned char* out, std::size_t row_bytes) {
 
 }  // namespace
 
-Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file) {
+Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file,
+                              std::uint64_t max_pixels) {
   Decoder d;
   const auto bad = [&](const char* text) {
     return fail(Errc::invalid_argument, fmt::format("'{}': broken JPEG: {}", name, text));
@@ -78,6 +79,7 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   const std::uint64_t pixels = std::uint64_t{image.width} * image.height;
   if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
     return bad("its size is not believable");
+  if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
   if (pixels / 64 / 64 >
       file.size())  // an 8 x 8 block takes at least two bits, shared by up to 4 blocks of chroma
     return bad("it is too short for its size");

@@ -68,7 +68,8 @@ bool read_rows(Png& p, png_bytepp rows) {
 
 }  // namespace
 
-Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file) {
+Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels) {
   Source source{file.data(), file.size(), {}};
   Png p;
   const auto bad = [&](const char* text) {
@@ -86,6 +87,7 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
     return bad("its size is not believable");
+  if (pixels > max_pixels) return too_many_pixels(name, shape.width, shape.height, max_pixels);
   std::vector<std::uint8_t> bytes(shape.row_bytes * shape.height);
   std::vector<png_bytep> rows(shape.height);
   for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = bytes.data() + y * shape.row_bytes;

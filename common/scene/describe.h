@@ -114,6 +114,12 @@ LS_TYPE(PointEmitter, "emitter", "point", "",
         "light from a point; a `to_world` instead of `position` moves the origin")
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
         "light from a point into a cone around the +z of `to_world`, falling off linearly in the angle")
+LS_TYPE(
+    EnvmapEmitter, "emitter", "envmap", "",
+    "light from everywhere around by an image in latitude-longitude form (EXR or HDR; PNG and JPEG, too). "
+    "Before `to_world` its top row is +y and its bottom row -y; of the horizon the left edge is -z, a "
+    "quarter of the width further +x, the middle +z, three quarters -x, as in Mitsuba 3. It takes 2 x 3 "
+    "to 2^25 pixels (8192 x 4096); negative values become 0")
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")

@@ -341,6 +341,13 @@ void describe(V& v, T& e) {
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
 }
 
+template <class V, Of<EnvmapEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "filename", .doc = "the image", .required = true}, e.file);
+  v.field({.name = "scale", .doc = "multiplies the image's values", .range = kNonNegative}, e.scale);
+  v.field({.name = "to_world", .doc = "turns or mirrors the map; moving it changes nothing"}, e.to_world);
+}
+
 // ---- camera, film, integrator
 // ---------------------------------------------------------------------------------------
 template <class V, Of<BoxFilter> T>

@@ -12,15 +12,31 @@ void Reader::read_emitter(const Element& e) {
   if (type == "directional") return read_directional(e);
   if (type == "point") return read_point(e);
   if (type == "spot") return read_spot(e);
+  if (type == "envmap") return read_envmap(e);
   if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
   if (type != "constant") return unknown_plugin(e, report_);
   Params p(*this, e);
   ConstantEmitter emitter;
   bind(p, emitter);
   p.finish();
+  check_only_environment(e);
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::check_only_environment(const Element& e) {
   for (const Emitter& other : scene_.emitters)
-    if (std::holds_alternative<ConstantEmitter>(other))
-      report_.error(e.at, "a second environment: a scene has one emitter \"constant\" at most");
+    if (std::holds_alternative<ConstantEmitter>(other) || std::holds_alternative<EnvmapEmitter>(other))
+      report_.error(e.at, "a second environment: a scene has one emitter \"constant\" or \"envmap\" at most");
+}
+
+void Reader::read_envmap(const Element& e) {
+  Params p(*this, e);
+  EnvmapEmitter emitter;
+  bind(p, emitter);
+  p.finish();
+  check_only_environment(e);
+  if (!invertible(emitter.to_world) || !is_similarity(emitter.to_world))
+    report_.error(e.at, "to_world of an environment map may turn and mirror it, not stretch or flatten it");
   scene_.emitters.emplace_back(emitter);
 }
 

@@ -90,6 +90,8 @@ class Reader {
   void read_directional(const Element& e);
   void read_point(const Element& e);
   void read_spot(const Element& e);
+  void read_envmap(const Element& e);
+  void check_only_environment(const Element& e);
 
   void read_sensor(const Element& e);
   void read_sensor_medium(Params& p, Sensor& sensor);

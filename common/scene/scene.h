@@ -275,7 +275,16 @@ struct SpotEmitter {  // at the origin of to_world, shining along its +z
   std::optional<TextureIndex> texture;  // projected, as Mitsuba's
   bool operator==(const SpotEmitter&) const = default;
 };
-using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter>;
+// Radiance from everywhere around, by direction: an image in latitude-longitude form. In its own space the
+// top row is +y; of the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). Rows
+// lie from pole to pole, the first and the last on them; columns repeat. to_world turns and mirrors only.
+struct EnvmapEmitter {
+  AssetIndex file;
+  double scale = 1;
+  Transform to_world;
+  bool operator==(const EnvmapEmitter&) const = default;
+};
+using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter>;
 
 // ---- camera, film, integrator
 // ---------------------------------------------------------------------------------------

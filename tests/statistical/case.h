@@ -32,6 +32,7 @@ void add_single_scattering(std::vector<Case>& cases);
 void add_slabs(std::vector<Case>& cases);
 void add_surfaces(std::vector<Case>& cases);
 void add_extremes(std::vector<Case>& cases);
+void add_environments(std::vector<Case>& cases);
 void add_materials(std::vector<Case>& cases);
 
 inline std::array<double, 3> grey(double v) { return {v, v, v}; }

@@ -32,6 +32,7 @@ const std::vector<Case>& table() {
     add_slabs(c);
     add_surfaces(c);
     add_extremes(c);
+    add_environments(c);
     add_materials(c);
     return c;
   }();

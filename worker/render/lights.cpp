@@ -31,7 +31,7 @@ LightChoice Lights::choose(const LightNumbers& numbers) const {
   const Light& l = lights_[c.light];
   c.probability = l.probability;
   c.numbers = numbers;
-  c.has_place = l.kind != Kind::directional;
+  c.has_place = has_place(l.kind);
   switch (l.kind) {
     case Kind::point:
     case Kind::spot:
@@ -46,6 +46,7 @@ LightChoice Lights::choose(const LightNumbers& numbers) const {
       c.pivot = area_point(l, numbers).p;
       break;
     case Kind::directional:
+    case Kind::map:
       break;
   }
   return c;
@@ -135,6 +136,15 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   return s;
 }
 
+// Looked up in the direction itself, as for paths that leave the scene: both must mean the same density.
+std::optional<LightSample> Lights::sample_map(const LightNumbers& numbers) const {
+  const V3 direction = map_->sample(numbers.x, numbers.y);
+  const EnvironmentMap::Light light = map_->at(direction);
+  const float pdf = light.pdf * map_probability_;
+  if (!(pdf > 0) || !std::isfinite(pdf)) return std::nullopt;
+  return LightSample{direction, kInfinity, V3(0), light.radiance, pdf, false};
+}
+
 C3 Lights::spot_radiance(const Light& l, const V3& towards) const {
   const float z = dot(towards, l.normal);
   if (z <= l.cos_cutoff) return {0, 0, 0};
@@ -160,6 +170,8 @@ std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) con
     case Kind::directional: {
       return LightSample{-l.normal, kInfinity, V3(0), l.value, l.probability, true};
     }
+    case Kind::map:
+      return sample_map(c.numbers);
     case Kind::point:
     case Kind::spot:
       break;

@@ -11,6 +11,7 @@
 
 #include "common/base/error.h"
 #include "common/scene/scene.h"
+#include "worker/render/envmap.h"
 #include "worker/render/geometry.h"
 #include "worker/render/math.h"
 #include "worker/render/texture/texture.h"
@@ -46,7 +47,9 @@ struct LightChoice {
 class Lights {
  public:
   // Gives the surfaces of `geometry` their light numbers. Lights without power or area are left out, counted.
-  static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures);
+  // `images` loads environment maps: scenes without one need none.
+  static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
+                              const ImageLoader& images = {});
 
   bool can_sample() const { return !lights_.empty(); }  // any light that next-event estimation can reach
   bool any_with_place() const { return any_with_place_; }
@@ -60,15 +63,26 @@ class Lights {
   // Density, per steradian at x and with the choice of the light, of sampling this point of a surface light.
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction) const;
   V3 pivot(const SurfaceHit& hit) const;
-  // Radiance of the surroundings. Never sampled: it is smooth, and paths that leave the scene find it.
-  C3 environment() const { return environment_; }
-  bool has_environment() const { return !is_black(environment_); }
+  // Radiance from the surroundings, for a path that leaves the scene in this direction (a unit vector),
+  // weighted against sampling it as a light. `pdf`: of the direction, per steradian; infinity where it had no
+  // choice, for the full radiance. A constant surrounding is never sampled: it is smooth, and paths that
+  // leave find it.
+  C3 environment(const V3& direction, float pdf) const {
+    if (!map_) return environment_;
+    const EnvironmentMap::Light light = map_->at(direction);
+    const float as_light = light.pdf * map_probability_;
+    return environment_ + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
+  }
+  bool has_environment() const { return map_ || !is_black(environment_); }
+  const EnvironmentMap* map() const { return map_ ? &*map_ : nullptr; }
 
   std::size_t count() const { return lights_.size(); }
   std::uint64_t left_out() const { return left_out_; }
+  std::uint64_t clamped_inputs() const { return clamped_; }  // negative texels made 0
 
  private:
-  enum class Kind { parallelogram, mesh, sphere, disk, directional, point, spot };
+  enum class Kind { parallelogram, mesh, sphere, disk, directional, point, spot, map };
+  static bool has_place(Kind kind) { return kind != Kind::directional && kind != Kind::map; }
   struct Light {
     Kind kind = Kind::point;
     C3 value;               // intensity (point, spot), irradiance (directional)
@@ -99,13 +113,15 @@ class Lights {
 
   static Primitives primitives_of(const Geometry& geometry);
   void add_area(const Scene& scene, std::uint32_t shape, const Primitives& primitives, Geometry& geometry);
-  Result<void> add_emitter(const Emitter& emitter);
+  Result<void> add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images);
+  Result<void> add_map(const Scene& scene, const EnvmapEmitter& emitter, const ImageLoader& images);
   void set_probabilities(float scene_radius);
   double power(const Light& light, float scene_radius) const;
   Point area_point(const Light& light, const LightNumbers& numbers) const;
   Point mesh_point(const Light& light, const LightNumbers& numbers) const;
   std::optional<LightSample> sample_area(const Light& light, const Point& y, const V3& x) const;
   std::optional<LightSample> sample_sphere(const Light& light, V2 u, const V3& x) const;
+  std::optional<LightSample> sample_map(const LightNumbers& numbers) const;
   C3 spot_radiance(const Light& light, const V3& towards) const;
   C3 area_radiance(const Light& light, V2 uv) const { return textures_->eval(light.radiance, uv); }
 
@@ -115,8 +131,10 @@ class Lights {
   const Geometry* geometry_ = nullptr;
   const TextureTable* textures_ = nullptr;
   C3 environment_{0, 0, 0};
+  std::optional<EnvironmentMap> map_;
+  float map_probability_ = 0;
   bool any_with_place_ = false;
-  std::uint64_t left_out_ = 0;
+  std::uint64_t left_out_ = 0, clamped_ = 0;
 };
 
 }  // namespace ls::render

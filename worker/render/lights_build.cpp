@@ -74,7 +74,29 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
   lights_.push_back(std::move(l));
 }
 
-Result<void> Lights::add_emitter(const Emitter& emitter) {
+Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, const ImageLoader& images) {
+  if (map_) return fail(Errc::invalid_argument, "a scene has one environment map at most");
+  if (emitter.file.value >= scene.assets.size() || !images)
+    return fail(Errc::invalid_argument, "an environment map names a file that the scene does not have");
+  const Asset& asset = scene.assets[emitter.file.value];
+  auto image = images(asset);
+  if (!image) return tl::unexpected(image.error());
+  auto map = EnvironmentMap::build(asset.name, std::move(*image), emitter.scale, emitter.to_world);
+  if (!map) return tl::unexpected(map.error());
+  clamped_ += map->clamped();
+  if (map->black()) {
+    ++left_out_;
+    return {};
+  }
+  map_ = std::move(*map);
+  Light l;
+  l.kind = Kind::map;
+  lights_.push_back(std::move(l));
+  return {};
+}
+
+Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images) {
+  if (const auto* map = std::get_if<EnvmapEmitter>(&emitter)) return add_map(scene, *map, images);
   const double s = geometry_->scale;
   const auto place = [&](const V3d& p) { return V3((p - geometry_->center) * s); };
   Light l;
@@ -82,6 +104,7 @@ Result<void> Lights::add_emitter(const Emitter& emitter) {
                           environment_ += color(e.radiance);
                           l.probability = -1;  // not a light to sample
                         },
+                        [&](const EnvmapEmitter&) {},
                         [&](const DirectionalEmitter& e) {
                           l.kind = Kind::directional;
                           l.normal = V3(V3d(e.direction[0], e.direction[1], e.direction[2]).normalized());
@@ -131,6 +154,8 @@ double Lights::power(const Light& l, float radius) const {
       return luminance(l.value) * 4 * pi;
     case Kind::spot:
       return luminance(l.value) * 2 * pi * (1 - .5 * (l.cos_cutoff + l.cos_beam));
+    case Kind::map:
+      return map_->flux() * pi * radius * radius;
     case Kind::parallelogram:
     case Kind::mesh:
     case Kind::sphere:
@@ -159,11 +184,13 @@ void Lights::set_probabilities(float radius) {
     lights_[i].probability = static_cast<float>(static_cast<double>(edge - before) * 0x1p-32);
     last_.push_back(static_cast<std::uint32_t>(edge - 1));
     before = edge;
-    any_with_place_ = any_with_place_ || lights_[i].kind != Kind::directional;
+    any_with_place_ = any_with_place_ || has_place(lights_[i].kind);
+    if (lights_[i].kind == Kind::map) map_probability_ = lights_[i].probability;
   }
 }
 
-Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures) {
+Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
+                             const ImageLoader& images) {
   Lights l;
   l.geometry_ = &geometry;
   l.textures_ = &textures;
@@ -172,7 +199,7 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
     if (scene.shapes[i].emitter) l.add_area(scene, i, primitives, geometry);
   }
   for (const Emitter& e : scene.emitters) {
-    if (auto ok = l.add_emitter(e); !ok) return tl::unexpected(ok.error());
+    if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
   }
   l.set_probabilities(geometry.radius);
   return l;

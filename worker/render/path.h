@@ -340,7 +340,7 @@ void PathTracer<F>::add_emission(const SurfaceHit& hit) {
 template <Features F>
 void PathTracer<F>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
-  add(beta_ * world_.lights.environment());
+  add(beta_ * world_.lights.environment(d_, last_.delta ? kInfinity : last_.pdf));
 }
 
 // Russian roulette; false ends the path.

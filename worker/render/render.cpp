@@ -170,6 +170,7 @@ WorldReport describe(const World& w) {
   feature(w.lights.count() > 1, "choice among lights");
   feature(w.camera.has_lens(), "thin lens");
   feature(w.textures.bytes() > 0, "image textures");
+  feature(w.lights.map(), "environment map, sampled by its brightness");
   if (w.lights.left_out())
     r.left_out.push_back(fmt::format("{} lights without power or area", w.lights.left_out()));
   std::uint64_t grids = 0;
@@ -178,6 +179,7 @@ WorldReport describe(const World& w) {
              {"bvh", w.accel.bytes()},
              {"textures", w.textures.bytes()},
              {"materials", w.bsdfs.bytes()},
+             {"environment map", w.lights.map() ? w.lights.map()->bytes() : 0},
              {"grids", grids}};
   r.clamped_inputs = w.clamped_inputs;
   return r;

@@ -64,8 +64,9 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
 struct WorldReport {
   std::vector<std::string> used, left_out;
   std::vector<std::pair<std::string, std::uint64_t>> bytes;
-  std::string variant;               // the integrator instantiation
-  std::uint64_t clamped_inputs = 0;  // negative densities set to 0, degenerate triangles dropped, ...
+  std::string variant;  // the integrator instantiation
+  // Negative densities and texels set to 0, degenerate triangles dropped, ...
+  std::uint64_t clamped_inputs = 0;
 };
 WorldReport describe(const World& world);
 

@@ -218,9 +218,17 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
   }
-  auto lights = Lights::build(scene, w.geometry, w.textures);
+  auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) -> Result<ImageData> {
+    const auto it = files.find(a.digest);
+    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
+    auto image = load_image(it->second, a.name, kMaxEnvironmentPixels);
+    if (!image && image.error().code == Errc::resource_exhausted)
+      image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
+    return image;
+  });
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
+  w.clamped_inputs += w.lights.clamped_inputs();
   auto accel = Accel::build(w.geometry, threads);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);

@@ -20,6 +20,17 @@ using testing::ElementsAre;
 using testing::FloatEq;
 using testing::HasSubstr;
 
+// The decoders without their default argument, which pointers to functions lose.
+constexpr auto kPng = [](std::string_view name, std::span<const std::byte> file) {
+  return decode_png(name, file);
+};
+constexpr auto kJpeg = [](std::string_view name, std::span<const std::byte> file) {
+  return decode_jpeg(name, file);
+};
+constexpr auto kHdr = [](std::string_view name, std::span<const std::byte> file) {
+  return decode_hdr(name, file);
+};
+
 // `format`: PNG_FORMAT_... of libpng's simple interface; `pixels` as that wants them.
 std::string png(std::uint32_t width, std::uint32_t height, std::uint32_t format, const void* pixels) {
   png_image image{};
@@ -128,8 +139,8 @@ TEST(Png, KeepsAllSixteenBits) {
 
 TEST(Png, NeverAcceptsATruncatedFileAndSurvivesMutations) {
   for (const std::string& file : {png(2, 2, PNG_FORMAT_RGB, kRgb), png16({0, 1, 2})}) {
-    EXPECT_EQ(test::accepted_truncations(file, decode_png), 0);
-    test::survive_mutations(file, decode_png, expect_sound);
+    EXPECT_EQ(test::accepted_truncations(file, kPng), 0);
+    test::survive_mutations(file, kPng, expect_sound);
   }
 }
 
@@ -146,9 +157,9 @@ TEST(Jpeg, ReadsColourAndGrey) {
 
 TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
   const std::string file = jpeg(32, 32, 3, 77);
-  EXPECT_LE(test::accepted_truncations(file, decode_jpeg),
+  EXPECT_LE(test::accepted_truncations(file, kJpeg),
             2);  // all pixels are there when only the end marker is cut
-  test::survive_mutations(file, decode_jpeg, expect_sound);
+  test::survive_mutations(file, kJpeg, expect_sound);
 }
 
 TEST(Exr, ReadsColourAsLinearFloats) {
@@ -183,8 +194,8 @@ TEST(Hdr, ReadsRunsAndPlainRows) {
 }
 
 TEST(Hdr, NeverAcceptsATruncatedFileAndSurvivesMutations) {
-  EXPECT_EQ(test::accepted_truncations(hdr(), decode_hdr), 0);
-  test::survive_mutations(hdr(), decode_hdr, expect_sound);
+  EXPECT_EQ(test::accepted_truncations(hdr(), kHdr), 0);
+  test::survive_mutations(hdr(), kHdr, expect_sound);
 }
 
 TEST(Hdr, RefusesSizesThatTheFileCannotHold) {
@@ -200,6 +211,25 @@ TEST(Image, NamesTheFileWhenItIsOfNoKnownKind) {
   ASSERT_FALSE(i);
   EXPECT_THAT(i.error().message, HasSubstr("'a.gif'"));
   EXPECT_FALSE(load_image("/nonexistent/a.png", "a.png"));
+}
+
+TEST(Image, MorePixelsThanTheCallerWantsAreRefusedByTheirSize) {
+  ExrPicture picture{{2, 2}, {}, {}};
+  for (const char* c : {"R", "G", "B"}) picture.channels[c] = ExrFloat{{1, 2, 3, 4}};
+  const auto exr = write_exr(picture);
+  ASSERT_TRUE(exr);
+  const std::string png_file = png(2, 2, PNG_FORMAT_RGB, kRgb), jpeg_file = jpeg(2, 2, 3, 9);
+  const auto hdr_file =
+      std::string("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n") + std::string(16, 'a');
+  for (const std::span<const std::byte> file :
+       {std::span<const std::byte>(*exr), std::span<const std::byte>(bytes_of(png_file)),
+        std::span<const std::byte>(bytes_of(jpeg_file)), std::span<const std::byte>(bytes_of(hdr_file))}) {
+    EXPECT_TRUE(decode_image("a", file, 4));
+    const auto refused = decode_image("a", file, 3);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, Errc::resource_exhausted);
+    EXPECT_THAT(refused.error().message, HasSubstr("2 x 2 pixels"));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,389 @@
+// Environment maps: which direction each texel is, what is between them, and densities that are exactly those
+// of the samples.
+#include "worker/render/envmap.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/support/render_check.h"
+#include "tests/support/sky_kit.h"
+#include "worker/render/hash.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneKit;
+using test::SkyImage;
+using ::testing::HasSubstr;
+using test::operator*;
+
+constexpr double kPiD = 3.14159265358979323846;
+
+ImageData data(const SkyImage& s) {
+  ImageData d;
+  d.width = static_cast<std::uint32_t>(s.width);
+  d.height = static_cast<std::uint32_t>(s.height);
+  d.channels = 3;
+  d.f32 = s.rgb;
+  return d;
+}
+Result<EnvironmentMap> try_map(const SkyImage& s, const Transform& t = {}, double scale = 1) {
+  return EnvironmentMap::build("sky.exr", data(s), scale, t);
+}
+EnvironmentMap map_of(const SkyImage& s, const Transform& t = {}, double scale = 1) {
+  auto m = try_map(s, t, scale);
+  if (!m) throw std::runtime_error(m.error().message);
+  return std::move(*m);
+}
+std::string refusal(const SkyImage& s, const Transform& t = {}, double scale = 1) {
+  const auto m = try_map(s, t, scale);
+  return m ? "accepted" : m.error().message;
+}
+// Texel (x, y) is 10 y + x + 1, but a pole's row is one value.
+SkyImage numbered() {
+  SkyImage s(4, 3);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const double v = 10. * y + (y == 1 ? x : 0) + 1;
+      s.set(x, y, {v, v, v});
+    }
+  return s;
+}
+float value(const EnvironmentMap& m, const V3& d) { return m.at(normalize(d)).radiance.x; }
+// Directions are float32, and a texel of these maps a good radian: 2^-20 of the values, which are below 32.
+constexpr float kEps = 32 * 0x1p-20f;
+
+// Mitsuba 3: (u, v) = (atan2(x, -z) / 2 pi, acos(y) / pi). The columns' centres are at u = 1/8, 3/8, 5/8,
+// 7/8: halfway between the axes of the horizon, from -z over +x to +z and -x.
+TEST(EnvironmentMap, TexelsLieWhereMitsubaPutsThem) {
+  const EnvironmentMap m = map_of(numbered());
+  EXPECT_NEAR(value(m, {1, 0, -1}), 11, kEps) << "u = 1/8: from -z towards +x";
+  EXPECT_NEAR(value(m, {1, 0, 1}), 12, kEps) << "u = 3/8";
+  EXPECT_NEAR(value(m, {-1, 0, 1}), 13, kEps) << "u = 5/8";
+  EXPECT_NEAR(value(m, {-1, 0, -1}), 14, kEps) << "u = 7/8";
+  EXPECT_NEAR(value(m, {0, 1, 0}), 1, kEps) << "the top row is the pole +y itself";
+  EXPECT_NEAR(value(m, {0, -1, 0}), 21, kEps) << "the bottom row is -y";
+}
+
+TEST(EnvironmentMap, IsBilinearBetweenTexelsAndRepeatsAround) {
+  const EnvironmentMap m = map_of(numbered());
+  EXPECT_NEAR(value(m, {1, 0, 0}), 11.5, kEps) << "u = 1/4";
+  EXPECT_NEAR(value(m, {0, 0, 1}), 12.5, kEps) << "the middle of the image";
+  EXPECT_NEAR(value(m, {0, 0, -1}), 12.5, kEps) << "its left and right edge: of 14 and 11";
+  // A quarter turn further by 22.5 degrees: a quarter of the way from 14 to 11.
+  const auto s = static_cast<float>(std::sin(kPiD / 8)), c = static_cast<float>(std::cos(kPiD / 8));
+  EXPECT_NEAR(value(m, {-s, 0, -c}), 14 + (11 - 14) * .25, kEps);
+  // 45 degrees above the horizon: half of the pole's.
+  const auto r = static_cast<float>(std::sqrt(.5));
+  EXPECT_NEAR(value(m, {r, 1, -r}), (11 + 1) / 2., kEps);
+  EXPECT_NEAR(value(m, {r, -1, r}), (12 + 21) / 2., kEps);
+}
+
+TEST(EnvironmentMap, ToWorldTurnsAndMirrorsItAndNothingElse) {
+  const SkyImage s = numbered();
+  // z to x, and so the middle of the image to +x.
+  EXPECT_NEAR(value(map_of(s, test::rotate_y(90)), {1, 0, 0}), 12.5, kEps);
+  // y to z: the pole.
+  EXPECT_NEAR(value(map_of(s, test::rotate_x(90)), {0, 0, 1}), 1, kEps);
+  // First about x, then about y.
+  EXPECT_NEAR(value(map_of(s, test::rotate_y(90) * test::rotate_x(90)), {1, 0, 0}), 1, kEps);
+  EXPECT_NEAR(value(map_of(s, test::scale(-1, 1, 1)), {-1, 0, -1}), 11, kEps);
+  EXPECT_NEAR(value(map_of(s, test::translate({5, 6, 7}) * test::scale(3)), {1, 0, -1}), 11, kEps);
+  EXPECT_NEAR(value(map_of(s, {}, 2.5), {1, 0, -1}), 27.5, 3 * kEps);
+}
+
+SkyImage random_sky(int width, int height, unsigned seed) {
+  SkyImage s(width, height);
+  std::mt19937 rng(seed);
+  for (float& v : s.rgb) v = rng() % 3 == 0 ? static_cast<float>(rng() % 1000) / 500 : 0.f;
+  if (height > 3) s.set(width / 3, height / 3, {34000, 30000, 20000});
+  return s;
+}
+struct Named {
+  const char* name;
+  SkyImage image;
+};
+std::vector<Named> skies() {
+  std::vector<Named> all = {{"least", random_sky(2, 3, 1)},
+                            {"small", random_sky(7, 5, 2)},
+                            {"sun", random_sky(64, 32, 3)},
+                            {"constant", SkyImage(6, 4, 2)}};
+  SkyImage pole(8, 5), corner(8, 5);
+  pole.set_row(0, {3, 2, 1});
+  corner.set(7, 4, {1, 1, 1});
+  all.push_back({"only a pole", pole});
+  all.push_back({"only the last texel", corner});
+  return all;
+}
+
+// The map's own direction at the azimuth 2 pi u and with the cosine z.
+V3 direction(double u, double z) {
+  const double r = std::sqrt(std::max(0., 1 - z * z));
+  return V3(V3d(std::sin(2 * kPiD * u) * r, z, -std::cos(2 * kPiD * u) * r));
+}
+
+// Within a cell the density is bilinear in azimuth and cosine, so that the midpoint rule is exact.
+struct Bins {
+  int across, down, per = 2;  // cells, and parts of a cell
+  explicit Bins(const SkyImage& s) : across(s.width), down(s.height - 1) {}
+  int size() const { return across * down * per * per; }
+  double edge(int row) const {  // cosine at the upper edge of a row of parts
+    const double top = std::cos(kPiD * (row / per) / down), bottom = std::cos(kPiD * (row / per + 1) / down);
+    return top + (bottom - top) * (row % per) / per;
+  }
+  double share(const EnvironmentMap& m, int column, int row) const {
+    const double u = ((column + .5) / per + .5) / across, z = (edge(row) + edge(row + 1)) / 2;
+    return double{m.at(direction(u, z)).pdf} * 2 * kPiD / (across * per) * (edge(row) - edge(row + 1));
+  }
+  int of(const V3& d) const {
+    double u = std::atan2(double{d.x}, -double{d.z}) / (2 * kPiD) * across - .5;
+    u = (u < 0 ? u + across : u) * per;
+    const double angle = std::atan2(std::hypot(double{d.x}, double{d.z}), double{d.y});
+    int row = std::min(static_cast<int>(angle / kPiD * down), down - 1) * per;
+    const double z = d.y / std::sqrt(double{dot(d, d)});
+    while (row % per + 1 < per && z < edge(row + 1)) ++row;
+    return row * across * per + std::min(static_cast<int>(u), across * per - 1);
+  }
+};
+
+TEST(EnvironmentMap, DensityIntegratesToOne) {
+  for (const Named& n : skies()) {
+    const EnvironmentMap m = map_of(n.image, test::rotate_y(0));
+    const Bins bins(n.image);
+    double sum = 0;
+    for (int row = 0; row < bins.down * bins.per; ++row)
+      for (int column = 0; column < bins.across * bins.per; ++column) sum += bins.share(m, column, row);
+    // Each part's density is off by the rounding of its place, 2^-24 of a turn, of which a cell is 1/64th.
+    EXPECT_NEAR(sum, 1, 64 * 0x1p-22) << n.name;
+  }
+}
+
+TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
+  for (const Named& n : skies()) {
+    const EnvironmentMap m = map_of(n.image);
+    const Bins bins(n.image);
+    constexpr int kSamples = 1 << 18;
+    std::vector<double> expected, got(static_cast<std::size_t>(bins.size()));
+    for (int row = 0; row < bins.down * bins.per; ++row)
+      for (int column = 0; column < bins.across * bins.per; ++column)
+        expected.push_back(kSamples * bins.share(m, column, row));
+    RandomStream r(77);
+    for (int i = 0; i < kSamples; ++i) {
+      const std::uint32_t x = r.bits(), y = r.bits();
+      ++got[static_cast<std::size_t>(bins.of(m.sample(x, y)))];
+    }
+    // Bins of fewer than 8 go together.
+    double chi2 = 0, rest_expected = 0, rest_got = 0;
+    int freedom = -1;
+    const auto add = [&](double e, double g) {
+      chi2 += (g - e) * (g - e) / e;
+      ++freedom;
+    };
+    for (std::size_t i = 0; i < got.size(); ++i) {
+      if (expected[i] >= 8) {
+        add(expected[i], got[i]);
+      } else {
+        rest_expected += expected[i];
+        rest_got += got[i];
+      }
+    }
+    if (rest_expected >= 8) {
+      add(rest_expected, rest_got);
+    } else {
+      EXPECT_LE(rest_got, rest_expected + 6 * std::sqrt(rest_expected) + 6) << n.name;
+    }
+    ASSERT_GT(freedom, 2) << n.name;
+    // Wilson and Hilferty: the cube root of chi2 / n is normal about 1 - 2/9n with variance 2/9n; 4.75 sigma
+    // are 1e-6.
+    const double k = 2. / (9 * freedom);
+    EXPECT_LT((std::cbrt(chi2 / freedom) - (1 - k)) / std::sqrt(k), 4.75)
+        << n.name << " " << chi2 << " of " << freedom;
+  }
+}
+
+TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {
+  const EnvironmentMap m = map_of(SkyImage(16, 9, 3));
+  RandomStream r(3);
+  for (int i = 0; i < 1000; ++i) {
+    const std::uint32_t x = r.bits(), y = r.bits();
+    const EnvironmentMap::Light l = m.at(m.sample(x, y));
+    // Shares of 2^-32 words, of cells of 1/128 and more; float32.
+    EXPECT_NEAR(l.pdf * kFourPi, 1, 1e-5f);
+    EXPECT_FLOAT_EQ(l.radiance.x, 3);
+  }
+  EXPECT_NEAR(m.flux(), 3 * 4 * kPiD, 1e-4);
+}
+
+// Away from the poles light over density is constant for one colour: no noise of its own.
+TEST(EnvironmentMap, DensityFollowsTheLight) {
+  SkyImage s(64, 32);
+  std::mt19937 rng(5);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double v = 1 + rng() % 100;
+      s.set(x, y, {v, v, v});
+    }
+  const EnvironmentMap m = map_of(s);
+  RandomStream r(3);
+  double sum = 0, square = 0;
+  constexpr int kSamples = 20000;
+  for (int i = 0; i < kSamples; ++i) {
+    const std::uint32_t x = r.bits(), y = r.bits();
+    const EnvironmentMap::Light l = m.at(m.sample(x, y));
+    ASSERT_GT(l.pdf, 0);
+    const double v = l.radiance.x / l.pdf;
+    sum += v;
+    square += v * v;
+  }
+  const double mean = sum / kSamples, relative = (square / kSamples - mean * mean) / (mean * mean);
+  EXPECT_LT(relative, 1e-3);  // 1/8 in the two cells of rows next to the poles, which have 1/400 of all light
+}
+
+TEST(EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight) {
+  for (const Named& n : skies()) {
+    const EnvironmentMap m = map_of(n.image);
+    for (const std::uint32_t x : {0u, 1u, 0x80000000u, 0xffffffffu})
+      for (const std::uint32_t y : {0u, 1u, 0x80000000u, 0xffffffffu}) {
+        const V3 d = m.sample(x, y);
+        EXPECT_NEAR(dot(d, d), 1, 1e-6f) << n.name;
+        EXPECT_GT(m.at(d).pdf, 0) << n.name << " " << x << " " << y;
+      }
+  }
+}
+
+TEST(EnvironmentMap, NegativeTexelsBecomeBlackAndAreCounted) {
+  SkyImage s(4, 3, 1);
+  s.set(0, 1, {-5, 1, -.5});
+  const EnvironmentMap m = map_of(s);
+  EXPECT_EQ(m.clamped(), 2u);
+  EXPECT_NEAR(m.at(normalize(V3(1, 0, -1))).radiance.x, 0, kEps);
+  EXPECT_NEAR(m.at(normalize(V3(1, 0, -1))).radiance.y, 1, kEps);
+}
+
+TEST(EnvironmentMap, WhatCannotBeLightIsRefusedByName) {
+  SkyImage bad(4, 3, 1);
+  bad.set(2, 1, {1, std::numeric_limits<double>::quiet_NaN(), 1});
+  EXPECT_THAT(refusal(bad), HasSubstr("the texel at x 2, y 1"));
+  bad.set(2, 1, {1, std::numeric_limits<double>::infinity(), 1});
+  EXPECT_THAT(refusal(bad), HasSubstr("infinite"));
+  bad.set(2, 1, {1, 1e30, 1});
+  EXPECT_THAT(refusal(bad), HasSubstr("x 2, y 1"));
+  bad.set(2, 1, {1, 1e20, 1});
+  EXPECT_EQ(refusal(bad), "accepted");
+  EXPECT_THAT(refusal(bad, {}, 1e10), HasSubstr("more than samples of light may be"));
+  EXPECT_THAT(refusal(SkyImage(4, 3, 1), {}, -1), HasSubstr("scale"));
+  EXPECT_THAT(refusal(SkyImage(4, 2, 1)), HasSubstr("at least 2 x 3"));
+  EXPECT_THAT(refusal(SkyImage(1, 4, 1)), HasSubstr("at least 2 x 3"));
+  EXPECT_THAT(refusal(SkyImage(4, 3, 1), test::scale(1, 2, 1)), HasSubstr("may turn and mirror"));
+  EXPECT_THAT(refusal(SkyImage(4, 3, 1), test::scale(1, 0, 1)), HasSubstr("may turn and mirror"));
+}
+
+TEST(EnvironmentMap, MoreThan8192By4096PixelsAreRefused) {
+  ImageData d;
+  d.width = 16384;
+  d.height = 8192;
+  d.channels = 3;
+  const auto m = EnvironmentMap::build("huge.exr", d, 1, {});
+  ASSERT_FALSE(m);
+  EXPECT_EQ(m.error().code, Errc::resource_exhausted);
+  EXPECT_THAT(m.error().message,
+              HasSubstr("'huge.exr' has 16384 x 8192 pixels; scale it down to 8192 x 4096"));
+}
+
+// ---- in a world
+
+SceneKit under_sky(const SkyImage& s, const Transform& t = {}) {
+  SceneKit kit({4, 4});
+  const BsdfIndex white = kit.diffuse(.5);
+  kit.shape(RectangleShape{}, test::scale(3), white);
+  kit.look({0, -4, 2}, {0, 0, 0}, 1e-3);
+  test::add_sky(kit, s, t);
+  return kit;
+}
+
+TEST(EnvironmentMap, GivesTheIrradianceOfOneTexel) {
+  const SkyImage black(32, 16);
+  // y up in the map is z up here; the sun 60 degrees above the horizon, all around.
+  for (const int x : {0, 5, 17, 31}) {
+    SkyImage s = black;
+    s.set(x, 5, {34000, 34000, 34000});
+    const auto world = test::world_of(under_sky(s, test::rotate_x(90)));
+    const Vec3 e = test::one_texel_irradiance(32, 16, x, 5);
+    // rotate_x(90): (x, y, z) becomes (x, -z, y).
+    const V3 expected(V3d(e[0], -e[2], e[1]) * 34000.);
+    RandomStream r(4);
+    constexpr int kSide = 128;
+    V3d sum(0, 0, 0);
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const auto word = [&](int k) {
+        return static_cast<std::uint32_t>((static_cast<float>(k) + r.uniform()) / kSide * 0x1p32f);
+      };
+      const std::uint32_t a = word(i % kSide), b = word(i / kSide);
+      const auto l = world->lights.sample(world->lights.choose({0, a, b}), V3(0));
+      ASSERT_TRUE(l);
+      EXPECT_FALSE(l->delta);
+      sum += V3d(l->direction) * double{l->radiance.x / l->pdf};
+    }
+    const V3 mean(sum / double{kSide * kSide});
+    // Stratified: the error of a smooth integrand is of the order of 1 / side^2 of its variation, of .2.
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(mean[k], expected[k], 1e-4f * std::sqrt(dot(expected, expected))) << x;
+  }
+}
+
+TEST(EnvironmentMap, IsSeenByTheCameraUnlessEmittersAreHidden) {
+  SkyImage s(8, 5, .5f);
+  SceneKit kit({2, 2});
+  test::add_sky(kit, s, {}, 4);
+  EXPECT_FLOAT_EQ(static_cast<float>(render_sample(*test::world_of(kit), 0, 0, 0).rgb[1]), 2);
+  kit.scene.integrator.hide_emitters = true;
+  EXPECT_EQ(render_sample(*test::world_of(kit), 0, 0, 0).rgb[1], 0);
+  // What it lights is still lit: half of the 0.5 that comes from above is reflected.
+  SceneKit lit = under_sky(s);
+  lit.scene.integrator.hide_emitters = true;
+  const test::Estimate e = test::estimate(lit, 256);
+  EXPECT_NEAR(e.mean[0], .25, 6 * e.standard_error[0] + 1e-5);
+}
+
+TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
+  // Flux through the world's bounding ball against a point light's: half by power, half one in two.
+  SceneKit kit = under_sky(SkyImage(8, 5, 1));
+  kit.scene.emitters.push_back(PointEmitter{{0, 0, 1}, {1, 1, 1}});
+  const auto world = test::world_of(kit);
+  const LightChoice c = world->lights.choose({0, 0, 0});
+  const auto l = world->lights.sample(c, V3(0));
+  const double r = world->geometry.radius / world->geometry.scale, power = 4 * kPiD * kPiD * r * r;
+  const double expected = .25 + .5 * power / (power + 4 * kPiD);
+  ASSERT_TRUE(l);
+  EXPECT_NEAR(l->pdf * 4 * kPiD, expected, 1e-4);
+  // As a path that leaves finds it: one whose direction had the same density shares it in halves.
+  EXPECT_FLOAT_EQ(world->lights.environment(l->direction, l->pdf).x, .5f);
+  EXPECT_FLOAT_EQ(world->lights.environment(l->direction, kInfinity).x, 1);
+}
+
+TEST(EnvironmentMap, IsCountedInTheReport) {
+  SkyImage s(8, 5, 1);
+  s.set(3, 2, {-1, 0, 0});
+  const WorldReport r = describe(*test::world_of(under_sky(s)));
+  EXPECT_EQ(r.clamped_inputs, 1u);
+  EXPECT_THAT(r.used, ::testing::Contains(HasSubstr("environment map")));
+  EXPECT_THAT(r.used, ::testing::Contains("next-event estimation"));
+
+  const WorldReport black = describe(*test::world_of(under_sky(SkyImage(8, 5))));
+  EXPECT_THAT(black.left_out, ::testing::Contains("1 lights without power or area"));
+  EXPECT_THAT(black.left_out, ::testing::Contains(HasSubstr("environment map")));
+}
+
+TEST(EnvironmentMap, ASecondOneIsRefused) {
+  SceneKit kit = under_sky(SkyImage(8, 5, 1));
+  test::add_sky(kit, SkyImage(8, 5, 2));
+  EXPECT_THROW(test::world_of(kit), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace ls::render
