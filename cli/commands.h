@@ -11,6 +11,7 @@ using Action = std::function<int()>;
 
 void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
+void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
 void add_farm_commands(CLI::App& app,
                        Action& action);  // jobs, show, watch, pause, resume, cancel, extend, fetch, workers

@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
   Action action;
   add_render(app, action);
   add_inspect(app, action);
+  add_convert(app, action);
   add_submit(app, action);
   add_farm_commands(app, action);
   add_merge(app, action);

@@ -1,0 +1,102 @@
+"""`lightshaft convert`: the same scene, digest and pixels, wherever it is written to."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from cli_kit import FOG, digest, lightshaft, vol_bytes, write_fog
+from local_farm import ROOT
+
+
+def convert(scene, out, *arguments):
+    """The digest that it prints."""
+    lines = lightshaft("convert", scene, out, *arguments).stdout.splitlines()
+    assert len(lines) == 1 and lines[0].startswith("scene_sha256 "), lines
+    return lines[0].split()[1]
+
+
+def identity(scene):
+    return json.loads(lightshaft("inspect", scene, "--json").stdout)["scene_sha256"]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    kit = ROOT / "scenes" / "steam_room"
+    subprocess.run([sys.executable, kit / "make_steam.py", folder / "steam.vol", "--voxel", "0.2"], check=True)
+    subprocess.run([sys.executable, kit / "make_scene.py", folder / "steam_room.xml"], check=True)
+    return folder / "steam_room.xml"
+
+
+def test_the_demo_scene_stays_itself(demo, tmp_path):
+    out = tmp_path / "out" / "canonical.xml"
+    out.parent.mkdir()
+
+    printed = convert(demo, out)
+
+    assert printed == identity(demo) == identity(out)
+    assert (out.parent / "steam.vol").read_bytes() == (demo.parent / "steam.vol").read_bytes()
+    again = tmp_path / "out" / "again.xml"
+    assert convert(out, again) == printed
+    assert again.read_bytes() == out.read_bytes()
+
+
+def test_a_converted_scene_renders_the_same_pixels(tmp_path):
+    scene = write_fog(tmp_path)
+    out = tmp_path / "there"
+    out.mkdir()
+
+    convert(scene, out / "fog.xml", "-D", "density=3")
+
+    def pixels(path, *more):
+        return digest(lightshaft("render", path, "-o", out / "x.exr", "--spp", 4, *more))
+    assert pixels(out / "fog.xml") == pixels(scene, "-D", "density=3") != pixels(scene)
+
+
+def test_files_from_elsewhere_come_into_the_folder(tmp_path):
+    for name, n in (("a", 4), ("b", 5)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "fog.vol").write_bytes(vol_bytes([1] * n ** 3, n, n, n))
+    (tmp_path / "scenes").mkdir()
+    cube = FOG[FOG.index('  <shape type="cube">'):FOG.index('  <shape type="rectangle">')]
+    text = FOG.replace("fog.vol", "../a/fog.vol").replace("</scene>", cube.replace("fog.vol", str(tmp_path / "b" / "fog.vol")) + "</scene>")
+    scene = tmp_path / "scenes" / "two.xml"
+    scene.write_text(text)
+    out = tmp_path / "out"
+    out.mkdir()
+
+    done = lightshaft("convert", scene, out / "two.xml")
+
+    assert "becomes" in done.stderr
+    names = sorted(p.name for p in out.iterdir())
+    assert len(names) == 3 and names[1] == "fog.vol" and names[0].endswith("-fog.vol"), names
+    assert identity(out / "two.xml") == done.stdout.split()[1]
+    beside = tmp_path / "scenes" / "canonical.xml"
+    assert convert(scene, beside) == identity(scene)
+    assert sorted(p.name for p in beside.parent.iterdir()) == ["canonical.xml", "two.xml"]
+
+
+def test_nothing_is_overwritten_but_out_itself(tmp_path):
+    scene = write_fog(tmp_path)
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "fog.vol").write_bytes(b"another one")
+
+    assert "another folder" in lightshaft("convert", scene, out / "fog.xml", code=1).stderr
+    assert (out / "fog.vol").read_bytes() == b"another one" and not (out / "fog.xml").exists()
+    assert "over itself" in lightshaft("convert", scene, scene, code=2).stderr
+    assert scene.read_text() == FOG
+    (out / "fog.vol").unlink()
+    (out / "fog.xml").write_text("old")
+    assert convert(scene, out / "fog.xml") == identity(scene)
+
+
+def test_a_bad_scene_is_told_with_places_and_writes_nothing(tmp_path):
+    scene = tmp_path / "bad.xml"
+    scene.write_text(FOG.replace("gridvolume", "gridvolme"))
+
+    said = lightshaft("convert", scene, tmp_path / "out.xml", code=2).stderr
+
+    assert "bad.xml:" in said and "gridvolume" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.xml"]
