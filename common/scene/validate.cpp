@@ -120,9 +120,9 @@ class Checker {
   void check_bsdf_nesting() {
     const auto traits = bsdf_traits(s_);
     if (!traits) {
-      wrong_ = fmt::format(
-          "scene.bsdfs (twosided, mask, ...) contain each other in a circle or more than {} deep",
-          kMaxBsdfNesting);
+      wrong_ =
+          fmt::format("scene.bsdfs (twosided, mask, ...) contain each other in a circle or more than {} deep",
+                      kMaxBsdfNesting);
       return;
     }
     for (const Bsdf& b : s_.bsdfs) {

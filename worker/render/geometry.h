@@ -28,7 +28,7 @@ struct SurfaceInfo {  // one per scene shape
   // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
   // frame.
   bool wants_uv = true, wants_tangent = true;
-  bool smooth = true;      // of its material: next-event estimation makes sense
+  bool smooth = true;     // of its material: next-event estimation makes sense
   float orientation = 1;  // -1: normals are flipped against winding or the outward direction
 };
 
