@@ -126,9 +126,7 @@ LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standa
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
         "looks along the +z of `to_world`, +y up, +x to the left")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
-LS_TYPE(IntegratorSettings, "integrator", "volpath",
-        "volpath, path",
-        "how light is followed")
+LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, path", "how light is followed")
 #undef LS_TYPE
 
 template <class T, class U>

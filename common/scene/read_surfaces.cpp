@@ -187,7 +187,9 @@ std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
   Params p(*this, e);
   MaskBsdf b;
   bind(p, b);
-  if (const auto* image = std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value])) {
+  // A mask in error may come without any texture.
+  const bool known = b.opacity.value < scene_.textures.size();
+  if (const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr) {
     BitmapTexture opacity = *image;  // others may use it for its colour
     opacity.alpha = true;
     scene_.textures.emplace_back(opacity);

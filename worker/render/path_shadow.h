@@ -1,7 +1,7 @@
 // Part of path.h, which includes it: what a shadow ray brings.
 #pragma once
 
-#include "worker/render/path.h"
+#include "worker/render/world.h"
 
 namespace ls::render {
 

@@ -1,0 +1,149 @@
+// The describe() overloads of surfaces; see describe.h.
+#pragma once
+
+#include "common/scene/describe.h"
+
+namespace ls::scene {
+
+// ---- surfaces
+// -------------------------------------------------------------------------------------------------------
+template <class V, Of<DiffuseBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "reflectance", .doc = "share of light sent back", .range = kUnit, .fallback = {.5, .5, .5}},
+      b.reflectance);
+}
+template <class V, Of<ConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<RoughConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u", .doc = "roughness along u", .range = kPositive, .fallback = {.1, .1, .1}},
+          b.alpha_u);
+  v.field({.name = "alpha_v", .doc = "roughness along v", .range = kPositive, .fallback = {.1, .1, .1}},
+          b.alpha_v);
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<DielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<RoughDielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u", .doc = "roughness along u", .range = kPositive, .fallback = {.1, .1, .1}},
+          b.alpha_u);
+  v.field({.name = "alpha_v", .doc = "roughness along v", .range = kPositive, .fallback = {.1, .1, .1}},
+          b.alpha_v);
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<ThinDielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction around", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<PlasticBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<RoughPlasticBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha", .doc = "roughness", .range = kPositive}, b.alpha);
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<NullBsdf> T>
+void describe(V&, T&) {}
+template <class V, Of<TwoSidedBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "front", .doc = "of the front", .derived = true, .given_as = "<bsdf>"}, b.front);
+  v.field({.name = "back",
+           .doc = "of the back; the first again if there is no second",
+           .derived = true,
+           .given_as = "<bsdf>"},
+          b.back);
+}
+
+template <class V, Of<MaskBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "opacity",
+           .doc = "1: nothing passes. Of an image its alpha channel, if that falls below 1/2 somewhere; "
+                  "else the luminance",
+           .range = kUnit,
+           .fallback = {.5, .5, .5}},
+          b.opacity);
+  v.field({.name = "bsdf", .doc = "of the opaque share", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+}
+template <class V, Of<BlendBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "weight",
+           .doc = "share of the second bsdf; the luminance of a colour",
+           .range = kUnit,
+           .fallback = {.5, .5, .5}},
+          b.weight);
+  v.field({.name = "first", .doc = "where the weight is 0", .derived = true, .given_as = "<bsdf>"}, b.first);
+  v.field({.name = "second", .doc = "where the weight is 1", .derived = true, .given_as = "<bsdf>"},
+          b.second);
+}
+
+template <class V, Of<NormalMapBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "normalmap",
+           .doc = "normals: (x, y, z) = 2 (r, g, b) - 1 along u, across it and along the surface's normal",
+           .range = kUnit,
+           .fallback = {.5, .5, 1}},
+          b.normalmap);
+  v.field({.name = "bsdf", .doc = "that sees them", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+}
+
+}  // namespace ls::scene
