@@ -160,7 +160,7 @@ TEST(Service, RefusesSpecsBeyondItsLimits) {
   spec.size = FrameSize{1 << 20, 1 << 20};
   EXPECT_NE(refusal(spec), "");
   spec = {};
-  spec.integrator = "bdpt";
+  spec.integrator = "radiosity";
   EXPECT_NE(refusal(spec).find("volpath"), std::string::npos);
   spec = {};
   spec.target_error = std::nan("");

@@ -4,13 +4,17 @@
 #include <openvdb/openvdb.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <mutex>
 #include <new>
 #include <string>
 #include <vector>
 
 namespace {
+
+constexpr std::uintmax_t kSmallFile = 16 << 20;
 
 struct Refused {
   int code;
@@ -145,6 +149,10 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
   } catch (const Refused& r) {
     return say(r.code, r.text);
   } catch (const std::bad_alloc&) {
+    // A small file that wants all memory is a damaged one: its counts are garbage.
+    std::error_code unknown;
+    const auto bytes = std::filesystem::file_size(path, unknown);
+    if (!unknown && bytes < kSmallFile) return say(1, "not a readable OpenVDB file: damaged, or cut short");
     return say(2, "the grid does not fit into memory");
   } catch (const std::exception& e) {
     return say(1, std::string("not a readable OpenVDB file: ") + e.what());
