@@ -147,8 +147,9 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
       }
     }
     if (!met) {
-      outcome_.cut_off = !is_finite(d_);  // a direction that is none meets nothing: a rejected sample
-      if (!outcome_.cut_off) add_environment();
+      // A direction that is none meets nothing: a rejected sample, as one that was cut off before stays.
+      if (!is_finite(d_)) outcome_.cut_off = true;
+      add_environment();
       break;
     }
     add_emission(hit);
