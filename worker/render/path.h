@@ -148,8 +148,10 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
     }
     if (!met) {
       // A direction that is none meets nothing: a rejected sample, as one that was cut off before stays.
-      if (!is_finite(d_)) outcome_.cut_off = true;
-      add_environment();
+      if (is_finite(d_))
+        add_environment();
+      else
+        outcome_.cut_off = true;
       break;
     }
     add_emission(hit);
