@@ -5,8 +5,8 @@ usage: overhead.py [--scene SCENE.xml] [--size WxH] [--spp N] [--pairs 7]
 Interleaved pairs, the order swapped from pair to pair; prints render_seconds of both, the median ratio, the coordinator's CPU
 time as a share of the workers', the mean unit, the idle gaps that the workers saw, and whether the pixels are the same. Nothing
 else should run meanwhile. A bench, not a test.
-Without --scene the demo scene is generated with twenty-five times its steam, followed for 256 scatterings: even the first units,
-of two samples a pixel, take 50 ms and more. Choose --spp so that a job takes at least 30 s.
+Without --scene the demo scene is generated with twenty-five times its steam, followed for 256 scatterings; units of the first
+rounds, of two samples a pixel, are the shortest. Choose --spp so that a job takes at least 30 s.
 """
 import argparse
 import json
