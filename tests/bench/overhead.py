@@ -5,8 +5,9 @@ usage: overhead.py [--scene SCENE.xml] [--size WxH] [--spp N] [--pairs 7]
 Interleaved pairs, the order swapped from pair to pair; prints render_seconds of both, the median ratio, the coordinator's CPU
 time as a share of the workers', the mean unit, the idle gaps that the workers saw, and whether the pixels are the same. Nothing
 else should run meanwhile. A bench, not a test.
-Without --scene the demo scene is generated with twenty-five times its steam, followed for 256 scatterings; units of the first
-rounds, of two samples a pixel, are the shortest. Choose --spp so that a job takes at least 30 s.
+Without --scene the demo scene is generated with twenty-five times its steam, followed for 256 scatterings, the first 64 without
+roulette. Units of the first two rounds, of two samples a pixel, are the shortest: their mean is measured by a render of these
+alone. Choose --spp so that a job takes at least 30 s.
 """
 import argparse
 import json
@@ -28,7 +29,8 @@ def demo_scene(folder):
     scene = folder / "steam_room.xml"
     subprocess.run([sys.executable, kit / "make_scene.py", scene], check=True)
     text = scene.read_text()
-    for thin, thick in (('name="scale" value="2.4"', 'name="scale" value="60"'), ('name="max_depth" value="16"', 'name="max_depth" value="256"')):
+    for thin, thick in (('name="scale" value="2.4"', 'name="scale" value="60"'), ('name="max_depth" value="16"', 'name="max_depth" value="256"'),
+                        ('name="rr_depth" value="5"', 'name="rr_depth" value="64"')):
         assert text.count(thin) == 1, f"the demo scene no longer has {thin}"
         text = text.replace(thin, thick)
     scene.write_text(text)
@@ -40,9 +42,9 @@ def cpu_seconds(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def render_alone(scene, options, seed, folder):
+def render_alone(scene, options, seed, folder, spp=None):
     report = folder / "alone.json"
-    subprocess.run([bin_dir() / "lightshaft", "render", scene, *size_and_samples(options), "--seed", str(seed), "--threads", "2", "--quiet",
+    subprocess.run([bin_dir() / "lightshaft", "render", scene, *size_and_samples(options, spp), "--seed", str(seed), "--threads", "2", "--quiet",
                     "-o", folder / "alone.exr", "--report", report], check=True)
     return json.loads(report.read_text())
 
@@ -56,8 +58,8 @@ def rounds_of(spp):
     return rounds
 
 
-def size_and_samples(options):
-    return [*(["--size", options.size] if options.size else []), "--spp", str(options.spp)]
+def size_and_samples(options, spp=None):
+    return [*(["--size", options.size] if options.size else []), "--spp", str(spp or options.spp)]
 
 
 def render_on_farm(farm, scene, options, seed):
@@ -74,7 +76,7 @@ def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     args.add_argument("--scene", type=pathlib.Path)
     args.add_argument("--size", default="256x192")
-    args.add_argument("--spp", type=int, default=64)
+    args.add_argument("--spp", type=int, default=32)
     args.add_argument("--pairs", type=int, default=7)
     options = args.parse_args()
     ratios, shares = [], []
@@ -92,13 +94,16 @@ def main():
                 one = render_alone(scene, options, pair, folder)
             ratios.append(many["render_seconds"] / one["render_seconds"])
             shares.append(coordinator / many["core_seconds"])
-            units = len(farm.get(f"/api/v1/jobs/{many['job']}/tiles")["tiles"]) * rounds_of(many["spp"])
+            tiles = len(farm.get(f"/api/v1/jobs/{many['job']}/tiles")["tiles"])
+            units = tiles * rounds_of(many["spp"])
             same = many["pixels_sha256"] == one["pixels_sha256"]
             print(f"pair {pair + 1}: farm {many['render_seconds']:.2f} s, alone {one['render_seconds']:.2f} s, ratio {ratios[-1]:.4f}, "
                   f"coordinator CPU {100 * shares[-1]:.2f} % of the workers', {units} units of {1000 * many['core_seconds'] / units:.0f} ms, {'same pixels' if same else 'PIXELS DIFFER'}", flush=True)
         for worker in farm.workers:
             worker.terminate()
             print(*(f"{worker.name}: {line}" for line in worker.output().splitlines() if "gaps between units" in line), sep="\n")
+        first = render_alone(scene, options, 0, folder, spp=4)
+        print(f"units of the first two rounds: {1000 * first['core_seconds'] / (2 * tiles):.0f} ms on average")
     print(f"median ratio {statistics.median(ratios):.4f}, coordinator CPU {100 * statistics.median(shares):.2f} %")
 
 
