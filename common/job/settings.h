@@ -20,7 +20,7 @@ struct RenderSettings {
   FrameSize size;
   int tile = 32;
   std::uint64_t seed = 0;
-  std::string integrator;        // "volpath" | "path": resolved, never empty
+  std::string integrator;        // as IntegratorSettings::name: resolved, never empty
   int max_depth = -1;            // -1: unlimited; as in the dialect: number of path segments
   int rr_depth = 5;              // first depth at which Russian roulette may act
   std::vector<std::string> aov;  // sorted names; empty: colour only

@@ -43,6 +43,8 @@ struct Field {
   // For the documentation, where the C++ type doesn't tell: "point", "medium" (a nested one with the field's
   // name), "<phase>" (a nested one without a name). Derived fields without it are not written in files.
   std::string_view given_as = "";
+  // Of a number or colour that the dialect does not know: where it is this, it is not written in files.
+  double unwritten = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct TypeInfo {
@@ -91,9 +93,17 @@ LS_TYPE(BlendBsdf, "bsdf", "blendbsdf", "", "a mixture of two bsdfs")
 LS_TYPE(NormalMapBsdf, "bsdf", "normalmap", "",
         "turns the normal that a bsdf sees by an image (`raw` as a rule); light that the turned and the true "
         "normal put on different sides is left out")
+LS_TYPE(BumpMapBsdf, "bsdf", "bumpmap", "",
+        "turns the normal that a bsdf sees as if the surface were lifted by the luminance of an image, its "
+        "`texture` (`raw` as a rule; bilinear, or else it is flat), which may also carry another name or "
+        "none; light that the turned and the true normal put on different sides is left out")
+LS_TYPE(PrincipledBsdf, "bsdf", "principled", "",
+        "Burley's model of metals, coated dielectrics and glass. `specular` instead of `eta` means "
+        "eta = 2 / (1 - sqrt(0.08 specular)) - 1")
 LS_TYPE(ConstVolume, "volume", "constvolume", "",
-        "one value: everywhere as an albedo or in a `homogeneous` medium, in [0, 1]^3 as the density of a "
-        "`heterogeneous` one; also written as a plain `<rgb>` or `<float>`")
+        "one value: as the density of a `heterogeneous` medium in [0, 1]^3, moved by `to_world`; everywhere "
+        "as its albedo or emission, or in a `homogeneous` medium; also written as a plain `<rgb>` or "
+        "`<float>`")
 LS_TYPE(GridVolume, "volume", "gridvolume", "", "values on a grid, from a file")
 LS_TYPE(IsotropicPhase, "phase", "isotropic", "",
         "scatters equally into all directions; what a medium has if none is given")
@@ -106,10 +116,15 @@ LS_TYPE(SphereShape, "shape", "sphere", "",
         "a ball's surface; `center` and `radius` act before `to_world`, which may not stretch it")
 LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
 LS_TYPE(MeshShape, "shape", "mesh", "obj, ply", "triangles from a file")
-LS_TYPE(AreaEmitter, "emitter", "area", "", "light from the front of the shape that it stands in")
+LS_TYPE(AreaEmitter, "emitter", "area", "",
+        "light from the front of the shape that it stands in. `cutoff_angle`, `beam_width` and `falloff` are "
+        "our own: they make each point of it a spot light, whose radiance between the two angles is "
+        "multiplied by s^falloff, s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle)")
 LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from everywhere around")
 LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
-        "parallel light from far away; a `to_world` instead of `direction` turns +z")
+        "parallel light from far away; a `to_world` instead of `direction` turns +z. `angular_radius` is our "
+        "own: with it the light is a disk in the sky, seen by paths that leave the scene, whose radiance is "
+        "irradiance / (pi sin^2 angular_radius)")
 LS_TYPE(PointEmitter, "emitter", "point", "",
         "light from a point; a `to_world` instead of `position` moves the origin")
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
@@ -120,13 +135,18 @@ LS_TYPE(
     "Before `to_world` its top row is +y and its bottom row -y; of the horizon the left edge is -z, a "
     "quarter of the width further +x, the middle +z, three quarters -x, as in Mitsuba 3. It takes 2 x 3 "
     "to 2^25 pixels (8192 x 4096); negative values become 0")
+LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
+        "throws an image from the origin along the +z of `to_world`, +y up: a `perspective` camera turned "
+        "round, with the image's shape for a film. A plane one unit ahead receives pi times scale times the "
+        "image, as in Mitsuba 3")
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
         "looks along the +z of `to_world`, +y up, +x to the left")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
-LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, path", "how light is followed")
+LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_mis, path",
+        "how light is followed")
 #undef LS_TYPE
 
 template <class T, class U>
@@ -161,6 +181,11 @@ struct NamesOf<VolumeFilter> {
                                                 {"trilinear", VolumeFilter::trilinear}};
 };
 template <>
+struct NamesOf<GridOrder> {
+  static constexpr Named<GridOrder> all[] = {{"x_fastest", GridOrder::x_fastest},
+                                             {"z_fastest", GridOrder::z_fastest}};
+};
+template <>
 struct NamesOf<MeshFormat> {
   static constexpr Named<MeshFormat> all[] = {{"obj", MeshFormat::obj}, {"ply", MeshFormat::ply}};
 };
@@ -171,6 +196,17 @@ struct NamesOf<FovAxis> {
                                            {"diagonal", FovAxis::diagonal},
                                            {"smaller", FovAxis::smaller},
                                            {"larger", FovAxis::larger}};
+};
+template <>
+struct NamesOf<DistanceSampling> {
+  static constexpr Named<DistanceSampling> all[] = {{"exponential", DistanceSampling::exponential},
+                                                    {"equiangular", DistanceSampling::equiangular},
+                                                    {"mis", DistanceSampling::mis}};
+};
+template <>
+struct NamesOf<MisHeuristic> {
+  static constexpr Named<MisHeuristic> all[] = {{"power", MisHeuristic::power},
+                                                {"balance", MisHeuristic::balance}};
 };
 
 }  // namespace ls::scene

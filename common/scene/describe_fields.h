@@ -39,11 +39,14 @@ void describe(V& v, T& t) {
 template <class V, Of<ConstVolume> T>
 void describe(V& v, T& s) {
   v.field({.name = "value", .doc = "the value", .range = kNonNegative}, s.value);
+  v.field({.name = "to_world", .doc = "moves the cube [0, 1]^3 that it fills as a density"}, s.to_world);
 }
 template <class V, Of<GridVolume> T>
 void describe(V& v, T& s) {
-  v.field({.name = "filename", .doc = "Mitsuba `.vol` or OpenVDB `.vdb`", .required = true}, s.file);
-  v.field({.name = "grid_name", .doc = "which grid of a `.vdb`; empty: the only one, or \"density\""},
+  v.field({.name = "filename", .doc = "Mitsuba `.vol`, OpenVDB `.vdb`, NanoVDB `.nvdb` or raw `.bin`", .required = true},
+          s.file);
+  v.field({.name = "grid_name",
+           .doc = "which grid of a `.vdb` or `.nvdb`; empty: the only one, or \"density\""},
           s.grid_name);
   v.field({.name = "filter_type", .doc = "between voxels"}, s.filter);
   v.field(
@@ -62,6 +65,7 @@ void describe(V& v, T& s) {
   v.field({.name = "raw", .doc = "no colour conversion; without effect, as volumes are linear RGB here"},
           s.raw);
   v.field({.name = "to_world", .doc = "places the grid's box in the world"}, s.to_world);
+  v.field({.name = "order", .doc = "which index of a `.bin` file's values runs fastest"}, s.order);
 }
 template <class V, Of<IsotropicPhase> T>
 void describe(V&, T&) {}
@@ -88,6 +92,18 @@ void describe(V& v, T& m) {
            .derived = true,
            .given_as = "<phase>"},
           m.phase);
+  v.field({.name = "emission",
+           .doc = "light given off, whatever the extinction",
+           .unit = "radiance/length",
+           .range = kNonNegative,
+           .constvolume = true},
+          m.emission);
+  v.field({.name = "source_radiance",
+           .doc = "light given off per absorption: sigma_a times this",
+           .unit = "radiance",
+           .range = kNonNegative,
+           .constvolume = true},
+          m.source_radiance);
 }
 template <class V, Of<HeterogeneousMedium> T>
 void describe(V& v, T& m) {
@@ -103,6 +119,29 @@ void describe(V& v, T& m) {
            .derived = true,
            .given_as = "<phase>"},
           m.phase);
+  v.field({.name = "emission",
+           .doc = "light given off, whatever the extinction; a grid ends at its box, one value is everywhere "
+                  "in the medium",
+           .unit = "radiance/length",
+           .range = kNonNegative},
+          m.emission);
+  v.field({.name = "source_radiance",
+           .doc = "light given off per absorption: sigma_a times this",
+           .unit = "radiance",
+           .range = kNonNegative},
+          m.source_radiance);
+  v.field({.name = "temperature",
+           .doc = "the medium glows as a black body: sigma_a times its radiance at temperature_offset + "
+                  "temperature_scale * this",
+           .unit = "K",
+           .range = kNonNegative},
+          m.temperature);
+  v.field({.name = "emission_scale", .doc = "factor on the light given off", .range = kNonNegative},
+          m.emission_scale);
+  v.field({.name = "temperature_scale", .doc = "kelvin per unit of `temperature`", .range = kNonNegative},
+          m.temperature_scale);
+  v.field({.name = "temperature_offset", .doc = "added to it", .unit = "K", .range = {-1e6, 1e6}},
+          m.temperature_offset);
 }
 
 // ---- shapes
@@ -162,6 +201,21 @@ void describe(V& v, T& s) {
 template <class V, Of<AreaEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "emitted radiance", .range = kNonNegative}, e.radiance);
+  v.field({.name = "cutoff_angle",
+           .doc = "dark beyond this angle from the normal",
+           .unit = "degrees",
+           .range = {0, 90, true},
+           .unwritten = 90},
+          e.cutoff_angle);
+  v.field({.name = "beam_width",
+           .doc = "all of the radiance within this angle from the normal; 3/4 of a given cutoff_angle if not "
+                  "given",
+           .unit = "degrees",
+           .range = {0, 90},
+           .unwritten = 90},
+          e.beam_width);
+  v.field({.name = "falloff", .doc = "exponent between the two", .range = {0, 1000}, .unwritten = 1},
+          e.falloff);
 }
 template <class V, Of<ConstantEmitter> T>
 void describe(V& v, T& e) {
@@ -173,6 +227,12 @@ void describe(V& v, T& e) {
           e.direction);
   v.field({.name = "irradiance", .doc = "on a plane that faces the light", .range = kNonNegative},
           e.irradiance);
+  v.field({.name = "angular_radius",
+           .doc = "of the disk that the light comes from (the sun's is 0.267); below 0.001 it is a point",
+           .unit = "degrees",
+           .range = {0, 90},
+           .unwritten = 0},
+          e.angular_radius);
 }
 template <class V, Of<PointEmitter> T>
 void describe(V& v, T& e) {
@@ -207,6 +267,19 @@ void describe(V& v, T& e) {
   v.field({.name = "filename", .doc = "the image", .required = true}, e.file);
   v.field({.name = "scale", .doc = "multiplies the image's values", .range = kNonNegative}, e.scale);
   v.field({.name = "to_world", .doc = "turns or mirrors the map; moving it changes nothing"}, e.to_world);
+}
+
+template <class V, Of<ProjectorEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "irradiance", .doc = "the image", .range = kNonNegative}, e.irradiance);
+  v.field({.name = "scale", .doc = "multiplies the image", .range = kNonNegative}, e.scale);
+  v.field({.name = "to_world", .doc = "places and turns the light"}, e.to_world);
+  v.field({.name = "fov",
+           .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given)",
+           .unit = "degrees",
+           .range = {0, 180, true, true}},
+          e.fov);
+  v.field({.name = "fov_axis", .doc = "what fov measures"}, e.fov_axis);
 }
 
 // ---- camera, film, integrator
@@ -278,7 +351,10 @@ void describe(V& v, T& f) {
 }
 template <class V, Of<IntegratorSettings> T>
 void describe(V& v, T& i) {
-  v.field({.name = "name", .doc = "\"volpath\" or \"path\" (leaves media out)", .derived = true}, i.name);
+  v.field({.name = "name",
+           .doc = "\"volpath\", \"volpath_distant_mis\" or \"path\" (leaves media out)",
+           .derived = true},
+          i.name);
   v.field({.name = "max_depth",
            .doc = "longest path in segments: 1 emission, 2 direct light; -1: no limit",
            .range = {-1, kMaxDepthSetting}},
@@ -288,6 +364,12 @@ void describe(V& v, T& i) {
            .range = {1, kMaxDepthSetting}},
           i.rr_depth);
   v.field({.name = "hide_emitters", .doc = "lights are invisible to the camera"}, i.hide_emitters);
+  v.field({.name = "distance",
+           .doc = "`volpath_distant_mis` alone: where on a ray's way through a medium it looks for light: as "
+                  "light fades (`exponential`), near the light (`equiangular`), or both (`mis`)"},
+          i.distance);
+  v.field({.name = "heuristic", .doc = "`volpath_distant_mis` alone: weighs the two against each other"},
+          i.heuristic);
 }
 
 template <class V, Of<Asset> T>

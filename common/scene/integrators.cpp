@@ -9,7 +9,7 @@ namespace {
 constexpr IntegratorRow kRows[] = {
     {"volpath", "volpath", {}},
     {"volpathmis", "volpath", {}},
-    {"volpath_distant_mis", "volpath", {}},
+    {kDistantMis, kDistantMis, {}},
     {"volpath_simple", "volpath", {}},
     {"path", "path", {}},
     {"direct", "path", 2},

@@ -7,6 +7,9 @@
 
 namespace ls::scene {
 
+// The one integrator whose settings say more than how far it goes.
+inline constexpr std::string_view kDistantMis = "volpath_distant_mis";
+
 struct IntegratorRow {
   std::string_view name;         // the dialect's, or ours
   std::string_view ours;         // IntegratorSettings::name

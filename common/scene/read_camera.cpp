@@ -195,9 +195,18 @@ void Reader::read_integrator(const Element& e, int depth) {
                                                         "by other means",
                                                         p.title(), row->ours));
   i.name = row->ours;
+  if (i.name != kDistantMis) refuse_distances(p);
   bind(p, i);
   if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
+}
+
+// What only `volpath_distant_mis` chooses is no parameter of the others.
+void Reader::refuse_distances(Params& p) {
+  for (const std::string_view name : {"distance", "heuristic"})
+    if (const Element* e = p.take(name))
+      report_.error(e->at, fmt::format("'{}' is a parameter of the integrator \"{}\" alone, not of {}", name,
+                                       kDistantMis, p.title()));
 }
 
 // Channels that a scene asks for and that are not written would be missed.

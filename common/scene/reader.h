@@ -103,6 +103,7 @@ class Reader {
   ReconstructionFilter read_plain_filter(const Element& e);
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
+  void refuse_distances(Params& p);
   void check_channels(Params& p);
 
   const Document& document_;

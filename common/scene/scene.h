@@ -155,20 +155,40 @@ struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the su
   BsdfIndex bsdf;
   bool operator==(const NormalMapBsdf&) const = default;
 };
+// The surface is lifted along its normal by scale * luminance, in scene units, as far as the normal shows it.
+// A bitmap.
+struct BumpMapBsdf {
+  TextureIndex texture;
+  double scale = 1;
+  BsdfIndex bsdf;
+  bool operator==(const BumpMapBsdf&) const = default;
+};
+// Burley's model, 2012 and 2015, as Mitsuba 3 has it.
+struct PrincipledBsdf {
+  TextureIndex base_color, roughness, anisotropic, metallic;
+  std::optional<TextureIndex> spec_trans;  // nothing: no light crosses the surface
+  double eta = 1.5;
+  TextureIndex spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss;
+  bool operator==(const PrincipledBsdf&) const = default;
+};
 using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughDielectricBsdf,
                           ThinDielectricBsdf, PlasticBsdf, RoughPlasticBsdf, NullBsdf, TwoSidedBsdf, MaskBsdf,
-                          BlendBsdf, NormalMapBsdf>;
+                          BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf>;
 
 // ---- volumes and media
 // ----------------------------------------------------------------------------------------------
+// As a density it fills the unit cube [0,1]^3 of its local space, moved by to_world; as anything else it is
+// everywhere.
 struct ConstVolume {
   Rgb value{1, 1, 1};
+  Transform to_world;
   bool operator==(const ConstVolume&) const = default;
 };
 enum class VolumeFilter { nearest, trilinear };
+enum class GridOrder { x_fastest, z_fastest };
 // A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With
-// use_grid_bbox the file's own bounding box is placed first. VDB grids are placed by their own transform (see
-// docs/scene-format.md).
+// use_grid_bbox the file's own bounding box is placed first. VDB and NanoVDB grids are placed by their own
+// transform, raw `.bin` grids by their box with the outermost values on its faces (see docs/scene-format.md).
 struct GridVolume {
   AssetIndex file;
   std::string grid_name;  // for files with named grids; empty: the only one, or "density"
@@ -178,6 +198,7 @@ struct GridVolume {
   bool node_centred = false;  // the outermost values on the faces of the box (Mitsuba 0.x); not of VDB
   bool raw = true;
   Transform to_world;
+  GridOrder order = GridOrder::x_fastest;  // of the values in a `.bin`
   bool operator==(const GridVolume&) const = default;
 };
 using Volume = std::variant<ConstVolume, GridVolume>;
@@ -191,19 +212,29 @@ struct HgPhase {
 };
 using Phase = std::variant<IsotropicPhase, HgPhase>;
 
-// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale.
+// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale. What it
+// emits per length is emission + sigma_a * source_radiance.
 struct HomogeneousMedium {
   Rgb sigma_t{1, 1, 1};
   Rgb albedo{.75, .75, .75};
   double scale = 1;
   PhaseIndex phase;
+  Rgb emission{0, 0, 0};         // radiance per scene unit, whatever the extinction
+  Rgb source_radiance{0, 0, 0};  // what an infinite depth of it, not scattering, shows
   bool operator==(const HomogeneousMedium&) const = default;
 };
+// At most one of the three sources of light.
 struct HeterogeneousMedium {
   VolumeIndex sigma_t;
   VolumeIndex albedo;
   double scale = 1;
   PhaseIndex phase;
+  std::optional<VolumeIndex> emission;         // radiance per scene unit, whatever the extinction
+  std::optional<VolumeIndex> source_radiance;  // emits sigma_a times it
+  // Emits sigma_a times the radiance of a black body of temperature_offset + temperature_scale * value kelvin.
+  std::optional<VolumeIndex> temperature;
+  double emission_scale = 1;  // factor on what is emitted
+  double temperature_scale = 1, temperature_offset = 0;
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
@@ -234,8 +265,12 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape>;
 
-struct AreaEmitter {  // radiance leaves on the side of the normal only
+// Radiance leaves on the side of the normal only. At an angle a from it, in degrees: all of it within
+// beam_width, none beyond cutoff_angle, and in between times s^falloff with
+// s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
+struct AreaEmitter {
   TextureIndex radiance;
+  double cutoff_angle = 90, beam_width = 90, falloff = 1;
   bool operator==(const AreaEmitter&) const = default;
 };
 
@@ -252,6 +287,7 @@ struct Shape {
 
 // ---- emitters without a shape
 // ---------------------------------------------------------------------------------------
+enum class FovAxis { x, y, diagonal, smaller, larger };
 struct ConstantEmitter {  // radiance from everywhere
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
@@ -260,6 +296,8 @@ struct DirectionalEmitter {  // `direction`: the way light travels, in the world
                              // it
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
+  // Degrees: the light is a disk of this radius in the sky, of one radiance, with the same irradiance.
+  double angular_radius = 0;
   bool operator==(const DirectionalEmitter&) const = default;
 };
 struct PointEmitter {
@@ -284,11 +322,23 @@ struct EnvmapEmitter {
   Transform to_world;
   bool operator==(const EnvmapEmitter&) const = default;
 };
-using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter>;
+
+// A camera turned round: at the origin of to_world, along its +z, +y up, it throws an image as the camera of
+// that field of view and the image's shape would see it. On the plane one scene unit ahead irradiance is
+// pi scale times the image's value.
+struct ProjectorEmitter {
+  TextureIndex irradiance;
+  double scale = 1;
+  Transform to_world;
+  double fov = 50;
+  FovAxis fov_axis = FovAxis::x;
+  bool operator==(const ProjectorEmitter&) const = default;
+};
+using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
+                             ProjectorEmitter>;
 
 // ---- camera, film, integrator
 // ---------------------------------------------------------------------------------------
-enum class FovAxis { x, y, diagonal, smaller, larger };
 struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   Transform to_world;
   double fov = 50;  // degrees, along fov_axis
@@ -321,11 +371,17 @@ struct FilmSettings {
   bool operator==(const FilmSettings&) const = default;
 };
 
+// How `volpath_distant_mis` chooses the point of a ray's way through a medium that it connects with a light,
+// and how the two choices of `mis` are weighed against each other.
+enum class DistanceSampling { exponential, equiangular, mis };
+enum class MisHeuristic { power, balance };
 struct IntegratorSettings {
-  std::string name = "volpath";  // ours: "volpath" or "path"
+  std::string name = "volpath";  // ours: "volpath", "volpath_distant_mis" or "path"
   int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light
   int rr_depth = 5;
   bool hide_emitters = false;
+  DistanceSampling distance = DistanceSampling::mis;  // these two of "volpath_distant_mis" alone
+  MisHeuristic heuristic = MisHeuristic::power;
   bool operator==(const IntegratorSettings&) const = default;
 };
 

@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/scene/describe_fields.h"
+#include "common/scene/integrators.h"
 
 namespace ls {
 namespace scene {
@@ -119,7 +120,7 @@ class Writer {
 
   std::string run() {
     out_ = "<scene version=\"3.0.0\">\n";
-    object(scene_.integrator);
+    write_integrator();
     pool(scene_.textures, TextureIndex{});
     pool(scene_.bsdfs, BsdfIndex{});
     pool(scene_.volumes, VolumeIndex{});
@@ -221,6 +222,25 @@ class Writer {
     close("shape");
   }
 
+  // What only `volpath_distant_mis` has is no parameter of the others.
+  struct WithoutDistances {
+    Writer& writer;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      if (f.name != "distance" && f.name != "heuristic") writer.field(f, x);
+    }
+  };
+  void write_integrator() {
+    const IntegratorSettings& i = scene_.integrator;
+    WithoutDistances plain{*this};
+    open("integrator", plugin(i), "", "");
+    if (i.name == kDistantMis)
+      describe(*this, i);
+    else
+      describe(plain, i);
+    close("integrator");
+  }
+
   // A pinhole camera knows no lens.
   struct WithoutLens {
     Writer& writer;
@@ -262,7 +282,9 @@ class Writer {
     object(x, "", name);
   }
 
-  void property(const Field& f, double x) { value("float", f.name, number(x)); }
+  void property(const Field& f, double x) {
+    if (x != f.unwritten) value("float", f.name, number(x));
+  }
   void property(const Field& f, int x) { value("integer", f.name, std::to_string(x)); }
   void property(const Field& f, std::uint64_t x) { value("integer", f.name, std::to_string(x)); }
   void property(const Field& f, bool x) {
@@ -281,6 +303,7 @@ class Writer {
   }
   void property(const Field& f, const Rgb& x) {
     const bool grey = x[0] == x[1] && x[1] == x[2];
+    if (grey && x[0] == f.unwritten) return;
     value(grey ? "float" : "rgb", f.name, grey ? number(x[0]) : numbers(x));
   }
   void property(const Field& f, const Transform& x) {

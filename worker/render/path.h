@@ -2,19 +2,25 @@
 //
 // State of a path: `beta`, its weight relative to the hero channel, and `density`, each channel's sampling
 // density relative to the hero's (see medium.h). A contribution is beta * light / mean(density): the balance
-// heuristic over channels. Strategies of direct light, combined by the balance heuristic: (1) next-event
-// estimation at a vertex, (2) directions from BSDF or phase function that hit a light, (3) in homogeneous
-// media, vertices placed equi-angularly about the light. For a vertex at distance t of a segment, (1) and (2)
-// share the density f(t) of free flight and (3) has e(t); with p_l, p_s the solid-angle densities of light
-// and direction sampling the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only the
-// ratio e / f matters: `focus` below.
+// heuristic over channels. Direct light is found by directions from BSDF or phase function that hit a light
+// and by next-event estimation, combined by the balance heuristic. At surfaces next-event estimation starts
+// from the path's own vertices. What it does in media is a strategy, `Light` (vertex_light.h: the default;
+// distant_mis.h), which has
+//   Segment ahead(path, medium, t_max, may_scatter)  before each flight through a medium: light scattered
+//                                                    once, anywhere on the way;
+//   Vertex vertex(path, medium, segment, t)          what a vertex that the flight made at t keeps of it;
+//   void at_vertex(path, medium, p, d)               light scattered at that vertex;
+//   Vertex::found_as_light(), (pivot)                the density of all that next-event estimation from there
+//                                                    and from the segment before, over the flight's: of
+//                                                    lights without a place, of those with this pivot. 1 for
+//                                                    a default-constructed one: a vertex on a surface.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
-#include "worker/render/equiangular.h"
 #include "worker/render/sampler.h"
+#include "worker/render/vertex_light.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -35,7 +41,7 @@ struct SampleOutcome {
   std::uint64_t majorant_violations = 0;
 };
 
-template <Features F>
+template <Features F, template <Features> class Light = VertexLight>
 class PathTracer {
  public:
   PathTracer(const World& world, const SampleStream& stream) : world_(world), stream_(stream) {}
@@ -43,23 +49,19 @@ class PathTracer {
   SampleOutcome trace(const CameraRay& ray);
 
  private:
+  friend class Light<F>;
   struct Vertex {  // where the current ray was scattered from
     V3 p{0, 0, 0};
     float pdf = 0;      // of the direction
     bool delta = true;  // chosen by a delta lobe or the camera: lights found are counted in full
-    // For a vertex in a medium whose segment was also sampled equi-angularly:
-    bool focused = false;
-    V3 o{0, 0, 0}, d{0, 0, 0};
-    float length = 0, t = 0, flight_pdf = 0;
+    typename Light<F>::Vertex in_medium;
   };
 
   std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
-  void focus_on_light(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
   void pass_boundary(const SurfaceHit& hit);
   void light_surface(const SurfaceHit& hit, const V3& wo);
-  void light_medium(const Medium& medium, const V3& p, const V3& d);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
@@ -79,22 +81,6 @@ class PathTracer {
   void apply(const Flight& f) {
     beta_ *= f.weight;
     if constexpr (F.chromatic) density_ *= f.density;
-  }
-  // Density of the free flight ending at t, whichever channel were the hero.
-  float flight_pdf(const Medium& m, float t) const {
-    if constexpr (F.chromatic) {
-      float num = 0;
-      for (int c = 0; c < 3; ++c) num += density_[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * t));
-      return num / 3 / mean(density_);
-    } else {
-      const float s = m.sigma_t.x * std::exp(-m.sigma_t.x * t);
-      return (s + s + s) / 3;
-    }
-  }
-  // e / f for a light with this pivot.
-  float focus(const V3& pivot) const {
-    if (!last_.focused) return 0;
-    return EquiAngular(last_.o, last_.d, last_.length, pivot).pdf(last_.t) / last_.flight_pdf;
   }
   // What a point at this distance from a surface along the ray lacks of the offset that keeps it clear of it.
   V3 clear_of(const V3& offset, float distance) const {
@@ -124,8 +110,8 @@ class PathTracer {
   MediumCounters counters_;
 };
 
-template <Features F>
-SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
+template <Features F, template <Features> class Light>
+SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
   start_ = o_ = ray.o;
   d_ = ray.d;
@@ -171,12 +157,11 @@ SampleOutcome PathTracer<F>::trace(const CameraRay& ray) {
 
 // A number for roulette: the path goes on from a vertex in the medium. Nothing: it reached the end of the
 // segment, if there is one, or has ended on the way, with beta black.
-template <Features F>
-std::optional<float> PathTracer<F>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
+template <Features F, template <Features> class Light>
+std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
   const float lead = dot(o_ - start_, d_), t_max = end ? end->t + lead : kInfinity;
   const bool may_scatter = world_.depth_allows(depth_ + 1);
-  const bool focused = world_.equiangular && !medium.grid && std::isfinite(t_max) && may_scatter;
-  if (focused) focus_on_light(medium, t_max);
+  const auto ahead = Light<F>::ahead(*this, medium, t_max, may_scatter);
   const Group numbers = stream_.group(segment_, Purpose::flight);
   const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], start_, d_, t_max,
                                        stream_.stream(segment_, Purpose::track_flight), counters_);
@@ -195,18 +180,10 @@ std::optional<float> PathTracer<F>::scatter_in_medium(const Medium& medium, cons
   if (lead > 0) last_.p += clear_of(o_ - start_, flight.t);
   if (end) last_.p += clear_of(offset_point(end->p, end->ng, -d_) - end->p, t_max - flight.t);
   last_.delta = false;
-  if (focused) {
-    last_.focused = true;
-    last_.o = start_;
-    last_.d = d_;
-    last_.length = t_max;
-    last_.t = flight.t;
-    last_.flight_pdf = flight_pdf(medium, flight.t);
-    if (!(last_.flight_pdf > 0)) last_.focused = false;
-  }
+  last_.in_medium = Light<F>::vertex(*this, medium, ahead, flight.t);
   apply(flight);
   ++depth_;
-  light_medium(medium, last_.p, d_);
+  Light<F>::at_vertex(*this, medium, last_.p, d_);
   const Group direction = stream_.group(depth_, Purpose::direction);
   const PhaseSample s = medium.phase.sample(d_, {direction.u(0), direction.u(1)});
   last_.pdf = s.pdf;
@@ -215,45 +192,9 @@ std::optional<float> PathTracer<F>::scatter_in_medium(const Medium& medium, cons
   return direction.u(3);
 }
 
-// Strategy (3): light scattered once, from a vertex near the light.
-template <Features F>
-void PathTracer<F>::focus_on_light(const Medium& medium, float t_max) {
-  const Group g = stream_.group(segment_, Purpose::segment);
-  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
-  if (!choice.has_place || !(t_max > 0)) return;
-  const EquiAngular::Sample s = EquiAngular(start_, d_, t_max, choice.pivot).sample(g.u(3));
-  const auto light = world_.lights.sample(choice, s.p);
-  if (!light || !(s.pdf > 0)) return;
-  const float phase = medium.phase.value(d_, light->direction);
-  const float ratio = s.pdf / flight_pdf(medium, s.t);  // e / f; infinite where no flight gets to
-  const float share = light->delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
-  const float weight = light->delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f)
-                                    : (std::isfinite(ratio) ? share : 1.f);
-  const C3 arriving = unoccluded(s.p, s.p, *light, medium_, stream_.stream(segment_, Purpose::track_segment));
-  if (is_black(arriving)) return;
-  C3 in_scattered;
-  for (int c = 0; c < 3; ++c) in_scattered[c] = medium.sigma_s[c] * std::exp(-medium.sigma_t[c] * s.t);
-  add(beta_ * in_scattered * arriving * (phase * weight / (light->pdf * s.pdf)));
-}
-
-// Strategy (1) at a vertex in a medium; d is the direction of travel before the scattering.
-template <Features F>
-void PathTracer<F>::light_medium(const Medium& medium, const V3& p, const V3& d) {
-  if (!world_.lights.can_sample()) return;
-  const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
-  const auto light = world_.lights.sample(choice, p);
-  if (!light) return;
-  const float phase = medium.phase.value(d, light->direction);
-  const float with_focus = 1 + (choice.has_place ? focus(choice.pivot) : 0.f);
-  const float weight = light->delta ? 1 / with_focus : light->pdf / (light->pdf * with_focus + phase);
-  const C3 arriving = unoccluded(p, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
-}
-
-// Strategy (1) at a surface.
-template <Features F>
-void PathTracer<F>::light_surface(const SurfaceHit& hit, const V3& wo) {
+// Next-event estimation at a surface.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
@@ -275,8 +216,8 @@ void PathTracer<F>::light_surface(const SurfaceHit& hit, const V3& wo) {
 }
 
 // A number for roulette, or nothing: absorbed, or too deep.
-template <Features F>
-std::optional<float> PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
+template <Features F, template <Features> class Light>
+std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) {
   if (!world_.depth_allows(depth_ + 1)) return std::nullopt;
   ++depth_;
   const V3 wo = hit.shading.to_local(-d_);
@@ -307,8 +248,8 @@ std::optional<float> PathTracer<F>::scatter_on_surface(const SurfaceHit& hit) {
 // next-event estimation from the vertex before, whose shadow rays pass the surface with the same share
 // (through_boundaries). The decision is keyed by the segment: the numbers of a vertex would be used again at
 // the next one.
-template <Features F>
-bool PathTracer<F>::passes_veil(const SurfaceHit& hit) {
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::passes_veil(const SurfaceHit& hit) {
   const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
   const Veil veil = world_.bsdfs.veil(bsdf, hit.uv, hit.shading.to_local(-d_));
   if (!(veil.probability > 0)) return false;
@@ -320,35 +261,36 @@ bool PathTracer<F>::passes_veil(const SurfaceHit& hit) {
   return false;
 }
 
-template <Features F>
-void PathTracer<F>::pass_boundary(const SurfaceHit& hit) {
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit) {
   start_ = hit.p;
   o_ = offset_point(hit.p, hit.ng, d_);
   if constexpr (F.media) medium_ = medium_beyond(hit, d_, medium_);
 }
 
-template <Features F>
-void PathTracer<F>::add_emission(const SurfaceHit& hit) {
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (world_.geometry.surfaces[hit.surface].light == kNone || (depth_ == 0 && world_.hide_emitters)) return;
   const C3 emitted = world_.lights.emitted(hit, -d_);
   if (is_black(emitted)) return;
   float weight = 1;
   if (!last_.delta) {
     const float p_l = world_.lights.pdf(hit, last_.p, d_);
-    weight = last_.pdf / (last_.pdf + p_l * (1 + focus(world_.lights.pivot(hit))));
+    weight = last_.pdf / (last_.pdf + p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
   add(beta_ * emitted * weight);
 }
 
-template <Features F>
-void PathTracer<F>::add_environment() {
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
-  add(beta_ * world_.lights.environment(d_, last_.delta ? kInfinity : last_.pdf));
+  const float pdf = last_.pdf / last_.in_medium.found_as_light();
+  add(beta_ * world_.lights.environment(d_, last_.delta ? kInfinity : pdf));
 }
 
 // Russian roulette; false ends the path.
-template <Features F>
-bool PathTracer<F>::survives(float u) {
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::survives(float u) {
   if (is_black(beta_)) return false;
   if (depth_ < world_.rr_depth) return true;
   float size = max_component(beta_) * eta_scale_;

@@ -8,9 +8,9 @@ namespace ls::render {
 // Light that gets from the sampled light to `start`, through boundaries and media. p is `start`, moved off
 // its surface after the light was sampled: the ray is aimed anew, so that it ends in front of the light and
 // not on it.
-template <Features F>
-C3 PathTracer<F>::unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
-                             RandomStream stream) {
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
+                                    std::uint32_t medium, RandomStream stream) {
   V3 d = light.direction;
   float left = light.distance;
   if (std::isfinite(left)) {
@@ -28,9 +28,9 @@ C3 PathTracer<F>::unoccluded(const V3& start, const V3& p, const LightSample& li
 
 // What of `value` gets along the unoccluded ray from p: surfaces that let light pass, and media, take their
 // share.
-template <Features F>
-C3 PathTracer<F>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
-                                     std::uint32_t medium, RandomStream stream) {
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
+                                            std::uint32_t medium, RandomStream stream) {
   V3 from = start, o = p;
   for (int i = 0; i < kMaxSegments; ++i) {
     SurfaceHit hit;

@@ -22,7 +22,10 @@ enum class Purpose : std::uint32_t {
   track_flight,
   track_shadow,
   track_segment,
-  veil
+  veil,
+  emission,
+  distance,
+  track_distance
 };
 
 // Four numbers of one purpose at one path vertex.

@@ -38,6 +38,9 @@ class World {
   bool use_media = true;     // false: the integrator `path`, which sees no media
   bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too
   bool veils = false;        // some surface lets a share of the light pass: shadow rays collect it
+  bool distant_mis = false;  // the integrator `volpath_distant_mis` (distant_mis.h), and its choices
+  DistanceSampling distance = DistanceSampling::mis;
+  MisHeuristic heuristic = MisHeuristic::power;
   bool hide_emitters = false;
   int max_depth = -1;  // segments; -1: unlimited
   int rr_depth = 5;

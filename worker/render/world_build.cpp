@@ -197,6 +197,9 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.max_depth = settings.max_depth;
   w.rr_depth = settings.rr_depth;
   w.use_media = settings.integrator != "path";
+  w.distant_mis = settings.integrator == "volpath_distant_mis";
+  w.distance = scene.integrator.distance;
+  w.heuristic = scene.integrator.heuristic;
   w.hide_emitters = scene.integrator.hide_emitters;
   auto geometry = Geometry::build(scene, loader);
   if (!geometry) return tl::unexpected(geometry.error());
