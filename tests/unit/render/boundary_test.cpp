@@ -1,0 +1,90 @@
+// Where media begin and end: no way through them is left out, and no sample that was cut off is counted.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "common/base/digest.h"
+#include "tests/support/render_check.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneKit;
+using test::translate;
+using test::operator*;
+
+// A floor in the light of a sun overhead, seen from below a slab of the medium that hangs over it.
+double lit_through(double half_thickness, double sigma_t) {
+  SceneKit kit({1, 1});
+  kit.scene.integrator.max_depth = 2;
+  kit.shape(RectangleShape{}, test::scale(1), kit.diffuse(1));
+  const MediumIndex black = kit.homogeneous({sigma_t, sigma_t, sigma_t}, {0, 0, 0});
+  const BsdfIndex null = kit.null();
+  kit.container(CubeShape{}, translate({0, 0, .5}) * test::scale(.4, .4, half_thickness), null, black);
+  kit.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {M_PI, M_PI, M_PI}});
+  kit.look({0, -.9, .2}, {0, 0, 0});
+  return render_sample(*test::world_of(kit), 0, 0, 0).rgb[0];
+}
+
+// The ray that goes on behind a boundary starts 2^-20 of the world farther in. Places are rounded to 2^-24 at
+// both faces, so a slab of 8 * 2^-20 is thick to 2 * 2^-24 / (8 * 2^-20) = 1/64; without the way that the
+// ray starts in it would be thinner by 1/8.
+TEST(Boundaries, LoseNoneOfTheWayThroughAMedium) {
+  EXPECT_NEAR(lit_through(.1, 0), 1, 1e-5);
+  EXPECT_NEAR(lit_through(.1, 5), std::exp(-1), 1e-5);
+  // The world's scale is a power of two that brings its radius, here about 1.5, to at most 1: half the unit.
+  const double thickness = 2 * 8 * 0x1p-20;
+  const double depth = -std::log(lit_through(thickness / 2, 1 / thickness));
+  EXPECT_NEAR(depth, 1, 1. / 32);
+}
+
+// A mirror that looks into fog, met by a ray that was in none: what it reflects has come through the fog, by
+// whichever strategy it is found.
+TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
+  SceneKit kit({8, 8});
+  const MediumIndex fog = kit.homogeneous({.7, .7, .7}, {0, 0, 0});
+  Shape& mirror = kit.shape(RectangleShape{}, {}, kit.mirror());
+  mirror.exterior = fog;
+  mirror.is_medium_transition = true;
+  const TextureIndex light = kit.texture({1, 1, 1});
+  kit.shape(RectangleShape{}, translate({0, 2, 1}) * test::rotate_x(180) * test::scale(1), kit.diffuse(0))
+      .emitter = AreaEmitter{light};
+  kit.look({0, -1, .5}, {0, 0, 0});
+  // From the mirror at the origin the light's plane z = 1 is met at (0, 2, 1).
+  const auto e = test::estimate(kit, 256);
+  EXPECT_NEAR(e.mean[0], std::exp(-.7 * std::sqrt(5.)), 5 * e.standard_error[0] + 1e-5);
+  EXPECT_LT(e.standard_error[0], .02);
+}
+
+// More null sheets than a ray may cross between a floor and its sun: a column over the little that the camera
+// sees of the floor, so that most paths leave the scene beside it after their shadow ray was cut off.
+TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
+  static const test::ScratchFolder folder;
+  std::string text;
+  constexpr int kSheets = (1 << 16) + 1;
+  for (int i = 0; i < kSheets; ++i) {
+    const double z = .2 + i * .7 / kSheets;
+    for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+      text += "v " + std::to_string(.1 * x) + ' ' + std::to_string(.1 * y) + ' ' + std::to_string(z) + '\n';
+    text += "f -4 -3 -2 -1\n";
+  }
+  SceneKit kit({1, 1});
+  const Asset asset{"sheets.obj", sha256(text), text.size()};
+  kit.files[asset.digest] = folder.path() / asset.digest.hex();
+  std::ofstream(kit.files[asset.digest], std::ios::binary) << text;
+  MeshShape mesh;
+  mesh.file = SceneKit::push<AssetTag>(kit.scene.assets, asset);
+  const MediumIndex thin = kit.homogeneous({.01, .01, .01}, {0, 0, 0});  // of none, nothing would be walked
+  const BsdfIndex null = kit.null();
+  kit.container(mesh, {}, null, thin);
+  kit.shape(RectangleShape{}, {}, kit.diffuse(1));
+  kit.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+  kit.look({0, -.1, .15}, {0, 0, 0});
+  kit.scene.sensor.fov = 10;
+  const auto world = test::world_of(kit);
+  for (std::uint64_t s = 0; s < 16; ++s) EXPECT_FALSE(render_sample(*world, 0, 0, s).finite) << s;
+}
+
+}  // namespace
+}  // namespace ls::render
