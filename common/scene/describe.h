@@ -70,6 +70,9 @@ LS_TYPE(ConstantTexture, "texture", "constant", "uniform, srgb",
 LS_TYPE(BitmapTexture, "texture", "bitmap", "",
         "an image: PNG, JPEG, EXR or HDR; (u, v) = (0, 0) is its upper left corner")
 LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")
+LS_TYPE(PeakTexture, "texture", "peak", "",
+        "the largest channel of another texture, or its colour divided by that; not in Mitsuba: Nori's "
+        "`microfacet_tex` is made of it")
 LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
 LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
@@ -115,7 +118,16 @@ LS_TYPE(CubeShape, "shape", "cube", "", "[-1, 1]^3, normals outwards")
 LS_TYPE(SphereShape, "shape", "sphere", "",
         "a ball's surface; `center` and `radius` act before `to_world`, which may not stretch it")
 LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
-LS_TYPE(MeshShape, "shape", "mesh", "obj, ply", "triangles from a file")
+LS_TYPE(MeshShape, "shape", "mesh", "obj, ply, serialized", "triangles from a file")
+LS_TYPE(CylinderShape, "shape", "cylinder", "",
+        "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it along "
+        "that line only")
+LS_TYPE(ShapeGroup, "shape", "shapegroup", "",
+        "shapes that are seen where an `instance` of the group stands, and kept in memory once; they stand "
+        "inside, placed within the group by their own `to_world`. Shapes that emit light, and instances, "
+        "can't be in a group")
+LS_TYPE(Instance, "shape", "instance", "",
+        "a `shapegroup` once more: a `<ref>` to it, or the group itself, stands inside")
 LS_TYPE(AreaEmitter, "emitter", "area", "",
         "light from the front of the shape that it stands in. `cutoff_angle`, `beam_width` and `falloff` are "
         "our own: they make each point of it a spot light, whose radiance between the two angles is "
@@ -142,8 +154,10 @@ LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
-LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens",
-        "looks along the +z of `to_world`, +y up, +x to the left")
+LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
+        "looks along the +z of `to_world`, +y up, +x to the left. `orthographic`: parallel rays from a sheet "
+        "of 2 by 2 height / width, which `to_world` may scale. `spherical`: all directions by latitude and "
+        "longitude, +y in the top row; of the horizon the left edge is -z, a quarter of the width further +x")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_mis, path",
         "how light is followed")
@@ -187,7 +201,15 @@ struct NamesOf<GridOrder> {
 };
 template <>
 struct NamesOf<MeshFormat> {
-  static constexpr Named<MeshFormat> all[] = {{"obj", MeshFormat::obj}, {"ply", MeshFormat::ply}};
+  static constexpr Named<MeshFormat> all[] = {{"obj", MeshFormat::obj},
+                                               {"ply", MeshFormat::ply},
+                                               {"serialized", MeshFormat::serialized}};
+};
+template <>
+struct NamesOf<Projection> {
+  static constexpr Named<Projection> all[] = {{"perspective", Projection::perspective},
+                                              {"orthographic", Projection::orthographic},
+                                              {"spherical", Projection::spherical}};
 };
 template <>
 struct NamesOf<FovAxis> {

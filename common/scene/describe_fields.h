@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/scene/describe.h"
+#include "common/scene/describe_shapes.h"
 #include "common/scene/describe_surfaces.h"
 
 namespace ls::scene {
@@ -32,6 +33,12 @@ void describe(V& v, T& t) {
       {.name = "color1", .doc = "second colour or texture", .range = kNonNegative, .fallback = {.2, .2, .2}},
       t.color1);
   v.field({.name = "to_uv", .doc = "moves (u, v) before the look-up"}, t.to_uv);
+}
+
+template <class V, Of<PeakTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "texture", .doc = "the texture", .range = kNonNegative}, t.texture);
+  v.field({.name = "hue", .doc = "the colour divided by its largest channel, white where it is black"}, t.hue);
 }
 
 // ---- volumes and media
@@ -96,13 +103,15 @@ void describe(V& v, T& m) {
            .doc = "light given off, whatever the extinction",
            .unit = "radiance/length",
            .range = kNonNegative,
-           .constvolume = true},
+           .constvolume = true,
+           .unwritten = 0},
           m.emission);
   v.field({.name = "source_radiance",
            .doc = "light given off per absorption: sigma_a times this",
            .unit = "radiance",
            .range = kNonNegative,
-           .constvolume = true},
+           .constvolume = true,
+           .unwritten = 0},
           m.source_radiance);
 }
 template <class V, Of<HeterogeneousMedium> T>
@@ -136,64 +145,19 @@ void describe(V& v, T& m) {
            .unit = "K",
            .range = kNonNegative},
           m.temperature);
-  v.field({.name = "emission_scale", .doc = "factor on the light given off", .range = kNonNegative},
+  v.field({.name = "emission_scale", .doc = "factor on the light given off", .range = kNonNegative, .unwritten = 1},
           m.emission_scale);
-  v.field({.name = "temperature_scale", .doc = "kelvin per unit of `temperature`", .range = kNonNegative},
+  v.field({.name = "temperature_scale",
+           .doc = "kelvin per unit of `temperature`",
+           .range = kNonNegative,
+           .unwritten = 1},
           m.temperature_scale);
-  v.field({.name = "temperature_offset", .doc = "added to it", .unit = "K", .range = {-1e6, 1e6}},
+  v.field({.name = "temperature_offset",
+           .doc = "added to it",
+           .unit = "K",
+           .range = {-1e6, 1e6},
+           .unwritten = 0},
           m.temperature_offset);
-}
-
-// ---- shapes
-// ---------------------------------------------------------------------------------------------------------
-template <class V, Of<RectangleShape> T>
-void describe(V&, T&) {}
-template <class V, Of<CubeShape> T>
-void describe(V&, T&) {}
-template <class V, Of<DiskShape> T>
-void describe(V&, T&) {}
-template <class V, Of<SphereShape> T>
-void describe(V& v, T& s) {
-  v.field({.name = "center", .doc = "centre", .unit = "length", .given_as = "point"}, s.center);
-  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
-}
-template <class V, Of<MeshShape> T>
-void describe(V& v, T& s) {
-  v.field({.name = "filename", .doc = "Wavefront OBJ or Stanford PLY", .required = true}, s.file);
-  v.field({.name = "format", .doc = "of the file: the plugin's name", .derived = true}, s.format);
-  v.field({.name = "face_normals", .doc = "flat shading: the file's vertex normals are left out"},
-          s.face_normals);
-  v.field({.name = "flip_tex_coords", .doc = "v becomes 1 - v; true unless said otherwise for `obj`"},
-          s.flip_tex_coords);
-}
-// What all shapes have; their geometry, emitter, bsdf and media are nested objects.
-template <class V, Of<Shape> T>
-void describe(V& v, T& s) {
-  v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
-  v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
-  v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
-  v.field({.name = "bsdf",
-           .doc = "`diffuse` if there is none, black if the shape emits light",
-           .derived = true,
-           .given_as = "<bsdf>"},
-          s.bsdf);
-  v.field({.name = "emitter",
-           .doc = "an `area`: the shape emits light",
-           .derived = true,
-           .given_as = "<emitter>"},
-          s.emitter);
-  v.field({.name = "interior",
-           .doc = "what is on the side that the normal points away from",
-           .derived = true,
-           .given_as = "medium"},
-          s.interior);
-  v.field({.name = "exterior",
-           .doc = "what is on the side that the normal points to",
-           .derived = true,
-           .given_as = "medium"},
-          s.exterior);
-  v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
-          s.is_medium_transition);
 }
 
 // ---- emitters
@@ -282,73 +246,8 @@ void describe(V& v, T& e) {
   v.field({.name = "fov_axis", .doc = "what fov measures"}, e.fov_axis);
 }
 
-// ---- camera, film, integrator
+// ---- integrator
 // ---------------------------------------------------------------------------------------
-template <class V, Of<BoxFilter> T>
-void describe(V& v, T& f) {
-  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
-}
-template <class V, Of<TentFilter> T>
-void describe(V& v, T& f) {
-  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
-}
-template <class V, Of<GaussianFilter> T>
-void describe(V& v, T& f) {
-  v.field({.name = "stddev", .doc = "standard deviation", .unit = "pixels", .range = {0, 8, true}}, f.stddev);
-}
-template <class V, Of<Sensor> T>
-void describe_perspective(V& v, T& s) {
-  v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
-  v.field({.name = "fov",
-           .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given)",
-           .unit = "degrees",
-           .range = {0, 180, true, true}},
-          s.fov);
-  v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
-  v.field({.name = "near_clip", .doc = "nearest depth that is seen", .unit = "length", .range = kPositive},
-          s.near_clip);
-  v.field({.name = "far_clip", .doc = "farthest depth that is seen", .unit = "length", .range = kPositive},
-          s.far_clip);
-  v.field({.name = "principal_point_offset_x", .doc = "shift of the image", .unit = "frame widths"},
-          s.principal_point_offset[0]);
-  v.field({.name = "principal_point_offset_y", .doc = "shift of the image", .unit = "frame heights"},
-          s.principal_point_offset[1]);
-}
-template <class V, Of<Sensor> T>
-void describe_lens(V& v, T& s) {
-  v.field({.name = "aperture_radius",
-           .doc = "radius of the lens (`thinlens` only, and needed there); 0: pinhole",
-           .unit = "length",
-           .range = kNonNegative},
-          s.aperture_radius);
-  v.field({.name = "focus_distance",
-           .doc = "depth that is sharp (`thinlens`); far_clip if not given",
-           .unit = "length",
-           .range = kPositive},
-          s.focus_distance);
-}
-template <class V, Of<Sensor> T>
-void describe(V& v, T& s) {
-  describe_perspective(v, s);
-  describe_lens(v, s);
-  v.field({.name = "medium",
-           .doc = "what the camera is in; the name may be left out",
-           .derived = true,
-           .given_as = "medium"},
-          s.medium);
-}
-template <class V, Of<FilmSettings> T>
-void describe(V& v, T& f) {
-  v.field({.name = "width", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
-          f.size.width);
-  v.field({.name = "height", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
-          f.size.height);
-  v.field({.name = "filter",
-           .doc = "reconstruction filter; `gaussian` if there is none",
-           .derived = true,
-           .given_as = "<rfilter>"},
-          f.filter);
-}
 template <class V, Of<IntegratorSettings> T>
 void describe(V& v, T& i) {
   v.field({.name = "name",
@@ -393,6 +292,8 @@ void describe(V& v, T& s) {
   v.field({.name = "integrator", .doc = ""}, s.integrator);
   v.field({.name = "sample_count", .doc = "samples per pixel, of the sampler", .range = {1, kMaxSpp}},
           s.sample_count);
+  v.field({.name = "groups", .doc = ""}, s.groups);
+  v.field({.name = "instances", .doc = ""}, s.instances);
 }
 
 // Anything that the table describes as an object.

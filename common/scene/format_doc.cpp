@@ -39,6 +39,7 @@ Column column(const Field&, AssetIndex) { return {"string", ""}; }
 Column column(const Field& f, TextureIndex) { return {"rgb, texture", text_of(f.fallback)}; }
 Column column(const Field&, const std::optional<TextureIndex>&) { return {"texture", "none"}; }
 Column column(const Field& f, VolumeIndex) { return {"rgb, volume", text_of(f.fallback)}; }
+Column column(const Field&, const std::optional<VolumeIndex>&) { return {"rgb, volume", "none"}; }
 template <class E>
 requires std::is_enum_v<E> Column column(const Field&, E x) {
   std::string all;
@@ -276,6 +277,8 @@ std::string scene_format_markdown() {
   const Shape shape;
   describe(common, shape);
   out += common.take();
+  add_type<ShapeGroup>(out);
+  add_type<Instance>(out);
   add_variant<Bsdf>(out, "Surfaces");
   add_variant<Texture>(out, "Textures");
   out += "## Light\n\n";

@@ -15,30 +15,14 @@
 namespace ls::scene {
 
 void Reader::read_sensor(const Element& e) {
-  const bool lens = e.get("type") == "thinlens";
-  if (!lens && e.get("type") != "perspective") return unknown_plugin(e, report_);
+  if (!is_supported_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
   if (sensor_)
     return report_.warning(
         e.at, fmt::format("a second sensor; the first ({}) is used", report_.refer_to(sensor_->at, e.at)));
   sensor_ = &e;
   Params p(*this, e);
   Sensor& s = scene_.sensor;
-  const bool has_focus = p.has("focus_distance"), has_aperture = p.has("aperture_radius");
-  read_fov(p, s);
-  Binder binder(p);
-  describe_perspective(binder, s);
-  if (lens) {
-    describe_lens(binder, s);
-    if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
-    if (!has_focus) s.focus_distance = s.far_clip;
-  }
-  if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
-  if (!is_rigid(s.to_world))
-    report_.error(
-        e.at,
-        "to_world of a sensor may only move, turn and mirror: this one scales or shears, which Mitsuba 3 "
-        "refuses, too; leave its <scale> out");
-
+  read_projection(e, p, s);
   read_sensor_medium(p, s);
   const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
   if (films.size() > 1) report_.error(films[1].use->at, "this sensor has a second film");
@@ -46,6 +30,38 @@ void Reader::read_sensor(const Element& e) {
   if (!films.empty()) read_film(*films[0].object);
   if (!samplers.empty()) read_sampler(*samplers[0].object);
   p.finish();
+}
+
+// What the plugins have of their own.
+void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
+  Binder binder(p);
+  if (e.get("type") == "spherical") {
+    s.projection = Projection::spherical;
+    if (const auto to_world = p.take_transform("to_world")) s.to_world = *to_world;
+  } else if (e.get("type") == "orthographic") {
+    s.projection = Projection::orthographic;
+    describe_clips(binder, s);
+  } else {
+    const bool has_focus = p.has("focus_distance"), has_aperture = p.has("aperture_radius");
+    read_fov(p, s);
+    describe_perspective(binder, s);
+    if (e.get("type") == "thinlens") {
+      describe_lens(binder, s);
+      if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
+      if (!has_focus) s.focus_distance = s.far_clip;
+    }
+  }
+  if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
+  if (s.projection == Projection::orthographic) {
+    if (!invertible(s.to_world))
+      report_.error(e.at,
+                    "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
+  } else if (!is_rigid(s.to_world)) {
+    report_.error(
+        e.at,
+        "to_world of a sensor may only move, turn and mirror: this one scales or shears, which Mitsuba 3 "
+        "refuses, too; leave its <scale> out");
+  }
 }
 
 // Written with the name "medium" or without one; any other name is a slip, as interior and exterior are
@@ -98,8 +114,9 @@ void Reader::read_film(const Element& e) {
                     fmt::format("{} gives the size of the frame and its filter: what is written are linear "
                                 "colours, as of \"hdrfilm\"",
                                 p.title()));
+  const bool has_width = p.has("crop_width"), has_height = p.has("crop_height");
   bind(p, film);
-  check_crop(p);
+  check_crop(e, p, has_width, has_height);
   if (std::int64_t{film.size.width} * film.size.height > kMaxFramePixels)
     report_.error(e.at, fmt::format("a frame of {} x {} is larger than {} pixels", film.size.width,
                                     film.size.height, kMaxFramePixels));
@@ -109,24 +126,22 @@ void Reader::read_film(const Element& e) {
   p.finish();
 }
 
-// A crop window that is the whole frame is no crop; any other would change which pixels there are.
-void Reader::check_crop(Params& p) {
-  const struct {
-    std::string_view name;
-    int whole;
-  } parts[] = {{"crop_offset_x", 0},
-               {"crop_offset_y", 0},
-               {"crop_width", scene_.film.size.width},
-               {"crop_height", scene_.film.size.height}};
-  for (const auto& [name, whole] : parts) {
-    const Element* e = p.take(name);
-    if (!e) continue;
-    int value = whole;
-    p.convert({.name = name, .doc = ""}, *e, value);
-    if (value != whole)
-      report_.error(value_place(*e, "value"),
-                    fmt::format("'{}': rendering a part of the frame is not supported", name));
-  }
+// A side that is not given is the frame's. A crop of the whole frame is none: both are the same scene.
+void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_height) {
+  FilmSettings& f = scene_.film;
+  if (!has_width) f.crop_size.width = f.size.width;
+  if (!has_height) f.crop_size.height = f.size.height;
+  const auto outside = [](int offset, int width, int whole) {
+    return width < 1 || offset > whole || width > whole - offset;
+  };
+  if (outside(f.crop_offset[0], f.crop_size.width, f.size.width) ||
+      outside(f.crop_offset[1], f.crop_size.height, f.size.height))
+    report_.error(e.at,
+                  fmt::format("the crop of {} at ({}, {}) with {} x {} pixels is not within its frame of "
+                              "{} x {}: give crop_width and crop_height so that it is",
+                              p.title(), f.crop_offset[0], f.crop_offset[1], f.crop_size.width,
+                              f.crop_size.height, f.size.width, f.size.height));
+  if (f.crop_size == f.size) f.crop_size = {0, 0};
 }
 
 template <class T>

@@ -1,5 +1,8 @@
-// Shapes, with what stands in them: bsdf, area emitter, media.
+// Shapes, with what stands in them: bsdf, area emitter, media; groups of shapes and their instances.
 #include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
@@ -15,14 +18,79 @@ void Reader::read_shape(const Element& e) {
   if (type == "disk") return read_geometry(e, DiskShape{});
   if (type == "obj") return read_geometry(e, MeshShape{.format = MeshFormat::obj, .flip_tex_coords = true});
   if (type == "ply") return read_geometry(e, MeshShape{.format = MeshFormat::ply});
+  if (type == "serialized") return read_geometry(e, MeshShape{.format = MeshFormat::serialized});
+  if (type == "cylinder") return read_geometry(e, CylinderShape{});
+  if (type == "shapegroup") return read_shape_group(e);
+  if (type == "instance") return read_instance(e);
   unknown_plugin(e, report_);
+}
+
+// A group is read where it first matters, which may be at an instance before it.
+void Reader::read_shape_group(const Element& e) {
+  if (groups_.contains(&e)) return;
+  auto& index = groups_[&e];
+  Params p(*this, e);
+  const GroupIndex group{static_cast<std::uint32_t>(scene_.groups.size())};
+  const std::size_t before = scene_.shapes.size();
+  for (const auto& [object, use] : p.take_nested("shape")) {
+    const std::string_view type = object->get("type");
+    if (type == "instance" || type == "shapegroup") {
+      report_.error(use->at, fmt::format("{} can't stand in a shapegroup: instances within instances are not "
+                                         "supported, by Mitsuba neither; put the shapes themselves here",
+                                         type == "instance" ? "an instance" : "a shapegroup"));
+      continue;
+    }
+    group_ = group;
+    read_shape(*object);
+    group_.reset();
+  }
+  p.finish();
+  if (scene_.shapes.size() == before) {
+    if (!report_.has_errors())
+      report_.warning(e.at, "this shapegroup holds no shape: instances of it show nothing");
+    return;
+  }
+  scene_.groups.emplace_back();
+  index = group;
+}
+
+void Reader::read_instance(const Element& e) {
+  Params p(*this, e);
+  Instance instance;
+  bind(p, instance);
+  const auto nested = p.take_nested("shape");
+  p.finish();
+  if (nested.empty())
+    return report_.error(e.at, "an instance needs a shapegroup: put <ref id=\"...\"/> to one into it");
+  if (nested.size() > 1) return report_.error(nested[1].use->at, "this instance has a second shapegroup");
+  const Element& object = *nested[0].object;
+  if (object.get("type") != "shapegroup")
+    return report_.error(nested[0].use->at,
+                         fmt::format("an instance shows a shapegroup, not a shape \"{}\": put that into a "
+                                     "<shape type=\"shapegroup\">",
+                                     object.get("type")));
+  if (!invertible(instance.to_world))
+    report_.error(e.at,
+                  "to_world flattens this instance or leaves the range of numbers: it can't be inverted");
+  read_shape_group(object);
+  const auto& group = groups_[&object];
+  if (!group) return;
+  instance.group = *group;
+  scene_.instances.push_back(instance);
 }
 
 template <class T>
 void Reader::read_geometry(const Element& e, T geometry) {
   Params p(*this, e);
+  if constexpr (std::is_same_v<T, MeshShape>) {
+    if (geometry.format != MeshFormat::serialized && p.has("shape_index"))
+      report_.error(p.take("shape_index")->at, fmt::format("{} has one mesh: 'shape_index' is for those of a "
+                                                           "\"serialized\" file",
+                                                           p.title()));
+  }
   bind(p, geometry);
   Shape shape;
+  shape.group = group_;
   bind(p, shape);
   shape.geometry = geometry;
   read_shape_parts(p, shape);
@@ -45,7 +113,12 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
   const auto emitters = p.take_nested("emitter");
   if (emitters.size() > 1)
     report_.error(emitters[1].use->at, fmt::format("{} has a second emitter", p.title()));
-  if (!emitters.empty()) shape.emitter = read_area(*emitters[0].object);
+  if (!emitters.empty() && shape.group)
+    report_.error(emitters[0].use->at, fmt::format("{} in a shapegroup can't emit light, in Mitsuba neither: "
+                                                   "place it outside of the group",
+                                                   p.title()));
+  else if (!emitters.empty())
+    shape.emitter = read_area(*emitters[0].object);
 
   const auto bsdfs = p.take_nested("bsdf");
   if (bsdfs.size() > 1) report_.error(bsdfs[1].use->at, fmt::format("{} has a second bsdf", p.title()));
@@ -82,6 +155,34 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
   return area;
 }
 
+namespace {
+
+// Whether it stays a circular cylinder: two directions across its axis remain at right angles, to each other
+// and to the axis, and equally long (to the rounding of composed transforms in single precision).
+bool stays_cylinder(const CylinderShape& c, const Transform& t) {
+  const auto dot = [](const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+  const auto cross = [](const Vec3& a, const Vec3& b) {
+    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  };
+  const auto unit = [&](Vec3 v) {
+    const double length = std::sqrt(dot(v, v));
+    for (double& x : v) x /= length;
+    return v;
+  };
+  Vec3 axis;
+  for (std::size_t k = 0; k < 3; ++k) axis[k] = c.p1[k] - c.p0[k];
+  axis = unit(axis);
+  const Vec3 other = std::abs(axis[0]) < .7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  const Vec3 u = unit(cross(axis, other)), v = cross(axis, u);
+  const Vec3 z = transform_vector(t, axis), x = transform_vector(t, u), y = transform_vector(t, v);
+  const double length = std::sqrt(dot(x, x)), tolerance = 1e-5;
+  return std::abs(std::sqrt(dot(y, y)) - length) <= tolerance * length &&
+         std::abs(dot(x, y)) <= tolerance * length * length &&
+         std::max(std::abs(dot(x, z)), std::abs(dot(y, z))) <= tolerance * length * std::sqrt(dot(z, z));
+}
+
+}  // namespace
+
 void Reader::check_placement(const Element& e, const Shape& shape) {
   if (!invertible(shape.to_world))
     report_.error(
@@ -91,6 +192,13 @@ void Reader::check_placement(const Element& e, const Shape& shape) {
     report_.error(
         e.at,
         "to_world stretches this sphere: only turning, moving and scaling alike along all axes keeps it one");
+  const auto* c = std::get_if<CylinderShape>(&shape.geometry);
+  if (c && c->p0 == c->p1)
+    report_.error(e.at, "p0 and p1 of this cylinder are the same point");
+  else if (c && invertible(shape.to_world) && !stays_cylinder(*c, shape.to_world))
+    report_.error(e.at,
+                  "to_world stretches this cylinder across its axis or shears it: only along the axis it "
+                  "may be scaled by itself");
 }
 
 }  // namespace ls::scene

@@ -85,6 +85,8 @@ class Reader {
   void read_shape_parts(Params& p, Shape& shape);
   std::optional<AreaEmitter> read_area(const Element& e);
   void check_placement(const Element& e, const Shape& shape);
+  void read_shape_group(const Element& e);
+  void read_instance(const Element& e);
 
   void read_emitter(const Element& e);
   void read_directional(const Element& e);
@@ -94,10 +96,11 @@ class Reader {
   void check_only_environment(const Element& e);
 
   void read_sensor(const Element& e);
+  void read_projection(const Element& e, Params& p, Sensor& sensor);
   void read_sensor_medium(Params& p, Sensor& sensor);
   void read_fov(Params& p, Sensor& sensor);
   void read_film(const Element& e);
-  void check_crop(Params& p);
+  void check_crop(const Element& e, Params& p, bool has_width, bool has_height);
   ReconstructionFilter read_filter(const Element& e);
   template <class T>
   ReconstructionFilter read_plain_filter(const Element& e);
@@ -124,6 +127,9 @@ class Reader {
   Memo<VolumeIndex> volumes_;
   Memo<PhaseIndex> phases_;
   Memo<MediumIndex> media_;
+  // Read where they stand; nothing: without a shape, or wrong.
+  std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
+  std::optional<GroupIndex> group_;  // whose shapes are being read
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;
   std::unordered_set<const Element*> bad_refs_;  // reported already

@@ -11,46 +11,11 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/image/frame.h"
+#include "common/scene/scene_camera.h"
+#include "common/scene/scene_shapes.h"
+#include "common/scene/scene_values.h"
 
 namespace ls {
-
-using Rgb = std::array<double, 3>;
-// A place or direction. Not the type of a colour: files write the two differently.
-struct Vec3 : std::array<double, 3> {};
-
-// Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
-struct Transform {
-  std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  bool operator==(const Transform&) const = default;
-};
-// Row-major 3 x 3 acting on (u, v, 1).
-struct UvTransform {
-  std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  bool operator==(const UvTransform&) const = default;
-};
-
-template <class Tag>
-struct Index {
-  std::uint32_t value = 0;
-  auto operator<=>(const Index&) const = default;
-};
-using AssetIndex = Index<struct AssetTag>;
-using TextureIndex = Index<struct TextureTag>;
-using BsdfIndex = Index<struct BsdfTag>;
-using VolumeIndex = Index<struct VolumeTag>;
-using PhaseIndex = Index<struct PhaseTag>;
-using MediumIndex = Index<struct MediumTag>;
-
-// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by
-// digest.
-struct Asset {
-  std::string name;
-  Digest digest;
-  std::uint64_t bytes = 0;
-  bool operator==(const Asset&) const = default;
-};
 
 // ---- textures
 // -------------------------------------------------------------------------------------------------------
@@ -79,7 +44,14 @@ struct CheckerboardTexture {
   UvTransform to_uv;
   bool operator==(const CheckerboardTexture&) const = default;
 };
-using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture>;
+// The largest channel of another texture, or with `hue` its colour divided by that (white where it is black):
+// their product is the texture. Our own; what Nori's `microfacet` is made of.
+struct PeakTexture {
+  TextureIndex texture;
+  bool hue = false;
+  bool operator==(const PeakTexture&) const = default;
+};
+using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture>;
 
 // ---- surfaces
 // -------------------------------------------------------------------------------------------------------
@@ -239,55 +211,8 @@ struct HeterogeneousMedium {
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
-// ---- shapes
-// ---------------------------------------------------------------------------------------------------------
-struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
-  bool operator==(const RectangleShape&) const = default;
-};
-struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
-  bool operator==(const CubeShape&) const = default;
-};
-struct SphereShape {  // center and radius before to_world
-  Vec3 center{0, 0, 0};
-  double radius = 1;
-  bool operator==(const SphereShape&) const = default;
-};
-struct DiskShape {  // unit disk in z = 0, normal +z
-  bool operator==(const DiskShape&) const = default;
-};
-enum class MeshFormat { obj, ply };
-struct MeshShape {
-  AssetIndex file;
-  MeshFormat format = MeshFormat::obj;
-  bool face_normals = false;
-  bool flip_tex_coords = false;
-  bool operator==(const MeshShape&) const = default;
-};
-using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape>;
-
-// Radiance leaves on the side of the normal only. At an angle a from it, in degrees: all of it within
-// beam_width, none beyond cutoff_angle, and in between times s^falloff with
-// s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
-struct AreaEmitter {
-  TextureIndex radiance;
-  double cutoff_angle = 90, beam_width = 90, falloff = 1;
-  bool operator==(const AreaEmitter&) const = default;
-};
-
-struct Shape {
-  Geometry geometry;
-  Transform to_world;
-  bool flip_normals = false;
-  BsdfIndex bsdf;
-  std::optional<AreaEmitter> emitter;
-  std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
-  bool is_medium_transition = false;              // interior or exterior was given
-  bool operator==(const Shape&) const = default;
-};
-
 // ---- emitters without a shape
 // ---------------------------------------------------------------------------------------
-enum class FovAxis { x, y, diagonal, smaller, larger };
 struct ConstantEmitter {  // radiance from everywhere
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
@@ -337,44 +262,8 @@ struct ProjectorEmitter {
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
                              ProjectorEmitter>;
 
-// ---- camera, film, integrator
+// ---- integrator
 // ---------------------------------------------------------------------------------------
-struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
-  Transform to_world;
-  double fov = 50;  // degrees, along fov_axis
-  FovAxis fov_axis = FovAxis::x;
-  double near_clip = 1e-2, far_clip = 1e4;
-  std::array<double, 2> principal_point_offset{0, 0};
-  double aperture_radius = 0;  // 0: pinhole
-  double focus_distance = 1;
-  std::optional<MediumIndex> medium;  // that the camera sits in
-  bool operator==(const Sensor&) const = default;
-};
-
-struct BoxFilter {
-  double radius = .5;
-  bool operator==(const BoxFilter&) const = default;
-};
-struct TentFilter {
-  double radius = 1;
-  bool operator==(const TentFilter&) const = default;
-};
-struct GaussianFilter {  // cut at 4 stddev, shifted to reach 0 there (Mitsuba)
-  double stddev = .5;
-  bool operator==(const GaussianFilter&) const = default;
-};
-using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>;
-
-struct FilmSettings {
-  FrameSize size{768, 576};
-  ReconstructionFilter filter = GaussianFilter{};
-  bool operator==(const FilmSettings&) const = default;
-};
-
-// How `volpath_distant_mis` chooses the point of a ray's way through a medium that it connects with a light,
-// and how the two choices of `mis` are weighed against each other.
-enum class DistanceSampling { exponential, equiangular, mis };
-enum class MisHeuristic { power, balance };
 struct IntegratorSettings {
   std::string name = "volpath";  // ours: "volpath", "volpath_distant_mis" or "path"
   int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light
@@ -398,6 +287,8 @@ struct Scene {
   FilmSettings film;
   IntegratorSettings integrator;
   std::uint64_t sample_count = 4;
+  std::vector<ShapeGroup> groups;
+  std::vector<Instance> instances;
   bool operator==(const Scene&) const = default;
 };
 

@@ -40,6 +40,10 @@ template <class S>
 auto& pool(S& s, MediumIndex) {
   return s.media;
 }
+template <class S>
+auto& pool(S& s, GroupIndex) {
+  return s.groups;
+}
 
 // Calls on_index for every index within a described value.
 template <class F>
@@ -94,10 +98,13 @@ class Checker {
     check_list("media", s_.media);
     check_list("shapes", s_.shapes);
     check_list("emitters", s_.emitters);
+    check_list("instances", s_.instances);
     IndexWalker walker([&](const auto& i) { check("sensor", i); });
     walker.walk(s_.sensor);
     if (wrong_.empty()) check_bsdf_nesting();
     if (wrong_.empty()) check_texture_nesting();
+    if (wrong_.empty()) check_groups();
+    if (wrong_.empty()) check_crop();
     if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
     return wrong_;
@@ -133,16 +140,42 @@ class Checker {
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
   }
+  // The shapes of a group stand together, groups in their order; each has shapes, and none of them shines.
+  void check_groups() {
+    std::size_t seen = 0;
+    const std::optional<GroupIndex>* last = nullptr;
+    for (const Shape& s : s_.shapes) {
+      const bool same = last && s.group == *last;
+      last = &s.group;
+      if (!s.group) continue;
+      if (s.emitter) wrong_ = "scene.shapes: a shape in a group emits light";
+      if (!same && s.group->value != seen++) wrong_ = "scene.shapes: groups are mixed or out of their order";
+    }
+    if (wrong_.empty() && seen != s_.groups.size()) wrong_ = "scene.groups: a group has no shapes";
+  }
+  void check_crop() {
+    const FilmSettings& f = s_.film;
+    const auto outside = [](int offset, int width, int whole) {
+      return width < 1 || offset > whole || width > whole - offset;
+    };
+    const bool none = f.crop_size == FrameSize{0, 0} && f.crop_offset == std::array<int, 2>{0, 0};
+    if (!none && (outside(f.crop_offset[0], f.crop_size.width, f.size.width) ||
+                  outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
+      wrong_ = "scene.film: the crop is not within the frame";
+  }
   // Depth of each texture by relaxation over the list, as often as textures may nest.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {
       bool changed = false;
-      for (std::size_t i = 0; i < s_.textures.size(); ++i)
-        if (const auto* c = std::get_if<CheckerboardTexture>(&s_.textures[i])) {
-          const int d = 1 + std::max(depth[c->color0.value], depth[c->color1.value]);
-          changed |= std::exchange(depth[i], d) != d;
-        }
+      for (std::size_t i = 0; i < s_.textures.size(); ++i) {
+        int d = 0;
+        if (const auto* c = std::get_if<CheckerboardTexture>(&s_.textures[i]))
+          d = 1 + std::max(depth[c->color0.value], depth[c->color1.value]);
+        else if (const auto* p = std::get_if<PeakTexture>(&s_.textures[i]))
+          d = 1 + depth[p->texture.value];
+        changed |= std::exchange(depth[i], d) != d;
+      }
       if (!changed) return;
     }
     wrong_ =
@@ -158,7 +191,10 @@ class Compactor {
   explicit Compactor(const Scene& from) : from_(from) {}
 
   Scene run() {
-    to_.shapes = from_.shapes;
+    std::vector<bool> placed(from_.groups.size(), false);
+    for (const Instance& i : from_.instances) placed[i.group.value] = true;
+    for (const Shape& s : from_.shapes)
+      if (!s.group || placed[s.group->value]) to_.shapes.push_back(s);
     to_.emitters = from_.emitters;
     to_.sensor = from_.sensor;
     to_.film = from_.film;
@@ -166,6 +202,8 @@ class Compactor {
     to_.sample_count = from_.sample_count;
     for (Shape& s : to_.shapes) move(s);
     for (Emitter& e : to_.emitters) move(e);
+    to_.instances = from_.instances;
+    for (Instance& i : to_.instances) move(i);
     move(to_.sensor);
     return std::move(to_);
   }
@@ -194,7 +232,8 @@ class Compactor {
   Scene to_;
   std::tuple<std::map<AssetIndex, AssetIndex>, std::map<TextureIndex, TextureIndex>,
              std::map<BsdfIndex, BsdfIndex>, std::map<VolumeIndex, VolumeIndex>,
-             std::map<PhaseIndex, PhaseIndex>, std::map<MediumIndex, MediumIndex>>
+             std::map<PhaseIndex, PhaseIndex>, std::map<MediumIndex, MediumIndex>,
+             std::map<GroupIndex, GroupIndex>>
       moved_;
 };
 

@@ -107,9 +107,12 @@ std::string_view name_of(E e) {
 std::string_view plugin(const MeshShape& mesh) { return name_of(mesh.format); }
 std::string_view plugin(const IntegratorSettings& integrator) { return integrator.name; }
 bool is_pinhole(const Sensor& s) {
-  return s.aperture_radius == 0 && s.focus_distance == Sensor{}.focus_distance;
+  return s.aperture_radius == 0 && s.focus_distance == Sensor{}.focus_distance && !s.aperture_scale;
 }
-std::string_view plugin(const Sensor& s) { return is_pinhole(s) ? "perspective" : "thinlens"; }
+std::string_view plugin(const Sensor& s) {
+  if (s.projection != Projection::perspective) return name_of(s.projection);
+  return is_pinhole(s) ? "perspective" : "thinlens";
+}
 
 class Writer {
  public:
@@ -126,7 +129,8 @@ class Writer {
     pool(scene_.volumes, VolumeIndex{});
     pool(scene_.phases, PhaseIndex{});
     pool(scene_.media, MediumIndex{});
-    for (const Shape& shape : scene_.shapes) write_shape(shape);
+    write_shapes();
+    for (const Instance& instance : scene_.instances) object(instance);
     for (const Emitter& emitter : scene_.emitters) std::visit([&](const auto& e) { object(e); }, emitter);
     write_sensor();
     return out_ + "</scene>\n";
@@ -203,14 +207,31 @@ class Writer {
     return std::holds_alternative<ConstantTexture>(scene_.textures[i.value]) && uses_.of(i) == 1;
   }
   bool stands_inline(VolumeIndex i) const {
-    return std::holds_alternative<ConstVolume>(scene_.volumes[i.value]) && uses_.of(i) == 1;
+    const auto* c = std::get_if<ConstVolume>(&scene_.volumes[i.value]);
+    return c && c->to_world == Transform{} && uses_.of(i) == 1;
   }
   static std::string id_of(TextureIndex i) { return fmt::format("texture{}", i.value); }
   static std::string id_of(BsdfIndex i) { return fmt::format("bsdf{}", i.value); }
   static std::string id_of(VolumeIndex i) { return fmt::format("volume{}", i.value); }
   static std::string id_of(PhaseIndex i) { return fmt::format("phase{}", i.value); }
   static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
+  static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
 
+  // The shapes of a group stand together.
+  void write_shapes() {
+    std::optional<GroupIndex> group;
+    const auto go_to = [&](std::optional<GroupIndex> next) {
+      if (group == next) return;
+      if (group) close("shape");
+      group = next;
+      if (group) open("shape", kInfo<ShapeGroup>.name, id_of(*group), "");
+    };
+    for (const Shape& shape : scene_.shapes) {
+      go_to(shape.group);
+      write_shape(shape);
+    }
+    go_to(std::nullopt);
+  }
   void write_shape(const Shape& shape) {
     std::visit(
         [&](const auto& geometry) {
@@ -241,22 +262,24 @@ class Writer {
     close("integrator");
   }
 
-  // A pinhole camera knows no lens.
-  struct WithoutLens {
+  // Of a camera, what its plugin knows.
+  struct SensorFields {
     Writer& writer;
+    const Sensor& sensor;
     template <class T>
     void field(const Field& f, const T& x) {
-      if (f.name != "aperture_radius" && f.name != "focus_distance") writer.field(f, x);
+      const bool lens = f.name == "aperture_radius" || f.name == "focus_distance" || f.name == "aperture_scale";
+      const bool clip = f.name.ends_with("_clip"), always = f.name == "to_world" || f.name == "medium";
+      if (always || (clip && sensor.projection == Projection::orthographic) ||
+          (sensor.projection == Projection::perspective && !(lens && is_pinhole(sensor))))
+        writer.field(f, x);
     }
   };
   void write_sensor() {
     const Sensor& s = scene_.sensor;
     open("sensor", plugin(s), "", "");
-    WithoutLens pinhole{*this};
-    if (is_pinhole(s))
-      describe(pinhole, s);
-    else
-      describe(*this, s);
+    SensorFields fields{*this, s};
+    describe(fields, s);
     open("sampler", "independent", "", "");
     value("integer", "sample_count", std::to_string(scene_.sample_count));
     close("sampler");
@@ -285,7 +308,11 @@ class Writer {
   void property(const Field& f, double x) {
     if (x != f.unwritten) value("float", f.name, number(x));
   }
-  void property(const Field& f, int x) { value("integer", f.name, std::to_string(x)); }
+  void property(const Field& f, int x) {
+    // No crop, or the only mesh of a file.
+    if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
+    value("integer", f.name, std::to_string(x));
+  }
   void property(const Field& f, std::uint64_t x) { value("integer", f.name, std::to_string(x)); }
   void property(const Field& f, bool x) {
     if (x || f.name != kOurOwn) value("boolean", f.name, x ? "true" : "false");
@@ -296,6 +323,9 @@ class Writer {
   template <class E>
   requires std::is_enum_v<E>
   void property(const Field& f, E e) { value("string", f.name, name_of(e)); }
+  void property(const Field& f, GridOrder o) {  // Mitsuba 3 does not know it
+    if (o != GridOrder{}) value("string", f.name, name_of(o));
+  }
   void property(const Field& f, const Vec3& x) {
     line(fmt::format("<{} name=\"{}\" x=\"{}\" y=\"{}\" z=\"{}\"/>",
                      f.given_as == "vector" ? "vector" : "point", f.name, number(x[0]), number(x[1]),
@@ -327,6 +357,9 @@ class Writer {
       reference(f.name, id_of(i));
   }
   void property(const Field& f, const std::optional<TextureIndex>& x) {
+    if (x) property(f, *x);
+  }
+  void property(const Field& f, const std::optional<VolumeIndex>& x) {
     if (x) property(f, *x);
   }
 

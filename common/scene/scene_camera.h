@@ -1,0 +1,63 @@
+// Camera and film of a scene; see scene.h.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <variant>
+
+#include "common/image/frame.h"
+#include "common/scene/scene_values.h"
+
+namespace ls {
+
+enum class FovAxis { x, y, diagonal, smaller, larger };
+
+// orthographic: parallel rays from [-1, 1] times [-1/a, 1/a] of its own x and y (a: width / height), which
+// to_world may scale. spherical: all directions, by latitude and longitude: +y is the top row, the left edge
+// -z, a quarter of the width further +x (Mitsuba 0.x); no clip planes.
+enum class Projection { perspective, orthographic, spherical };
+struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
+  Transform to_world;
+  double fov = 50;  // degrees, along fov_axis
+  FovAxis fov_axis = FovAxis::x;
+  double near_clip = 1e-2, far_clip = 1e4;
+  std::array<double, 2> principal_point_offset{0, 0};
+  double aperture_radius = 0;  // 0: pinhole
+  double focus_distance = 1;
+  std::optional<MediumIndex> medium;  // that the camera sits in
+  Projection projection = Projection::perspective;
+  std::optional<TextureIndex> aperture_scale;  // over the frame: multiplies the aperture's radius at a pixel
+  bool operator==(const Sensor&) const = default;
+};
+
+struct BoxFilter {
+  double radius = .5;
+  bool operator==(const BoxFilter&) const = default;
+};
+struct TentFilter {
+  double radius = 1;
+  bool operator==(const TentFilter&) const = default;
+};
+struct GaussianFilter {  // cut at 4 stddev, shifted to reach 0 there (Mitsuba)
+  double stddev = .5;
+  bool operator==(const GaussianFilter&) const = default;
+};
+using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>;
+
+struct FilmSettings {
+  FrameSize size{768, 576};
+  ReconstructionFilter filter = GaussianFilter{};
+  // The part of the frame that is rendered; a width of 0: all of it.
+  std::array<int, 2> crop_offset{0, 0};
+  FrameSize crop_size{0, 0};
+  bool has_crop() const { return crop_size.width > 0; }
+  FrameSize image_size() const { return has_crop() ? crop_size : size; }  // of what is written
+  bool operator==(const FilmSettings&) const = default;
+};
+
+// How `volpath_distant_mis` chooses the point of a ray's way through a medium that it connects with a light,
+// and how the two choices of `mis` are weighed against each other.
+enum class DistanceSampling { exponential, equiangular, mis };
+enum class MisHeuristic { power, balance };
+
+}  // namespace ls

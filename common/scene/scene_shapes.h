@@ -1,0 +1,72 @@
+// The shapes of a scene; see scene.h.
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "common/scene/scene_values.h"
+
+namespace ls {
+
+struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
+  bool operator==(const RectangleShape&) const = default;
+};
+struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
+  bool operator==(const CubeShape&) const = default;
+};
+struct SphereShape {  // center and radius before to_world
+  Vec3 center{0, 0, 0};
+  double radius = 1;
+  bool operator==(const SphereShape&) const = default;
+};
+struct DiskShape {  // unit disk in z = 0, normal +z
+  bool operator==(const DiskShape&) const = default;
+};
+struct CylinderShape {  // without caps: about the line from p0 to p1; normals outwards, also when mirrored
+  Vec3 p0{0, 0, 0}, p1{0, 0, 1};
+  double radius = 1;
+  bool operator==(const CylinderShape&) const = default;
+};
+enum class MeshFormat { obj, ply, serialized };
+struct MeshShape {
+  AssetIndex file;
+  MeshFormat format = MeshFormat::obj;
+  bool face_normals = false;
+  bool flip_tex_coords = false;
+  int shape_index = 0;  // which mesh of a `serialized` file
+  bool operator==(const MeshShape&) const = default;
+};
+using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
+
+// Radiance leaves on the side of the normal only. At an angle a from it, in degrees: all of it within
+// beam_width, none beyond cutoff_angle, and in between times s^falloff with
+// s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
+struct AreaEmitter {
+  TextureIndex radiance;
+  double cutoff_angle = 90, beam_width = 90, falloff = 1;
+  bool operator==(const AreaEmitter&) const = default;
+};
+
+struct Shape {
+  Geometry geometry;
+  Transform to_world;
+  bool flip_normals = false;
+  BsdfIndex bsdf;
+  std::optional<AreaEmitter> emitter;
+  std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
+  bool is_medium_transition = false;              // interior or exterior was given
+  // Seen only where instances of this group stand; to_world places it within the group. The shapes of a group
+  // stand together in the scene's list, groups in the order of their numbers; none of them emits light.
+  std::optional<GroupIndex> group;
+  bool operator==(const Shape&) const = default;
+};
+struct ShapeGroup {  // its shapes name it
+  bool operator==(const ShapeGroup&) const = default;
+};
+struct Instance {  // the shapes of a group, once more
+  GroupIndex group;
+  Transform to_world;
+  bool operator==(const Instance&) const = default;
+};
+
+}  // namespace ls

@@ -1,0 +1,49 @@
+// The values that a scene is made of; see scene.h.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "common/base/digest.h"
+
+namespace ls {
+
+using Rgb = std::array<double, 3>;
+// A place or direction. Not the type of a colour: files write the two differently.
+struct Vec3 : std::array<double, 3> {};
+
+// Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
+struct Transform {
+  std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  bool operator==(const Transform&) const = default;
+};
+// Row-major 3 x 3 acting on (u, v, 1).
+struct UvTransform {
+  std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  bool operator==(const UvTransform&) const = default;
+};
+
+template <class Tag>
+struct Index {
+  std::uint32_t value = 0;
+  auto operator<=>(const Index&) const = default;
+};
+using AssetIndex = Index<struct AssetTag>;
+using TextureIndex = Index<struct TextureTag>;
+using BsdfIndex = Index<struct BsdfTag>;
+using VolumeIndex = Index<struct VolumeTag>;
+using PhaseIndex = Index<struct PhaseTag>;
+using MediumIndex = Index<struct MediumTag>;
+using GroupIndex = Index<struct GroupTag>;
+
+// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by
+// digest.
+struct Asset {
+  std::string name;
+  Digest digest;
+  std::uint64_t bytes = 0;
+  bool operator==(const Asset&) const = default;
+};
+
+}  // namespace ls
