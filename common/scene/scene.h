@@ -38,7 +38,8 @@ struct BitmapTexture {
   bool operator==(const BitmapTexture&) const = default;
 };
 // color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's
-// `checkerboard`).
+// `checkerboard`). Where one number is wanted (roughness, opacity, weight of a blend, all of `principled` but
+// its colour) it is color1 that stands there: so has it Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
@@ -122,9 +123,13 @@ struct BlendBsdf {  // (1 - weight) first + weight second
   BsdfIndex first, second;
   bool operator==(const BlendBsdf&) const = default;
 };
+// Both kinds of map: flip_invalid_normals turns a normal by half a circle about the surface's where it would
+// face away from the viewer (Schuessler et al. 2017); use_shadowing_function darkens by the shadow that facets
+// of the map's slope would cast (Estevez, Lecocq, Stein 2019). With either, light does not go both ways alike.
 struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
   TextureIndex normalmap;
   BsdfIndex bsdf;
+  bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const NormalMapBsdf&) const = default;
 };
 // The surface is lifted along its normal by scale * luminance, in scene units, as far as the normal shows it.
@@ -133,6 +138,7 @@ struct BumpMapBsdf {
   TextureIndex texture;
   double scale = 1;
   BsdfIndex bsdf;
+  bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const BumpMapBsdf&) const = default;
 };
 // Burley's model, 2012 and 2015, as Mitsuba 3 has it.
