@@ -23,13 +23,13 @@ struct NoriTest {
   // rectangle (normal +z) that wears it: scene.bsdfs[scene.shapes[0].bsdf.value].
   std::vector<Scene> scenes, bsdfs;
 
-  // t_test. Of scenes: references[i] is the luminance expected of scenes[i]'s whole frame, averaged. Of bsdfs:
-  // references[b * angles.size() + a] is the expected luminance of weights (f cos / pdf) of bsdfs[b] sampled
-  // for light that arrives angles[a] degrees from the normal.
+  // t_test. Of scenes: references[i] is the luminance expected of scenes[i]'s whole frame, averaged. Of
+  // bsdfs: references[b * angles.size() + a] is the expected luminance of weights (f cos / pdf) of bsdfs[b]
+  // sampled for light that arrives angles[a] degrees from the normal.
   std::vector<double> references, angles;
 
-  // chi2_test, of bsdfs: so many cells in cos theta, twice that in phi; cells with fewer expected samples than
-  // min_expected are joined; so many random directions are tested.
+  // chi2_test, of bsdfs: so many cells in cos theta, twice that in phi; cells with fewer expected samples
+  // than min_expected are joined; so many random directions are tested.
   int resolution = 10, test_count = 5;
   double min_expected = 5;
   bool operator==(const NoriTest&) const = default;
