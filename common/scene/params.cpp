@@ -278,6 +278,10 @@ void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
   }
 }
 
+void Params::convert(const Field& f, const Element& e, std::optional<VolumeIndex>& value) {
+  convert(f, e, value.emplace());
+}
+
 void Params::absent(const Field& f, TextureIndex& value) { value = reader_.add_constant_texture(f.fallback); }
 void Params::absent(const Field& f, VolumeIndex& value) { value = reader_.add_constant_volume(f.fallback); }
 

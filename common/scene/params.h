@@ -55,6 +55,7 @@ class Params {
   void convert(const Field& f, const Element& e, TextureIndex& value);
   void convert(const Field& f, const Element& e, std::optional<TextureIndex>& value);
   void convert(const Field& f, const Element& e, VolumeIndex& value);
+  void convert(const Field& f, const Element& e, std::optional<VolumeIndex>& value);
   template <class E>
   requires std::is_enum_v<E>
   void convert(const Field& f, const Element& e, E& value) {

@@ -44,6 +44,27 @@ void read_old_coefficients(Params& p, HeterogeneousMedium&, Report& report) {
   if (!p.has("albedo")) report.error(p.object().at, fmt::format("{} needs albedo", p.title()));
 }
 
+void need_inverse(const Transform& to_world, const Element& e, Report& report) {
+  if (!invertible(to_world))
+    report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
+}
+
+// One kind of light; what scales it needs it.
+void check_emission(const Params& p, const HeterogeneousMedium& m, Report& report) {
+  if (m.emission.has_value() + m.source_radiance.has_value() + m.temperature.has_value() > 1)
+    report.error(p.object().at,
+                 fmt::format("{} gives more than one of emission, source_radiance and temperature; give one",
+                             p.title()));
+  for (const char* name : {"temperature_scale", "temperature_offset"})
+    if (p.has(name) && !m.temperature)
+      report.error(p.object().at, fmt::format("{} gives {}, but no temperature", p.title(), name));
+  if (p.has("emission_scale") && !m.emission && !m.source_radiance && !m.temperature)
+    report.error(p.object().at,
+                 fmt::format("{} gives emission_scale, but none of emission, source_radiance and temperature",
+                             p.title()));
+}
+void check_emission(const Params&, const HomogeneousMedium&, Report&) {}
+
 }  // namespace
 
 std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
@@ -52,17 +73,23 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
   if (type == "constvolume") {
     ConstVolume volume;
     bind(p, volume);
+    need_inverse(volume.to_world, e, report_);
     scene_.volumes.emplace_back(volume);
   } else if (type == "gridvolume") {
     GridVolume volume;
     bind(p, volume);
     if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
+    const std::string_view file = volume.file.value < scene_.assets.size()
+                                      ? std::string_view(scene_.assets[volume.file.value].name)
+                                      : "";
+    if (volume.order != GridOrder{} && !file.ends_with(".bin"))
+      report_.error(e.at, "'order' is of .bin files; others say for themselves how their values lie");
+    if (file.ends_with(".bin") && volume.wrap != Wrap::clamp)
+      report_.error(e.at, "a .bin grid ends at its outermost nodes: 'wrap_mode' can only be clamp");
     if (volume.node_centred && volume.wrap != Wrap::clamp)
       report_.error(e.at,
                     "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
-    if (!invertible(volume.to_world))
-      report_.error(e.at,
-                    "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
+    need_inverse(volume.to_world, e, report_);
     scene_.volumes.emplace_back(volume);
   } else {
     unknown_plugin(e, report_);
@@ -102,6 +129,11 @@ std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
   T medium;
   if (e.old) read_old_coefficients(p, medium, report_);
   bind(p, medium);
+  check_emission(p, medium, report_);
+  if constexpr (std::is_same_v<T, HeterogeneousMedium>)
+    if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr;
+        t && ((*t)[0] != (*t)[1] || (*t)[1] != (*t)[2]))
+      report_.error(e.at, fmt::format("'temperature' of {} is one number, not a colour", p.title()));
   const auto phases = p.take_nested("phase");
   if (phases.size() > 1)
     report_.error(phases[1].use->at, fmt::format("{} has a second phase function", p.title()));
@@ -126,7 +158,11 @@ void Reader::unbound_constant_density(const Element& e) {
   const Rgb* albedo = constant(medium.albedo);
   if (!albedo)
     return report_.error(e.at, "the density of this medium is the same everywhere, but its albedo is a grid");
-  scene_.media.back() = HomogeneousMedium{*density, *albedo, medium.scale, medium.phase};
+  if (medium.emission || medium.source_radiance || medium.temperature)
+    return report_.error(e.at,
+                         "the density of this medium is the same everywhere: write it as a medium "
+                         "\"homogeneous\" to give it an emission");
+  scene_.media.back() = HomogeneousMedium{*density, *albedo, medium.scale, medium.phase, {}, {}};
 }
 
 }  // namespace ls::scene

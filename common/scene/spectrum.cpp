@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "common/scene/cie.h"
@@ -75,6 +76,22 @@ Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant) {
   Xyz c = integral(curve, illuminant);
   for (double& x : c) x /= luminance[static_cast<std::size_t>(illuminant)];
   return srgb_of(c);
+}
+
+Rgb linear_srgb(const std::array<double, 3>& xyz) { return srgb_of(xyz); }
+
+std::array<double, 3> black_body_xyz(double kelvin) {
+  // 2 h c^2 and h c / k (CODATA 2018, exact), for wavelengths in nm: W nm^4 / (m^2 sr), and nm K.
+  constexpr double kFirst = 1.191042972397188e-16 * 1e36, kSecond = 1.438776877503933e7;
+  SpectralCurve curve;
+  for (double nm = kCieFirst; nm <= kCieLast; nm += 1) {
+    curve.nm.push_back(nm);
+    curve.value.push_back(kFirst / (nm * nm * nm * nm * nm) / std::expm1(kSecond / (nm * kelvin)));
+  }
+  Xyz c = integral(curve, Illuminant::equal_energy);
+  static const double luminance = white_luminance(Illuminant::equal_energy);
+  for (double& x : c) x /= luminance;
+  return c;
 }
 
 Rgb equal_energy_srgb() { return srgb_of({1, 1, 1}); }

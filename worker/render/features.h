@@ -8,12 +8,14 @@ struct Features {
   bool media = false;      // any participating medium
   bool grids = false;      // heterogeneous media
   bool chromatic = false;  // extinction that differs between channels
+  bool emission = false;   // media that give off light
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
-    return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic);
+    return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
+           (emission || !need.emission);
   }
 };
-inline constexpr Features kEverything{.media = true, .grids = true, .chromatic = true};
+inline constexpr Features kEverything{.media = true, .grids = true, .chromatic = true, .emission = true};
 
 }  // namespace ls::render

@@ -26,6 +26,9 @@ namespace ls::render {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+// What a medium's light is measured by: length, or absorption.
+enum class Glow : std::uint8_t { none, per_length, per_absorption, black_body };
+
 struct Medium {
   bool grid = false;
   // Homogeneous: extinction and scattering [1/world unit]. Grid: extinction per unit of density; scattering
@@ -34,6 +37,13 @@ struct Medium {
   const Grid* density = nullptr;
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
   HenyeyGreenstein phase;
+  // Light given off (glow.h). Homogeneous: `emission` [radiance per world unit]. Grid: `emission` times the
+  // emitter's value, or times a black body's radiance at offset + scale times that value, and (but for
+  // per_length) times the absorption coefficient.
+  Glow glow = Glow::none;
+  C3 emission{0, 0, 0};
+  std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
+  float kelvin_scale = 1, kelvin_offset = 0;
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z; }
 
   // Scattering coefficient per unit of extinction density at a point of a grid.

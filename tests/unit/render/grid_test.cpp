@@ -169,6 +169,27 @@ TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
       << flat.error().message;
 }
 
+TEST(Grid, AConstantVolumeFillsTheCubeThatItsTransformMoves) {
+  const test::SceneKit kit({1, 1});
+  using test::operator*;
+  const auto length = [&](const Transform& to_world, const V3d& o, double center, double scale) {
+    const auto loaded = load_volume(ConstVolume{{2, 2, 2}, to_world}, AssetLoader{kit.scene, kit.files},
+                                    V3d(center), scale, 1);
+    return loaded.value().channels.at(0).exact_integral((o - V3d(center)) * scale, V3d(1, 0, 0), 0,
+                                                        20 * scale) /
+           (2 * scale);
+  };
+  EXPECT_NEAR(length({}, {-9, .25, .25}, 0, 1), 1, 1e-6);
+  EXPECT_NEAR(length({}, {-9, -.25, .25}, 0, 1), 0, 1e-6);
+  const Transform moved = test::translate({-.5, -.5, -.5});
+  EXPECT_NEAR(length(moved, {-9, -.25, .25}, 0, 1), 1, 1e-6);
+  EXPECT_NEAR(length(moved, {-9, -.25, .25}, 3, .125), 1, 1e-6);
+  EXPECT_NEAR(length(moved, {-9, .75, .25}, 0, 1), 0, 1e-6);
+  const Transform turned = test::scale(3) * test::rotate_x(45) * moved;
+  EXPECT_NEAR(length(turned, {-9, 2.1, 0}, 0, 1), 3, 1e-6);
+  EXPECT_NEAR(length(turned, {-9, 1.4, 1.4}, 0, 1), 0, 1e-6);
+}
+
 struct Ray {
   V3 o, d;
 };

@@ -118,6 +118,7 @@ inline const std::string kExample = R"(<scene version="3.0.0">
     <volume type="constvolume" name="albedo">
       <rgb name="value" value="0.99"/>
     </volume>
+    <float name="temperature" value="1200"/>
     <phase type="isotropic"/>
   </medium>
   <shape type="rectangle">

@@ -37,8 +37,6 @@ TEST(Warnings, FieldsWithoutEffectAreToldOf) {
        "'fov_axis' of sensor \"perspective\" has no effect here"},
       {"", "<emitter type=\"constant\"><transform name=\"to_world\"/></emitter>",
        "'to_world' of emitter \"constant\" has no effect here"},
-      {"", "<volume type=\"constvolume\"><transform name=\"to_world\"/></volume>",
-       "'to_world' of volume \"constvolume\" has no effect here"},
   };
   for (const auto& row : rows) {
     const auto r = read("<scene version=\"3.0.0\">" + row.objects + "<sensor type=\"perspective\">" +

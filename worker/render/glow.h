@@ -1,0 +1,21 @@
+// Light that a medium gives off along a ray: the integral of transmittance times emission, all of it at once
+// and not only where a flight happens to collide. So it is exact where nothing is absorbed (a tracker has no
+// collisions there), and as good in the dark of an opaque medium.
+//
+// A homogeneous medium has a closed form. A grid is walked by stretches that are short in voxels, each with
+// one emission sample per channel, placed by the light that the stretch's mean density lets through; the
+// transmittance up to each sample is that of residual ratio tracking (medium.h), one walk for all samples. A
+// sum of terms each of which is right on the average is right on the average.
+#pragma once
+
+#include "worker/render/medium.h"
+
+namespace ls::render {
+
+// Along t_max of a homogeneous medium; t_max may be infinite. Infinite where light comes without end.
+C3 glow_of_length(const Medium& m, float t_max);
+
+// Along o + t d (d of unit length) up to t_max; an unbiased estimate.
+C3 glow_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream);
+
+}  // namespace ls::render
