@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "common/assets/raw_grid.h"
 #include "common/assets/vol.h"
 #include "common/base/overloaded.h"
 #include "worker/render/vdb_module.h"
@@ -14,7 +15,8 @@
 namespace ls::render {
 namespace {
 
-bool is_vdb(std::string_view name) { return name.size() > 4 && name.substr(name.size() - 4) == ".vdb"; }
+bool is_vdb(std::string_view name) { return name.ends_with(".vdb") || name.ends_with(".nvdb"); }
+bool is_raw(std::string_view name) { return name.ends_with(".bin"); }
 
 // World to index, given scene to index.
 Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
@@ -22,26 +24,30 @@ Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
 }
 
 Result<LoadedVolume> constant_volume(const ConstVolume& v, V3d center, double scale, double to_sigma) {
-  // As in Mitsuba, a volume without a file fills the unit cube.
+  // As in Mitsuba, a volume without a file fills the unit cube, moved by to_world.
   LoadedVolume out;
   for (int c = 0; c < 3; ++c) {
     out.channels.emplace_back(std::array<int, 3>{1, 1, 1}, std::vector<float>{static_cast<float>(v.value[c])},
-                              from_world(Affine(), center, scale), V3d(0, 0, 0), V3d(1, 1, 1), to_sigma);
+                              from_world(Affine(v.to_world).inverse(), center, scale), V3d(0, 0, 0),
+                              V3d(1, 1, 1), to_sigma);
   }
   if (v.value[0] == v.value[1] && v.value[1] == v.value[2]) out.channels.resize(1);
   return out;
 }
 
+// A .vol, or a raw grid, whose values are nodes from face to face of its own box.
 Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
   auto path = files.path(v.file);
   if (!path) return tl::unexpected(path.error());
-  auto data = load_vol(*path, files.name(v.file));
+  const bool raw = is_raw(files.name(v.file));
+  auto data = raw ? load_raw_grid(*path, files.name(v.file), v.order) : load_vol(*path, files.name(v.file));
   if (!data) return tl::unexpected(data.error());
+  const bool node_centred = v.node_centred || raw;
   // Values sit at cell centres of the unit cube, or at nodes from face to face; the cube is the file's box
   // first, if asked for, then moved.
   Affine unit_to_scene(v.to_world);
-  if (v.use_grid_bbox) {
+  if (v.use_grid_bbox || raw) {
     const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
         hi(data->bbox_max[0], data->bbox_max[1], data->bbox_max[2]);
     Affine box;
@@ -54,14 +60,14 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
                 fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
   }
   const int n[3] = {static_cast<int>(data->nx), static_cast<int>(data->ny), static_cast<int>(data->nz)};
-  if (v.node_centred && std::min({n[0], n[1], n[2]}) < 2) {
+  if (node_centred && std::min({n[0], n[1], n[2]}) < 2) {
     return fail(
         Errc::invalid_argument,
         fmt::format("{}: {} x {} x {} values can't be nodes from face to face of a box: that takes two "
                     "along each axis",
                     files.name(v.file), n[0], n[1], n[2]));
   }
-  const double margin = v.node_centred ? 0 : .5;
+  const double margin = node_centred ? 0 : .5;
   const V3d last(n[0] - 1, n[1] - 1, n[2] - 1), steps = last + V3d(2 * margin);
   Affine to_nodes;
   to_nodes.a = {steps.x, 0, 0, 0, steps.y, 0, 0, 0, steps.z};

@@ -1,0 +1,21 @@
+// Raw `.bin` grids, little endian: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box
+// in the world; nx ny nz float32 values, x fastest or (as some converters call "x-major") z fastest. The
+// values are nodes: the outermost ones lie on the faces of the box. Nothing comes after them.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "common/assets/data.h"
+#include "common/scene/scene.h"
+
+namespace ls {
+
+// One channel. A value that is NaN or infinite is refused with its node; negative ones become 0 and are
+// counted. The result is x fastest, whatever the file is.
+Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byte> file, GridOrder order);
+Result<GridData> load_raw_grid(const std::filesystem::path& path, std::string_view name, GridOrder order);
+
+}  // namespace ls
