@@ -1,5 +1,5 @@
-// The interface of the OpenVDB module, a shared library that is opened only when a scene names a .vdb file:
-// mapping OpenVDB costs 30 ms and 29 MB that other scenes need not pay. Plain C types: nothing of OpenVDB
+// The interface of the OpenVDB module, a shared library that is opened only when a scene names a .vdb or .nvdb
+// file (which of them it is, the file says): mapping OpenVDB costs 30 ms and 29 MB that other scenes need not pay. Plain C types: nothing of OpenVDB
 // crosses it.
 #pragma once
 

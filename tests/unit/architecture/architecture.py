@@ -51,6 +51,7 @@ EVERYWHERE = r"^(common|worker|coordinator|cli)/"
 DOORS = [
     Door("Embree", r"^embree\d?/", r"^worker/render/accel\.(h|cpp)$", "one file pair of the renderer"),
     Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a module that is loaded on demand"),
+    Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same module"),
     Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr\w*\.(h|cpp)$", "common/image/exr*"),
     Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),

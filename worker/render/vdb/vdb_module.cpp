@@ -12,14 +12,14 @@
 #include <string>
 #include <vector>
 
+#include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/refused.h"
+
 namespace {
 
-constexpr std::uintmax_t kSmallFile = 16 << 20;
+using ls::render::Refused;
 
-struct Refused {
-  int code;
-  std::string text;
-};
+constexpr std::uintmax_t kSmallFile = 16 << 20;
 
 void initialize_once() {
   static std::once_flag flag;
@@ -138,13 +138,17 @@ extern "C" {
 int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
                 char* error, std::uint64_t error_size) {
   *out = LsVdbGrid{};
+  constexpr char kDamaged[] = "not a readable OpenVDB or NanoVDB file: damaged, or cut short";
   const auto say = [&](int code, const std::string& text) {
     std::snprintf(error, error_size, "%s", text.c_str());
     ls_vdb_free(out);
     return code;
   };
   try {
-    read(path, grid_name, max_values, *out);
+    if (ls::render::is_nvdb(path))
+      ls::render::read_nvdb(path, grid_name, max_values, *out);
+    else
+      read(path, grid_name, max_values, *out);
     return 0;
   } catch (const Refused& r) {
     return say(r.code, r.text);
@@ -152,7 +156,7 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
     // A small file that wants all memory is a damaged one: its counts are garbage.
     std::error_code unknown;
     const auto bytes = std::filesystem::file_size(path, unknown);
-    if (!unknown && bytes < kSmallFile) return say(1, "not a readable OpenVDB file: damaged, or cut short");
+    if (!unknown && bytes < kSmallFile) return say(1, kDamaged);
     return say(2, "the grid does not fit into memory");
   } catch (const std::exception& e) {
     return say(1, std::string("not a readable OpenVDB file: ") + e.what());

@@ -1,0 +1,195 @@
+#include "worker/render/vdb/nvdb.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "tests/unit/nvdb/nvdb_kit.h"
+#include "worker/render/vdb/refused.h"
+
+namespace ls::render {
+namespace {
+
+using test::NvdbKit;
+using testing::HasSubstr;
+
+struct Read {
+  LsVdbGrid grid{};
+  std::string error;
+  std::vector<float> values;
+
+  float at(int x, int y, int z) const {
+    return values.at(static_cast<std::size_t>((z * grid.size[1] + y) * grid.size[0] + x));
+  }
+};
+
+Read read(const std::string& file, const std::string& wanted = "", std::uint64_t max_values = 1 << 20) {
+  Read r;
+  try {
+    decode_nvdb(std::as_bytes(std::span(file.data(), file.size())), wanted, max_values, r.grid);
+    const auto n = static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2];
+    r.values.assign(r.grid.values, r.grid.values + n);
+  } catch (const Refused& e) {
+    r.error = e.text;
+  }
+  delete[] r.grid.values;
+  r.grid.values = nullptr;
+  return r;
+}
+
+// Active voxels 0..23, 0..7, 0..7, with a layer around them.
+void expect_the_kits_values(const Read& r, const NvdbKit& kit, float step = 1) {
+  ASSERT_EQ(r.error, "");
+  EXPECT_EQ(r.grid.size[0], 26);
+  EXPECT_EQ(r.grid.size[1], 10);
+  EXPECT_EQ(r.grid.size[2], 10);
+  for (int z = -1; z < 9; ++z)
+    for (int y = -1; y < 9; ++y)
+      for (int x = -1; x < 25; ++x) {
+        const bool inside = x >= 0 && x < 24 && y >= 0 && y < 8 && z >= 0 && z < 8;
+        const float value = kit.value(x, y, z), held = x < 16 ? std::floor(value / step) * step : value;
+        ASSERT_EQ(r.at(x + 1, y + 1, z + 1), inside ? held : kit.background) << x << " " << y << " " << z;
+      }
+}
+
+TEST(Nvdb, ReadsEveryKindOfNumber) {
+  for (const std::uint32_t type : {1, 2, 9, 13, 14, 15, 16}) {
+    NvdbKit kit;
+    kit.type = type;
+    SCOPED_TRACE(type);
+    expect_the_kits_values(read(kit.file()), kit, type == 13 ? 16 : 1);
+  }
+}
+
+TEST(Nvdb, ReadsEveryCompression) {
+  for (const std::uint16_t codec : {0, 1, 2}) {
+    NvdbKit kit;
+    kit.codec = codec;
+    SCOPED_TRACE(codec);
+    expect_the_kits_values(read(kit.file()), kit);
+  }
+}
+
+TEST(Nvdb, PlacesTheGridByItsOwnMap) {
+  const NvdbKit kit;
+  const Read r = read(kit.file());
+  // Node (0, 0, 0) is the voxel before the first active one.
+  const double x = kit.origin[0] - 1, y = kit.origin[1] - 1, z = kit.origin[2] - 1;
+  const double expected[16] = {.5, 0, 0, .5 * x + 1, 0, 2, 0, 2 * y + 2, 0, 0, 1, z + 3, 0, 0, 0, 1};
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(r.grid.index_to_scene[i], expected[i]) << i;
+}
+
+TEST(Nvdb, TilesOfTheRootAndNegativesAreReadToo) {
+  NvdbKit kit;
+  kit.background = -1;
+  std::string b = kit.buffer();
+  const Read r = read(kit.file(b));
+  EXPECT_EQ(r.at(0, 0, 0), 0);
+  EXPECT_EQ(r.grid.negatives, 26u * 10 * 10 - 24 * 8 * 8);
+  // Without its child the root's tile is a value.
+  NvdbKit::put(b, kit.upper() - 32 + 8, std::int64_t{0});
+  NvdbKit::put(b, kit.upper() - 32 + 20, 7.f);
+  EXPECT_EQ(read(kit.file(b)).at(5, 5, 5), 7);
+}
+
+TEST(Nvdb, ChoosesAGridByItsName) {
+  NvdbKit a, b;
+  a.name = "temperature";
+  a.background = 3;
+  b.codec = 1;
+  const std::string both = a.file() + b.file();  // two segments
+  EXPECT_EQ(read(both).at(0, 0, 0), .25f);
+  EXPECT_EQ(read(both, "temperature").at(0, 0, 0), 3);
+  EXPECT_THAT(read(both, "flame").error,
+              HasSubstr("it has no grid 'flame'; there are 'temperature', 'density'"));
+  b.name = "fuel";
+  EXPECT_THAT(read(a.file() + b.file()).error, HasSubstr("none is called 'density'; name one of"));
+}
+
+TEST(Nvdb, RefusesWhatIsNoDensityByName) {
+  NvdbKit kit;
+  kit.grid_class = 1;
+  EXPECT_THAT(read(kit.file()).error, HasSubstr("grid 'density' is a level set"));
+  kit.grid_class = 0;
+  for (const auto& [type, name] :
+       {std::pair{4u, "int32"}, {6u, "vec3f"}, {19u, "index"}, {77u, "number 77"}}) {
+    kit.type = type;
+    EXPECT_THAT(read(kit.file()).error, HasSubstr(std::string("has values of type ") + name));
+  }
+  kit.type = 1;
+  kit.version = 33u << 21;
+  EXPECT_THAT(read(kit.file()).error, HasSubstr("version 33.0; known is version 32"));
+  kit = {};
+  kit.hi = {-1, -1, -1};
+  EXPECT_THAT(read(kit.file()).error, HasSubstr("is empty"));
+}
+
+TEST(Nvdb, RefusesWhatIsTooLargeBeforeItIsAllocated) {
+  NvdbKit kit;
+  EXPECT_THAT(read(kit.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
+  EXPECT_EQ(read(kit.file(), "", 2600).error, "");
+  kit.hi[1] = 20000;
+  EXPECT_THAT(read(kit.file()).error, HasSubstr("along an axis; the limit is 16384"));
+  kit = {};
+  kit.codec = 1;
+  std::string f = kit.file();
+  NvdbKit::put(f, 16, std::uint64_t{1} << 60);
+  EXPECT_THAT(read(f).error, HasSubstr("is damaged"));
+}
+
+TEST(Nvdb, RefusesDamage) {
+  const NvdbKit kit;
+  const auto with = [&](std::uint64_t at, auto v) {
+    std::string b = kit.buffer();
+    NvdbKit::put(b, at, v);
+    return read(kit.file(b)).error;
+  };
+  const float nan = std::nanf("");
+  EXPECT_THAT(with(kit.leaf(0) + 96, nan),
+              HasSubstr("voxel (-4096, 0, 8192) of grid 'density' is not a finite"));
+  EXPECT_THAT(with(0, 'X'), HasSubstr("begins with something else"));
+  EXPECT_THAT(with(32, std::uint64_t{5}), HasSubstr("its sizes contradict each other"));
+  EXPECT_THAT(with(672 + 24, ~std::uint64_t{0}), HasSubstr("damaged"));
+  EXPECT_THAT(with(NvdbKit::kRoot + 24, ~std::uint32_t{0}), HasSubstr("damaged"));
+  EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{1} << 62), HasSubstr("damaged"));
+  EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{-8}), HasSubstr("points backwards"));
+  EXPECT_THAT(with(kit.lower() + 1088, std::int64_t{1} << 40), HasSubstr("damaged"));
+  EXPECT_THAT(with(296 + 88, std::numeric_limits<double>::infinity()),
+              HasSubstr("its transform is not finite"));
+  std::string b = kit.buffer();
+  NvdbKit::put(b, NvdbKit::kRoot + 24, std::uint32_t{2});
+  std::string twice =
+      b.substr(0, kit.upper() - 32) + b.substr(kit.upper() - 32, 32) + b.substr(kit.upper() - 32);
+  NvdbKit::put(twice, 32, std::uint64_t{twice.size()});
+  EXPECT_THAT(read(kit.file(twice)).error, HasSubstr("two of its tiles are at one place"));
+}
+
+// A file that was cut off gives an error at whatever byte; one whose bytes were changed an answer.
+TEST(Nvdb, SurvivesTruncationsAndMutations) {
+  std::mt19937 rng(5);
+  for (const std::uint16_t codec : {1, 2}) {
+    NvdbKit kit;
+    kit.codec = codec;
+    const std::string file = kit.file();
+    for (std::size_t n = 1; n < file.size(); n += 1 + n / 64)
+      EXPECT_NE(read(file.substr(0, n)).error, "") << codec << " " << n;
+  }
+  const NvdbKit kit;
+  const std::string file = kit.file();
+  for (int i = 0; i < 400; ++i) {
+    std::string m = file;
+    for (int e = 0; e < 4; ++e) {
+      // Half of them where headers and pointers are.
+      const std::size_t head = 193 + 672 + 64 + 64 + 32;
+      const std::size_t at = e < 3 ? rng() % head : rng() % m.size();
+      m[at] = static_cast<char>(rng());
+    }
+    const Read r = read(m, "", 1 << 16);
+    for (const float v : r.values) ASSERT_TRUE(v >= 0 && std::isfinite(v));
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

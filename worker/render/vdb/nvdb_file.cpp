@@ -1,0 +1,163 @@
+#include <blosc.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string_view>
+#include <vector>
+
+#include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/nvdb_bytes.h"
+
+namespace ls::render {
+namespace {
+
+constexpr std::uint64_t kFileBytes = std::uint64_t{8} << 30;
+constexpr std::size_t kMaxGrids = 4096;
+constexpr std::uint32_t kMaxName = 1 << 16;
+constexpr std::uint32_t kAbi = 32;
+// Neither zlib (1032) nor Blosc's codecs make more out of a byte.
+constexpr std::uint64_t kMaxExpansion = 1100;
+// Blosc's buffers are cut into pieces of this many bytes.
+constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
+
+enum Codec : std::uint16_t { kPlain, kZip, kBlosc };
+
+bool is_magic(std::string_view m) { return m == "NanoVDB0" || m == "NanoVDB2"; }
+
+std::vector<std::byte> contents(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
+  if (!in) throw Refused{1, "the file cannot be read"};
+  if (size > kFileBytes)
+    throw Refused{2, "a NanoVDB file of " + std::to_string(size) + " bytes; the limit is 8 GiB"};
+  std::vector<std::byte> bytes(size);
+  in.seekg(0);
+  if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
+    throw Refused{1, "the file cannot be read"};
+  return bytes;
+}
+
+struct Entry {
+  std::string name;
+  std::uint64_t at = 0, stored = 0, bytes = 0;  // where it lies in the file, its size there, and expanded
+  std::uint16_t codec = kPlain;
+};
+
+// The file is a sequence of segments: 16 bytes of header, of each grid 176 bytes of metadata and its name,
+// then the grids themselves.
+std::vector<Entry> table_of(const NvdbBytes& file) {
+  std::vector<Entry> all;
+  for (std::uint64_t at = 0; at < file.size();) {
+    const auto magic = file.part(at, 8);
+    if (!is_magic({reinterpret_cast<const char*>(magic.data()), 8}))
+      throw Refused{1, "not a readable NanoVDB file: damaged at byte " + std::to_string(at)};
+    const std::uint32_t version = file.get<std::uint32_t>(at + 8), major = version >> 21;
+    if (major != kAbi)
+      throw Refused{1, "a NanoVDB file of version " + std::to_string(major) + "." +
+                           std::to_string(version >> 10 & 0x7ff) + "; known is version 32"};
+    const auto count = file.get<std::uint16_t>(at + 12), codec = file.get<std::uint16_t>(at + 14);
+    if (codec > kBlosc) throw Refused{1, "a NanoVDB file of unknown compression " + std::to_string(codec)};
+    at += 16;
+    const std::size_t first = all.size();
+    for (int i = 0; i < count; ++i) {
+      if (all.size() == kMaxGrids)
+        throw Refused{2, "the file holds more than " + std::to_string(kMaxGrids) + " grids"};
+      Entry& e = all.emplace_back();
+      e.bytes = file.get<std::uint64_t>(at);
+      e.stored = file.get<std::uint64_t>(at + 8);
+      e.codec = codec;
+      const auto length = file.get<std::uint32_t>(at + 136);
+      if (length > kMaxName) throw Refused{1, "not a readable NanoVDB file: a grid's name is too long"};
+      const auto name = file.part(at + 176, length);
+      e.name.assign(reinterpret_cast<const char*>(name.data()), length);
+      e.name.resize(std::min(e.name.size(), e.name.find('\0')));
+      at += 176 + length;
+    }
+    for (std::size_t i = first; i < all.size(); ++i) {
+      all[i].at = at;
+      file.part(at, all[i].stored);
+      at += all[i].stored;
+    }
+  }
+  return all;
+}
+
+std::string names_of(const std::vector<Entry>& all) {
+  std::string names;
+  for (const Entry& e : all) names += (names.empty() ? "'" : ", '") + e.name + "'";
+  return names;
+}
+
+// The grid of this name; without one the only grid there is, or "density".
+const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
+  if (all.empty()) throw Refused{1, "the file holds no grid"};
+  if (wanted.empty() && all.size() == 1) return all.front();
+  for (const Entry& e : all)
+    if (e.name == (wanted.empty() ? "density" : wanted)) return e;
+  if (wanted.empty())
+    throw Refused{1,
+                  "the file holds several grids and none is called 'density'; name one of " + names_of(all)};
+  throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(all)};
+}
+
+[[noreturn]] void damaged(const Entry& e) {
+  throw Refused{1, "not a readable NanoVDB file: the data of grid '" + e.name + "' is damaged"};
+}
+
+void unzip(const Entry& e, const NvdbBytes& file, std::span<std::byte> to) {
+  const auto packed = file.get<std::uint64_t>(e.at);
+  if (packed > e.stored - 8) damaged(e);
+  uLongf n = to.size();
+  const int rc = uncompress(reinterpret_cast<Bytef*>(to.data()), &n,
+                            reinterpret_cast<const Bytef*>(file.part(e.at + 8, packed).data()), packed);
+  if (rc != Z_OK || n != to.size()) damaged(e);
+}
+
+void unblosc(const Entry& e, const NvdbBytes& file, std::span<std::byte> to) {
+  std::uint64_t at = e.at;
+  while (!to.empty()) {
+    const std::size_t piece = std::min<std::uint64_t>(to.size(), kBloscPiece);
+    const auto packed = file.get<std::uint64_t>(at);
+    if (packed > e.stored || at + 8 + packed > e.at + e.stored) damaged(e);
+    const auto from = file.part(at + 8, packed);
+    std::size_t whole = 0;
+    if (blosc_cbuffer_validate(from.data(), from.size(), &whole) != 0 || whole != piece) damaged(e);
+    if (blosc_decompress_ctx(from.data(), to.data(), piece, 1) != static_cast<int>(piece)) damaged(e);
+    to = to.subspan(piece);
+    at += 8 + packed;
+  }
+}
+
+}  // namespace
+
+bool is_nvdb(const std::filesystem::path& path) {
+  char magic[8] = {};
+  std::ifstream(path, std::ios::binary).read(magic, sizeof magic);
+  return is_magic({magic, sizeof magic});
+}
+
+void read_nvdb(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
+               LsVdbGrid& out) {
+  decode_nvdb(contents(path), wanted, max_values, out);
+}
+
+void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, std::uint64_t max_values,
+                 LsVdbGrid& out) {
+  const NvdbBytes file(bytes, "a file");
+  const std::vector<Entry> all = table_of(file);
+  const Entry& e = choose(all, wanted);
+  if (e.codec == kPlain) {
+    if (e.stored != e.bytes) damaged(e);
+    return expand_nvdb(e.name, file.part(e.at, e.bytes), max_values, out);
+  }
+  if (e.stored < 8 || e.bytes / kMaxExpansion > e.stored) damaged(e);
+  std::vector<std::byte> buffer(e.bytes);
+  if (e.codec == kZip)
+    unzip(e, file, buffer);
+  else
+    unblosc(e, file, buffer);
+  expand_nvdb(e.name, buffer, max_values, out);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,260 @@
+#include <Imath/half.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/nvdb_bytes.h"
+
+namespace ls::render {
+namespace {
+
+using Coord = std::array<std::int64_t, 3>;
+
+// ---- layout: of the grid, 672 bytes; of the tree behind it; of nodes, by the type of values
+constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
+                        kType = 636, kRootOffset = 24;
+constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544, kUpperTable = 8256, kLowerTable = 1088;
+constexpr int kUpperSide = 4096, kLowerSide = 128, kLeafSide = 8;
+constexpr std::uint64_t kRootTile = 32;
+
+enum Type : std::uint32_t { kFloat = 1, kDouble = 2, kHalf = 9, kFp4 = 13, kFp8 = 14, kFp16 = 15, kFpN = 16 };
+struct Layout {
+  std::uint64_t background, root_size, tile_value, leaf_table;
+};
+Layout layout_of(Type type) {
+  if (type == kDouble) return {32, 96, 24, 128};
+  return {28, 64, 20, 96};
+}
+
+std::string type_name(std::uint32_t type) {
+  static constexpr const char* kNames[] = {"unknown", "float", "double", "int16",  "int32", "int64", "vec3f",
+                                           "vec3d",   "mask",  "half",   "uint32", "bool",  "rgba8", "Fp4",
+                                           "Fp8",     "Fp16",  "FpN",    "vec4f",  "vec4d", "index"};
+  return type < std::size(kNames) ? kNames[type] : "number " + std::to_string(type);
+}
+
+class Tree {
+ public:
+  Tree(const std::string& name, const NvdbBytes& bytes, std::uint64_t max_values, LsVdbGrid& out)
+      : name_(name), b_(bytes), max_values_(max_values), out_(out) {}
+
+  void expand() {
+    check_header();
+    root_ = kGrid + b_.get<std::uint64_t>(kGrid + kRootOffset);
+    if (root_ < kGrid) fault("its tree lies before it");
+    place();
+    const auto count = std::uint64_t{static_cast<std::uint64_t>(out_.size[0])} *
+                       static_cast<std::uint64_t>(out_.size[1]) * static_cast<std::uint64_t>(out_.size[2]);
+    out_.values = new float[count];
+    fill(lo_, end_, number(root_ + layout_.background));
+    read_root();
+  }
+
+ private:
+  [[noreturn]] void fault(const std::string& why) const {
+    throw Refused{1, "not a readable NanoVDB file: grid '" + name_ + "': " + why};
+  }
+
+  void check_header() {
+    const auto magic = b_.part(0, 8);
+    const std::string m(reinterpret_cast<const char*>(magic.data()), 8);
+    if (m != "NanoVDB0" && m != "NanoVDB1") fault("its data begins with something else");
+    if (b_.get<std::uint64_t>(kGridSize) != b_.size()) fault("its sizes contradict each other");
+    const auto type = b_.get<std::uint32_t>(kType), grid_class = b_.get<std::uint32_t>(kClass);
+    if (grid_class == 1)
+      throw Refused{1, "grid '" + name_ + "' is a level set, not a density; convert it to a fog volume"};
+    switch (type) {
+      case kFloat:
+      case kDouble:
+      case kHalf:
+      case kFp4:
+      case kFp8:
+      case kFp16:
+      case kFpN:
+        type_ = static_cast<Type>(type);
+        break;
+      default:
+        throw Refused{1, "grid '" + name_ + "' has values of type " + type_name(type) +
+                             "; a density is float, double, half or one of Fp4, Fp8, Fp16 and FpN"};
+    }
+    layout_ = layout_of(type_);
+  }
+
+  // The box of the active voxels and one voxel around it, and where it is.
+  void place() {
+    std::uint64_t count = 1;
+    for (int k = 0; k < 3; ++k) {
+      const std::int64_t lo = b_.get<std::int32_t>(root_ + 4 * k),
+                         hi = b_.get<std::int32_t>(root_ + 12 + 4 * k);
+      if (hi < lo) throw Refused{1, "grid '" + name_ + "' is empty: it has no active voxel"};
+      lo_[k] = lo - 1;
+      end_[k] = hi + 2;
+      const std::int64_t n = end_[k] - lo_[k];
+      if (n > (1 << 14))
+        throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(n) +
+                             " voxels along an axis; the limit is 16384"};
+      out_.size[k] = static_cast<std::int32_t>(n);
+      count *= static_cast<std::uint64_t>(n);
+    }
+    if (count > max_values_)
+      throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(count) + " voxels; the limit is " +
+                           std::to_string(max_values_)};
+    double m[9], v[3];
+    for (int i = 0; i < 9; ++i) m[i] = b_.get<double>(kMap + kMatrix + 8 * i);
+    for (int i = 0; i < 3; ++i) v[i] = b_.get<double>(kMap + kOffset + 8 * i);
+    double* t = out_.index_to_scene;
+    for (int r = 0; r < 3; ++r) {
+      t[4 * r + 3] = v[r];
+      for (int c = 0; c < 3; ++c) {
+        t[4 * r + c] = m[3 * r + c];
+        t[4 * r + 3] += m[3 * r + c] * static_cast<double>(lo_[c]);
+      }
+    }
+    t[15] = 1;
+    for (int i = 0; i < 16; ++i)
+      if (!std::isfinite(t[i])) fault("its transform is not finite");
+  }
+
+  double number(std::uint64_t at) const {
+    if (type_ == kDouble) return b_.get<double>(at);
+    if (type_ != kHalf) return b_.get<float>(at);
+    Imath::half h;
+    h.setBits(b_.get<std::uint16_t>(at));
+    return h;
+  }
+
+  // Voxel n of a leaf. Quantised ones are codes of 1 to 16 bits, and the leaf's minimum and step.
+  double voxel(std::uint64_t leaf, std::uint32_t n) const {
+    const std::uint64_t table = leaf + layout_.leaf_table;
+    if (type_ == kDouble) return number(table + 8 * n);
+    if (type_ == kFloat) return number(table + 4 * n);
+    if (type_ == kHalf) return number(table + 2 * n);
+    const std::uint32_t log_bits = type_ == kFp4    ? 2
+                                   : type_ == kFp8  ? 3
+                                   : type_ == kFp16 ? 4
+                                                    : b_.get<std::uint32_t>(leaf + 12) >> 29;
+    if (log_bits > 4) fault("a leaf has codes of more than 16 bits");
+    const std::uint32_t per_word = 5 - log_bits, bits = 1u << log_bits;
+    const auto word = b_.get<std::uint32_t>(table + 4 * (n >> per_word));
+    const std::uint32_t code = word >> ((n & ((1u << per_word) - 1)) << log_bits) & ((1u << bits) - 1);
+    return static_cast<float>(code) * b_.get<float>(table - 12) + b_.get<float>(table - 16);
+  }
+
+  void read_root() {
+    const auto tiles = b_.get<std::uint32_t>(root_ + 24);
+    std::set<std::uint64_t> keys;
+    for (std::uint32_t i = 0; i < tiles; ++i) {
+      const std::uint64_t tile = root_ + layout_.root_size + kRootTile * i;
+      const auto key = b_.get<std::uint64_t>(tile);
+      if (!keys.insert(key).second) fault("two of its tiles are at one place");
+      Coord origin;
+      for (int k = 0; k < 3; ++k)
+        origin[k] =
+            static_cast<std::int32_t>(static_cast<std::uint32_t>(key >> 21 * (2 - k) & 0xfffff) << 12);
+      if (!meets(origin, kUpperSide)) continue;
+      const auto child = b_.get<std::int64_t>(tile + 8);
+      if (child == 0)
+        fill_node(origin, kUpperSide, number(tile + layout_.tile_value));
+      else
+        inner(at(root_, child), origin, kUpperSide);
+    }
+  }
+
+  std::uint64_t at(std::uint64_t base, std::int64_t offset) const {
+    if (offset < 0) fault("a node points backwards");
+    return base + static_cast<std::uint64_t>(offset);
+  }
+
+  // An upper node (32^3 children of 128^3 voxels) or a lower one (16^3 of 8^3).
+  void inner(std::uint64_t node, const Coord& origin, int side) {
+    const bool upper = side == kUpperSide;
+    const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;
+    const std::uint64_t mask = node + (upper ? kUpperChildMask : kLowerChildMask),
+                        table = node + (upper ? kUpperTable : kLowerTable);
+    std::array<int, 3> first{}, last{};
+    for (int k = 0; k < 3; ++k) {
+      first[k] = static_cast<int>(std::max<std::int64_t>(0, lo_[k] - origin[k]) / child_side);
+      last[k] = static_cast<int>(std::min<std::int64_t>(side, end_[k] - origin[k]) - 1) / child_side;
+    }
+    for (int x = first[0]; x <= last[0]; ++x)
+      for (int y = first[1]; y <= last[1]; ++y)
+        for (int z = first[2]; z <= last[2]; ++z) {
+          const auto n = static_cast<std::uint32_t>((x * per_axis + y) * per_axis + z);
+          const Coord at_child{origin[0] + x * child_side, origin[1] + y * child_side,
+                               origin[2] + z * child_side};
+          if (!b_.bit(mask, n)) {
+            fill_node(at_child, child_side, number(table + 8 * n));
+            continue;
+          }
+          const std::uint64_t child = at(node, b_.get<std::int64_t>(table + 8 * n));
+          if (upper)
+            inner(child, at_child, kLowerSide);
+          else
+            leaf(child, at_child);
+        }
+  }
+
+  void leaf(std::uint64_t node, const Coord& origin) {
+    for (int x = 0; x < kLeafSide; ++x)
+      for (int y = 0; y < kLeafSide; ++y)
+        for (int z = 0; z < kLeafSide; ++z) {
+          const Coord c{origin[0] + x, origin[1] + y, origin[2] + z};
+          if (meets(c, 1)) set(c, voxel(node, static_cast<std::uint32_t>((x * 8 + y) * 8 + z)));
+        }
+  }
+
+  bool meets(const Coord& c, int side) const {
+    for (int k = 0; k < 3; ++k)
+      if (c[k] >= end_[k] || c[k] + side <= lo_[k]) return false;
+    return true;
+  }
+  void fill_node(const Coord& c, int side, double value) {
+    Coord a, e;
+    for (int k = 0; k < 3; ++k) {
+      a[k] = std::max(c[k], lo_[k]);
+      e[k] = std::min(c[k] + side, end_[k]);
+    }
+    fill(a, e, value);
+  }
+  void fill(const Coord& a, const Coord& e, double value) {
+    for (std::int64_t z = a[2]; z < e[2]; ++z)
+      for (std::int64_t y = a[1]; y < e[1]; ++y)
+        for (std::int64_t x = a[0]; x < e[0]; ++x) set({x, y, z}, value);
+  }
+  void set(const Coord& c, double value) {
+    const auto v = static_cast<float>(value);
+    if (!std::isfinite(v))
+      throw Refused{1, "voxel (" + std::to_string(c[0]) + ", " + std::to_string(c[1]) + ", " +
+                           std::to_string(c[2]) + ") of grid '" + name_ + "' is not a finite number"};
+    const auto i = ((c[2] - lo_[2]) * out_.size[1] + (c[1] - lo_[1])) * out_.size[0] + (c[0] - lo_[0]);
+    out_.values[i] = v;
+  }
+
+  const std::string& name_;
+  const NvdbBytes& b_;
+  const std::uint64_t max_values_;
+  LsVdbGrid& out_;
+  Type type_ = kFloat;
+  Layout layout_{};
+  std::uint64_t root_ = 0;
+  Coord lo_{}, end_{};  // of what is read: [lo, end)
+};
+
+}  // namespace
+
+void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,
+                 LsVdbGrid& out) {
+  const NvdbBytes bytes(buffer, "its buffer");
+  Tree(name, bytes, max_values, out).expand();
+  const auto n = static_cast<std::size_t>(out.size[0]) * out.size[1] * out.size[2];
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(out.values[i] < 0)) continue;
+    ++out.negatives;
+    out.values[i] = 0;
+  }
+}
+
+}  // namespace ls::render
