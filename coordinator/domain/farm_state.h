@@ -102,6 +102,11 @@ struct Farm::State {
   // The next unit of the job for this worker, if it may have one now.
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
+  // At a job's tail: what lies untouched behind other work is better begun by a worker that has none. True if
+  // units wait again because of it.
+  bool take_back_for_idle();
+  double waits_behind_others(const LeaseRecord& lease) const;
+  LeaseRecord* longest_waiting_for(const Worker& idle);
   void copy_overdue(Worker& worker);  // speculation at the tail
 };
 

@@ -25,7 +25,10 @@ inline constexpr double kDeadlineFactor = 3.0;            // of the predicted du
 inline constexpr Duration kDeadlineSlack = 10s;
 inline constexpr Duration kLoadSlack = 120s;  // more, until a worker has finished a unit of the job
 inline constexpr Duration kNoGrowthLimit =
-    600s;                                       // progress without a finished unit renews no longer than this
+    600s;  // progress without a finished unit renews no longer than this
+// A unit that waits this long behind others of its worker is moved to an idle one: far above a lease's way
+// there.
+inline constexpr Duration kTakeBackAfter = 20ms;
 inline constexpr double kSpeculateAfter = 1.5;  // of the predicted duration: then idle workers may copy units
 inline constexpr Duration kSpeculateSlack = 1s;
 inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked at for one idle worker

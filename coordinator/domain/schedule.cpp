@@ -44,15 +44,66 @@ bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint 
 }  // namespace
 
 void Farm::State::dispatch() {
-  std::vector<Worker*> candidates;
-  for (const WorkerIndex index : work_appeared ? workers.hungry() : touched) {
-    if (workers.hungry().contains(index)) candidates.push_back(&workers.at(index));
-  }
-  serve(candidates, true);
-  serve(candidates, false);
+  do {
+    std::vector<Worker*> candidates;
+    for (const WorkerIndex index : work_appeared ? workers.hungry() : touched) {
+      if (workers.hungry().contains(index)) candidates.push_back(&workers.at(index));
+    }
+    serve(candidates, true);
+    serve(candidates, false);
+  } while (take_back_for_idle());
   for (const WorkerIndex index : touched) {
     if (workers.hungry().contains(index)) copy_overdue(workers.at(index));
   }
+}
+
+bool Farm::State::take_back_for_idle() {
+  for (const WorkerIndex index : touched) {
+    if (!workers.hungry().contains(index)) continue;
+    const Worker& idle = workers.at(index);
+    if (!idle.available() || idle.covered()) continue;
+    if (LeaseRecord* lease = longest_waiting_for(idle)) {
+      free_lease(lease->seq, "moved to an idle worker", true);
+      return true;
+    }
+  }
+  return false;
+}
+
+// Seconds until the worker begins the lease, if it has not begun it: it works through its leases in order.
+double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
+  const Worker& worker = *lease.worker;
+  std::uint32_t units = 0;
+  double before = 0;
+  for (const LeaseSeq seq : worker.leases) {
+    if (seq >= lease.seq) break;
+    const LeaseRecord& earlier = leases.all().at(seq);
+    units += earlier.remaining;
+    // As it is known now; when the first leases were made out, nothing was.
+    before += earlier.remaining * earlier.job->predict(earlier.units.front());
+  }
+  const bool waits = lease.reported == 0 && units >= static_cast<std::uint32_t>(worker.threads);
+  return waits ? before / worker.threads : 0;
+}
+
+LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
+  LeaseRecord* found = nullptr;
+  double longest = seconds(kTakeBackAfter);
+  std::uint32_t looked_at = 0;
+  for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
+    LeaseRecord& lease = it->second;
+    const Job& job = *lease.job;
+    // The idle one begins at once what it is given: it has the world, and nothing keeps it from the units.
+    if (lease.worker == &idle || !idle.warmed_up.contains(job.seq) || !may_serve(job, idle, ticked) ||
+        !job.leasable())
+      continue;
+    const bool barred = std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode code) {
+      return job.failures.failed_on(code, idle.index) || out_of_time(job, idle, code, now);
+    });
+    const double wait = barred ? 0 : waits_behind_others(lease);
+    if (wait > longest) found = &lease, longest = wait;
+  }
+  return found;
 }
 
 void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered) {

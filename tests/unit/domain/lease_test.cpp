@@ -292,6 +292,82 @@ TEST(Deadline, FollowsTheMeasuredCost) {
   EXPECT_GT(rig.worker("w").units_out, 0u);
 }
 
+// Two workers that know the job's cost; then "fast" has rendered all that it held, and nothing waits.
+void run_dry(Rig& rig, double cpu_seconds) {
+  rig.cpu_seconds = cpu_seconds;
+  rig.join("slow", 1);
+  rig.submit(plan_of("j", 8, 2));
+  rig.join("fast", 1);
+  rig.render("slow");
+  while (rig.worker("fast").units_out > 0 && rig.worker("slow").units_out > 1) rig.render("fast");
+}
+
+TEST(TakingBack, AnIdleWorkerGetsWhatHasNotBeenBegunElsewhere) {
+  Rig rig;
+  run_dry(rig, 1.0);
+  EXPECT_EQ(rig.worker("slow").units_out, 1u) << "what it is rendering stays";
+  while (rig.worker("fast").units_out > 0) rig.render("fast");
+  EXPECT_EQ(rig.worker("slow").units_out, 1u);
+  rig.render("slow");
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.job().units_done, 8u);
+}
+
+TEST(TakingBack, TheWorkerThatWaitedIsToldAndAResultThatComesAllTheSameCounts) {
+  Rig rig;
+  rig.cpu_seconds = 1;
+  rig.join("slow", 1);
+  rig.submit(plan_of("j", 4, 2));
+  rig.join("fast", 1);
+  rig.render("slow");
+  const auto waiting = rig.held[{"slow"}];
+  ASSERT_EQ(waiting.size(), 2u);
+  ASSERT_EQ(rig.held[{"fast"}].size(), 1u);
+
+  const auto moved = rig.render("fast");
+
+  const auto told = sent<CancelLease>(moved);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].first, WorkerId{"slow"});
+  EXPECT_EQ(told[0].second.lease, waiting[1].lease);
+  ASSERT_EQ(rig.held[{"fast"}].size(), 1u);
+  EXPECT_EQ(rig.held[{"fast"}][0].key(), waiting[1].key());
+
+  rig.result("slow", waiting[1]);  // it had begun it before it was told
+  EXPECT_EQ(rig.worker("fast").units_out, 0u);
+  rig.render("slow");
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
+  // "slow" holds three: the last waits for two others.
+  for (const auto& [share, stays] : {std::pair{.45, 3u}, {.55, 2u}}) {
+    Rig rig;
+    run_dry(rig, share * seconds(kTakeBackAfter));
+    if (stays == 3) {
+      EXPECT_EQ(rig.worker("fast").units_out, 0u);
+      EXPECT_EQ(rig.worker("slow").units_out, 3u);
+    } else {
+      while (rig.worker("fast").units_out > 0) rig.render("fast");
+      EXPECT_EQ(rig.worker("slow").units_out, 2u) << "the second waits for less than the limit";
+    }
+  }
+}
+
+TEST(TakingBack, AWorkerThatHasNotLoadedTheJobTakesNothing) {
+  Rig rig;
+  rig.cpu_seconds = 1;
+  rig.join("slow", 1);
+  rig.submit(plan_of("j", 4, 2));
+  rig.render("slow");
+  const auto waiting = rig.worker("slow").units_out;
+  ASSERT_GT(waiting, 1u);
+  rig.join("new", 1);
+  rig.pass(Duration{});
+  EXPECT_TRUE(rig.held[{"new"}].empty());
+  EXPECT_EQ(rig.worker("slow").units_out, waiting);
+}
+
 TEST(Speculation, AnIdleWorkerCopiesOverdueUnitsOnce) {
   Rig rig;
   rig.join("slow", 1);
