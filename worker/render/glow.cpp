@@ -12,8 +12,7 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// A stretch with an emission sample is at most this many voxels long, of either grid. In the thinnest grids of single
-// voxels, 4 of them would have 25 times the variance.
+// A stretch with an emission sample is at most this many voxels long, of either grid, where it matters.
 constexpr double kStretchVoxels = 1;
 
 // (1 - e^-x) / x, the mean of e^-t up to x.
@@ -70,8 +69,7 @@ class GlowWalk {
         stream_(stream),
         density_(*m.density, o, d, t_max),
         channels_(m.chromatic() ? 3 : 1),
-        s_max_(max_component(m.sigma_t)),
-        left_(stream_.exponential()) {
+        s_max_(max_component(m.sigma_t)) {
     if (m.emitter[0]) emitter_.emplace(*m.emitter[0], o, d, t_max);
   }
 
@@ -80,21 +78,13 @@ class GlowWalk {
       density_.advance(at);
       if (emitter_) emitter_->advance(at);
       if ((emitter_ && emitter_->past()) || (m_.glow != Glow::per_length && density_.past())) break;
-      double to = std::min(end_, density_.boundary(at));
-      if (emitter_) to = std::min(to, emitter_->boundary(at));
       const MacroCell* cell = density_.inside(at) ? &density_.cell() : nullptr;
       const bool absorbs = cell && s_max_ * cell->hi > 0, shines = may_shine(at, cell);
-      if (shines && absorbs) {
-        to = std::min(to, at + density_.longest());
-        if (emitter_) to = std::min(to, at + emitter_->longest());
-      }
-      if (!absorbs) {
-        if (shines) add_unabsorbed(at, to);
-      } else if (s_max_ * cell->residual * (to - at) > detail::kExactDepth) {
-        pass_exactly(at, to, shines);
-      } else {
-        track(at, to, *cell, shines);
-      }
+      const double to = end_of_stretch(at, absorbs && shines ? cell : nullptr);
+      if (absorbs)
+        add_absorbed(at, to, shines, cell->residual == 0);
+      else if (shines)
+        add_clear(at, to);
       if (!goes_on()) break;
       at = to;
     }
@@ -112,26 +102,31 @@ class GlowWalk {
     return m_.glow == Glow::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest : hi > 0;
   }
 
-  // Radiance given off per length at t.
-  V3d emitted(double t) const {
+  // `sampled`: the density's cell, where the stretch is to get an emission sample.
+  double end_of_stretch(double at, const MacroCell* sampled) const {
+    double to = std::min(end_, density_.boundary(at));
+    if (emitter_) to = std::min(to, emitter_->boundary(at));
+    if (!sampled) return to;
+    if (emitter_) to = std::min(to, at + emitter_->longest());
+    const bool varies = m_.glow == Glow::per_length ? sampled->residual > 0 : m_.albedo[0] != nullptr;
+    return varies ? std::min(to, at + density_.longest()) : to;
+  }
+
+  // What is given off at t: radiance per length, or a source's radiance.
+  V3d source(double t) const {
     V3d e(m_.emission);
-    if (emitter_) {
-      const V3 q = emitter_->index(t);
-      if (m_.glow == Glow::black_body)
-        e = e *
-            V3d(black_body_radiance(m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q)));
-      else
-        for (int c = 0; c < 3; ++c) e[c] *= m_.emitter[c]->value_anywhere(q);
-    }
-    if (m_.glow == Glow::per_length) return e;
-    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
-    const double rho = density_at(t);
-    for (int c = 0; c < 3; ++c) e[c] *= rho * std::max(0.f, m_.sigma_t[c] - scattering[c]);
+    if (!emitter_) return e;
+    const V3 q = emitter_->index(t);
+    if (m_.glow == Glow::black_body)
+      return e *
+             V3d(black_body_radiance(m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q)));
+    for (int c = 0; c < 3; ++c) e[c] *= m_.emitter[c]->value_anywhere(q);
     return e;
   }
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
+  double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
 
-  // The light e of channel c (or of all of them, where they are treated alike), times a share of it.
+  // A share of the light e of channel c, or of all of them where they have one extinction.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
       sum_ = sum_ + e * (through_[0] * share);
@@ -140,74 +135,69 @@ class GlowWalk {
     }
   }
 
-  // Only light per length is given off here. The integral of a grid is known; of one value, too.
-  void add_unabsorbed(double a, double b) {
-    V3d e(m_.emission);
+  // Only light per length is given off here, and the integral of a grid is known, as that of one value is.
+  void add_clear(double a, double b) {
+    double field = b - a;
     for (int c = 0; c < 3; ++c) {
-      const double field = !emitter_ ? b - a
-                           : c > 0 && m_.emitter[c] == m_.emitter[c - 1]
-                               ? sum_of_last_
-                               : emitter_->pass(*m_.emitter[c], a, b).integral;
-      sum_of_last_ = field;
+      if (emitter_ && (c == 0 || m_.emitter[c] != m_.emitter[c - 1]))
+        field = emitter_->pass(*m_.emitter[c], a, b).integral;
       // A dark channel stays dark, however far.
-      if (e[c] > 0) sum_[c] += e[c] * through_[channels_ == 1 ? 0 : c] * field;
+      if (m_.emission[c] > 0) sum_[c] += double{m_.emission[c]} * through_[channels_ == 1 ? 0 : c] * field;
     }
   }
 
-  void track(double a, double b, const MacroCell& cell, bool shines) {
-    const double h = b - a;
-    const float rate = s_max_ * cell.residual, room = rate * static_cast<float>(h);
-    double where[3], factor[3] = {1, 1, 1};
-    bool due[3] = {shines, shines && channels_ > 1, shines && channels_ > 1};
-    if (shines) {
-      const double u = stream_.uniform();
-      for (int c = 0; c < channels_; ++c)
-        where[c] = truncated_exponential(u, double{m_.sigma_t[c]} * cell.control, h);
-    }
-    float gone = left_;
-    for (;; gone += stream_.exponential()) {
-      const bool collides = gone < room;
-      const double t = collides ? std::min(h, double{gone} / rate) : h;
-      for (int c = 0; c < channels_; ++c) {
-        if (!due[c] || where[c] > t) continue;
-        due[c] = false;
-        const double k = double{m_.sigma_t[c]} * cell.control;
-        add(c, emitted(a + where[c]), factor[c] * h * mean_transmittance(k * h));
-      }
-      if (!collides) break;
-      const double r = (density_at(a + t) - cell.control) / cell.residual;
-      for (int c = 0; c < channels_; ++c) factor[c] *= std::max(0., 1 - r * m_.sigma_t[c] / s_max_);
-    }
-    left_ = gone - room;
-    for (int c = 0; c < channels_; ++c)
-      through_[c] *= factor[c] * std::exp(-double{m_.sigma_t[c]} * cell.control * h);
-  }
-
-  // Where trackers would collide too often: the field's own integral, and two samples weighed by the balance
-  // heuristic, one uniform and one where light is absorbed. So emission is found in the gaps of a dense cell,
-  // and at its surface.
-  void pass_exactly(double a, double b, bool shines) {
-    const double h = b - a, whole = density_.pass(*m_.density, a, b).integral;
+  void add_absorbed(double a, double b, bool shines, bool uniform) {
+    const double whole = depth(a, b);
     if (shines) {
       const double u = stream_.uniform(), v = stream_.uniform();
       for (int c = 0; c < channels_; ++c) {
-        const double s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
-        const auto add_at = [&](double t, double depth) {
-          const double rest = std::exp(-s * depth);
-          add(c, emitted(t), rest / (1 / h + (absorbed > 0 ? s * density_at(t) * rest / absorbed : 0)));
-        };
-        const double t = a + u * h;
-        add_at(t, density_.pass(*m_.density, a, t).integral);
-        if (!(absorbed > 0)) continue;
-        const double wanted = -std::log1p(-v * absorbed) / s;
-        const Passage p = density_.pass(*m_.density, a, b, wanted);
-        add_at(p.reached ? density_.distance(p.t) : b, p.reached ? wanted : whole);
+        if (m_.glow != Glow::per_length)
+          add_source(c, a, b, whole, u);
+        else if (uniform || m_.sigma_t[c] * whole < 1)
+          add_thin(c, a, b, whole, u);
+        else
+          add_thick(c, a, b, whole, u, v);
       }
     }
     for (int c = 0; c < channels_; ++c) through_[c] *= std::exp(-m_.sigma_t[c] * whole);
   }
 
-  // Roulette, as for transmittances.
+  // Where the light is absorbed that this channel loses on the stretch.
+  double absorption_point(double a, double b, double s, double absorbed, double u) const {
+    const Passage p = density_.pass(*m_.density, a, b, -std::log1p(-u * absorbed) / s);
+    return p.reached ? density_.distance(p.t) : b;
+  }
+
+  // Light per absorption, sampled by where light is absorbed: the density cancels out, and a source that is
+  // the same everywhere has no noise at all.
+  void add_source(int c, double a, double b, double whole, double u) {
+    const double s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
+    if (!(absorbed > 0)) return;
+    const double t = absorption_point(a, b, s, absorbed, u);
+    V3d e = source(t);
+    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
+    for (int k = 0; k < 3; ++k)
+      e[k] = m_.sigma_t[k] > 0 ? e[k] * std::max(0.f, m_.sigma_t[k] - scattering[k]) / m_.sigma_t[k] : 0;
+    add(c, e, absorbed);
+  }
+
+  // Light per length, sampled as if the density were the same all along: right where it is.
+  void add_thin(int c, double a, double b, double whole, double u) {
+    const double h = b - a, s = m_.sigma_t[c], k = s * whole / h, t = truncated_exponential(u, k, h);
+    add(c, source(a + t), h * mean_transmittance(k * h) * std::exp(k * t - s * depth(a, a + t)));
+  }
+
+  // Two samples weighed by the balance heuristic, one uniform and one where light is absorbed: so emission is
+  // found in the gaps of a dense cell, and at its surface.
+  void add_thick(int c, double a, double b, double whole, double u, double v) {
+    const double h = b - a, s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
+    for (const double t : {a + u * h, absorption_point(a, b, s, absorbed, v)}) {
+      const double rest = std::exp(-s * depth(a, t));
+      add(c, source(t), rest / (1 / h + s * density_at(t) * rest / absorbed));
+    }
+  }
+
+  // Russian roulette, as for transmittances.
   bool goes_on() {
     double largest = 0;
     for (int c = 0; c < channels_; ++c) largest = std::max(largest, through_[c]);
@@ -227,9 +217,7 @@ class GlowWalk {
   std::optional<Steps> emitter_;
   const int channels_;  // 1: all have the same extinction
   const float s_max_;
-  float left_;  // of the residuals' depth, up to the next collision
   double through_[3] = {1, 1, 1};
-  double sum_of_last_ = 0;
   V3d sum_{0, 0, 0};
 };
 

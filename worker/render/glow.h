@@ -3,9 +3,8 @@
 // collisions there), and as good in the dark of an opaque medium.
 //
 // A homogeneous medium has a closed form. A grid is walked by stretches that are short in voxels, each with
-// one emission sample per channel, placed by the light that the stretch's mean density lets through; the
-// transmittance up to each sample is that of residual ratio tracking (medium.h), one walk for all samples. A
-// sum of terms each of which is right on the average is right on the average.
+// its own exact optical depth (Grid::pass: no tracker's noise) and one emission sample per channel. A sum of
+// terms each of which is right on the average is right on the average.
 #pragma once
 
 #include "worker/render/medium.h"

@@ -135,7 +135,8 @@ TEST(Glow, OfAnIsothermalGridIsWhatItDoesNotLetThrough) {
       for (int c = 0; c < 3; ++c) {
         const double expected = kEmission[c] * -std::expm1(-sigma[c] * depth);
         EXPECT_NEAR(r.mean[c], expected, 5 * r.error[c] + 40 * 0x1p-23 * expected) << sigma << " " << c;
-        EXPECT_LE(r.error[c], .02 * expected) << sigma << " " << c;
+        // All the noise there is comes from roulette, where next to nothing is let through.
+        EXPECT_LE(r.error[c], 1e-4 * expected) << sigma << " " << c;
       }
     }
 }
