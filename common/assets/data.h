@@ -28,6 +28,7 @@ inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
+  bool face_normals = false;  // the file wants its triangles flat
   std::uint64_t dropped_triangles =
       0;  // of zero area or with a vertex that is not finite; none of them in indices
 

@@ -1,4 +1,4 @@
-// Wavefront OBJ and Stanford PLY. Polygons become fans of triangles from their first corner, as in Mitsuba.
+// Wavefront OBJ, Stanford PLY and Mitsuba's `.serialized`. Polygons become fans of triangles from their first corner, as in Mitsuba.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,11 @@ Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> fi
 // skipped over.
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
 
-// By the first bytes: "ply" is PLY, everything else OBJ.
-Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name);
+// Mitsuba's `.serialized`, versions 3 and 4: mesh number `index` of the file. Vertex colours are skipped over.
+bool is_serialized(std::span<const std::byte> file);
+Result<MeshData> decode_serialized(std::string_view name, std::span<const std::byte> file, int index);
+
+// By the first bytes: "ply" is PLY, 0x041C a `.serialized`, everything else OBJ. `index` counts only there.
+Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name, int index = 0);
 
 }  // namespace ls

@@ -172,7 +172,7 @@ void describe(V& v, T& f) {
           f.crop_offset[1]);
   v.field({.name = "crop_width",
            .doc = "of the part that is rendered, which is the image that is written; the whole frame if it "
-                  "is not given",
+                  "is not given. A size that a job asks for is that of this part",
            .unit = "pixels",
            .range = {0, kMaxFrameSide}},
           f.crop_size.width);

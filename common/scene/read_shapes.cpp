@@ -83,10 +83,13 @@ template <class T>
 void Reader::read_geometry(const Element& e, T geometry) {
   Params p(*this, e);
   if constexpr (std::is_same_v<T, MeshShape>) {
-    if (geometry.format != MeshFormat::serialized && p.has("shape_index"))
-      report_.error(p.take("shape_index")->at, fmt::format("{} has one mesh: 'shape_index' is for those of a "
-                                                           "\"serialized\" file",
-                                                           p.title()));
+    const bool serialized = geometry.format == MeshFormat::serialized;
+    const std::string_view foreign = serialized ? "flip_tex_coords" : "shape_index";
+    if (const Element* given = p.take(foreign))
+      report_.error(given->at, fmt::format("{} has no parameter '{}': {}", p.title(), foreign,
+                                           serialized ? "its v is never turned"
+                                                      : "it is for \"serialized\" files, "
+                                                        "which may hold several meshes"));
   }
   bind(p, geometry);
   Shape shape;
@@ -150,8 +153,15 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
   }
   Params p(*this, e);
   AreaEmitter area;
+  const bool has_beam = p.has("beam_width"), has_cutoff = p.has("cutoff_angle");
+  if (p.has("falloff") && !has_beam && !has_cutoff)
+    report_.error(e.at, "'falloff' of emitter \"area\" lies between beam_width and cutoff_angle: give them");
   bind(p, area);
+  if (has_cutoff && !has_beam) area.beam_width = area.cutoff_angle * 3 / 4;
   p.finish();
+  if (area.beam_width > area.cutoff_angle)
+    report_.error(
+        e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", area.beam_width, area.cutoff_angle));
   return area;
 }
 

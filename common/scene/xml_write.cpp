@@ -217,6 +217,16 @@ class Writer {
   static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
   static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
 
+  // Of a mesh, what its plugin knows.
+  struct GeometryFields {
+    Writer& writer;
+    const Geometry& geometry;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      const auto* mesh = std::get_if<MeshShape>(&geometry);
+      if (!mesh || mesh->format != MeshFormat::serialized || f.name != "flip_tex_coords") writer.field(f, x);
+    }
+  };
   // The shapes of a group stand together.
   void write_shapes() {
     std::optional<GroupIndex> group;
@@ -236,7 +246,8 @@ class Writer {
     std::visit(
         [&](const auto& geometry) {
           open("shape", plugin(geometry), "", "");
-          describe(*this, geometry);
+          GeometryFields fields{*this, shape.geometry};
+          describe(fields, geometry);
         },
         shape.geometry);
     describe(*this, shape);

@@ -185,10 +185,6 @@ INSTANTIATE_TEST_SUITE_P(
              "<sensor type=\"perspective\"><sampler type=\"independent\"><integer name=\"sample_count\" "
              "value=\"9999999999\"/></sampler></sensor>",
              92, "sample_count"},
-        Case{"Cropped",
-             "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"crop_width\" "
-             "value=\"5\"/></film></sensor>",
-             83, "part of the frame"},
         Case{"ThinLensWithoutAperture", "<sensor type=\"thinlens\"/>", 2, "needs 'aperture_radius'"},
         Case{"SecondSceneElement", "<scene version=\"3.0.0\"/>", 2, "can't stand in"},
         Case{"TextInside", shape("hello"), 2, "text inside <shape>"},

@@ -48,9 +48,9 @@ TEST(SceneJson, IsEqualForEqualScenes) {
 
 TEST(SceneJson, HasSortedKeysAndNoBlanks) {
   const std::string json = serialize(must_read(with_sensor("")));
-  EXPECT_THAT(
-      json,
-      HasSubstr("\"film\":{\"filter\":{\"stddev\":0.5,\"type\":\"gaussian\"},\"height\":8,\"width\":8}"));
+  EXPECT_THAT(json,
+              HasSubstr("\"film\":{\"crop_height\":0,\"crop_offset_x\":0,\"crop_offset_y\":0,\"crop_width\":"
+                        "0,\"filter\":{\"stddev\":0.5,\"type\":\"gaussian\"},\"height\":8,\"width\":8}"));
   EXPECT_EQ(json.find(' '), std::string::npos);
 }
 
