@@ -151,8 +151,8 @@ TEST(Nvdb, RefusesDamage) {
               HasSubstr("voxel (-4096, 0, 8192) of grid 'density' is not a finite"));
   EXPECT_THAT(with(0, 'X'), HasSubstr("begins with something else"));
   EXPECT_THAT(with(32, std::uint64_t{5}), HasSubstr("its sizes contradict each other"));
-  EXPECT_THAT(with(672 + 24, ~std::uint64_t{0}), HasSubstr("damaged"));
-  EXPECT_THAT(with(NvdbKit::kRoot + 24, ~std::uint32_t{0}), HasSubstr("damaged"));
+  EXPECT_THAT(with(672 + 24, ~std::uint64_t{0}), HasSubstr("its tree lies before it"));
+  EXPECT_THAT(with(672 + 24, std::uint64_t{1} << 40), HasSubstr("damaged"));
   EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{1} << 62), HasSubstr("damaged"));
   EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{-8}), HasSubstr("points backwards"));
   EXPECT_THAT(with(kit.lower() + 1088, std::int64_t{1} << 40), HasSubstr("damaged"));
