@@ -218,7 +218,10 @@ std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report
   } else if (const auto c = Reader(o, report).coefficients()) {
     out = homogeneous(*c, o.number("scale", 1), e.at);
   }
-  if (!out) return std::nullopt;
+  if (!out) {
+    o.finish_refused();
+    return std::nullopt;
+  }
   add_phase(*out, o, report);
   add_light(*out, o);
   o.finish();

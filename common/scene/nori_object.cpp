@@ -185,6 +185,18 @@ void Object::finish() {
     if (!c.taken && !report_.full()) left_over(c);
 }
 
+bool Object::knows(std::string_view parameter) const {
+  return std::any_of(plugin_.parameters.begin(), plugin_.parameters.end(),
+                     [&](const Parameter& p) { return p.name == parameter; });
+}
+
+void Object::finish_refused() {
+  for (const Child& c : children_) {
+    const std::string_view name = c.e->get("name");
+    if (!c.taken && !name.empty() && !knows(name) && !report_.full()) left_over(c);
+  }
+}
+
 void Object::left_over(const Child& c) {
   const std::string_view name = c.e->get("name");
   std::vector<std::string> names;

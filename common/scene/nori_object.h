@@ -44,6 +44,8 @@ class Object {
   std::vector<const Element*> nested(std::string_view tag);
   const Element* only(std::string_view tag);  // a second one is reported
   void finish();
+  // Of an object that was refused: only what is unknown.
+  void finish_refused();
 
  private:
   struct Child {
@@ -52,6 +54,7 @@ class Object {
   };
   bool fits(const Parameter& p, const Element& e);
   bool in_range(const Parameter& p, const Element& e, const std::vector<double>& values);
+  bool knows(std::string_view parameter) const;
   void left_over(const Child& c);
 
   const Element& e_;

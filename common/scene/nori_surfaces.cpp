@@ -157,6 +157,19 @@ Element metal(Object& o, const Mesh& mesh, Report& report) {
   return out;
 }
 
+Element principled(Object& o, const Mesh& mesh, Report& report) {
+  Element out = bsdf_of("principled", o.element());
+  for (const char* name : {"base_color", "roughness"})
+    if (o.has(name)) add_texture(out, o, name, name, .5, mesh, report);
+  const bool glass = o.has("spec_trans");
+  for (const char* name : {"anisotropic", "clearcoat", "clearcoat_gloss", "flatness", "metallic", "sheen",
+                           "sheen_tint", "spec_tint", "spec_trans"})
+    add_as(out, o.take(name), name);
+  const double specular = o.number("specular", .5);
+  add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);  // Kombu's
+  return out;
+}
+
 std::optional<Element> bsdf_in_words(Object& o, const Mesh& mesh, Report& report) {
   const std::string_view type = o.type();
   const Element& e = o.element();
@@ -169,6 +182,7 @@ std::optional<Element> bsdf_in_words(Object& o, const Mesh& mesh, Report& report
   if (type == "dielectric") return dielectric(o);
   if (type == "microfacet" || type == "microfacet_tex") return microfacet(o, mesh, report);
   if (type == "conductor" || type == "roughconductor") return metal(o, mesh, report);
+  if (type == "principled") return principled(o, mesh, report);
   return bsdf_of("null", e);  // transparent, null
 }
 

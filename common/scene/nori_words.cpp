@@ -11,7 +11,6 @@ constexpr unsigned kNumber = kFloat | kInteger;
 constexpr unsigned kAnyColor = kColor | kFloat;
 constexpr unsigned kTriple = kPoint | kVector;
 constexpr std::string_view kSampling = "it only steers sampling, which is chosen here";
-constexpr std::string_view kPhotons = "no photons are shot: the exact answer is rendered";
 
 const Parameter kToWorld{"toWorld", kTransform, "identity", "places it"};
 const Parameter kIntIor{"intIOR", kNumber, "1.5046", "index of refraction inside", kPositive};
@@ -102,6 +101,21 @@ std::vector<Parameter> parallel_light() {
            {.min = 0, .max = 90}}};
 }
 
+// Kombu's, which is Mitsuba's.
+std::vector<Parameter> principled() {
+  std::vector<Parameter> p{
+      {"base_color", kAnyColor | kTexture, "0.5", "the colour", kUnit},
+      {"roughness", kNumber | kTexture, "0.5", "its square is GGX's alpha", kUnit},
+      {"specular", kNumber, "0.5", "gives the index of refraction, as in Mitsuba", kUnit}};
+  for (const std::string_view name : {"anisotropic", "clearcoat", "clearcoat_gloss", "flatness", "metallic",
+                                      "sheen", "sheen_tint", "spec_tint", "spec_trans"})
+    p.push_back({name, kNumber, "0", "as in Mitsuba", kUnit});
+  for (const std::string_view name :
+       {"main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate"})
+    p.push_back({name, kNumber, "", "", kAny, kSampling});
+  return p;
+}
+
 std::vector<Plugin> surfaces() {
   const Parameter albedo{"albedo", kAnyColor | kTexture, "0.5", "the share of light reflected", kUnit};
   return {
@@ -118,6 +132,7 @@ std::vector<Plugin> surfaces() {
       {"bsdf", "microfacet_tex", "as `microfacet`, with a texture in the place of kd",
        microfacet(kAnyColor | kTexture)},
       {"bsdf", "conductor", "`conductor`", metal(false)},
+      {"bsdf", "principled", "`principled`", principled()},
       {"bsdf", "roughconductor", "`roughconductor`", metal(true)},
       {"texture", "constant_color", "a colour", {{"value", kAnyColor, "0", "the colour", kNonNegative}}},
       {"texture",
@@ -254,9 +269,8 @@ constexpr Refused kRefused[] = {
     {"integrator", "path_mis_testenvmap", "it is a test of its authors' own; choose path_mis"},
     {"mesh", "instance", "instances of Kombu are not read; write the mesh again where it stands"},
     {"mesh", "reference", "instances of Kombu are not read; write the mesh where it stands"},
-    {"bsdf", "principled", "its parameters are read in files of Mitsuba alone"},
     {"bsdf", "disneyglass", "it is not known here; choose dielectric"},
-    {"bsdf", "blend", "blends are read in files of Mitsuba alone (blendbsdf)"},
+    {"bsdf", "blendbsdf", "blends are read in files of Mitsuba alone"},
     {"bsdf", "bumpmap", "bump maps are not read in files of Nori"},
     {"bsdf", "emissive", "put an <emitter type=\"area\"> into the mesh instead"},
     {"emitter", "environment", "write it as an emitter \"envmap\" with a filename"},
