@@ -18,6 +18,9 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
                                [](const NormalMapBsdf& b) {
                                  return Nested{b.bsdf, std::nullopt};
                                },
+                               [](const BumpMapBsdf& b) {
+                                 return Nested{b.bsdf, std::nullopt};
+                               },
                                [](const BlendBsdf& b) {
                                  return Nested{b.first, b.second};
                                },
@@ -37,7 +40,9 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
   t.two_sided = std::holds_alternative<TwoSidedBsdf>(bsdf);
   t.passes = t.passes || std::holds_alternative<NullBsdf>(bsdf) || std::holds_alternative<MaskBsdf>(bsdf) ||
              std::holds_alternative<ThinDielectricBsdf>(bsdf);
-  t.transmits = t.transmits || t.passes || std::holds_alternative<DielectricBsdf>(bsdf) ||
+  const auto* principled = std::get_if<PrincipledBsdf>(&bsdf);
+  t.transmits = t.transmits || t.passes || (principled && principled->spec_trans) ||
+                std::holds_alternative<DielectricBsdf>(bsdf) ||
                 std::holds_alternative<RoughDielectricBsdf>(bsdf);
   return t;
 }

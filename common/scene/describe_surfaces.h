@@ -136,6 +136,16 @@ void describe(V& v, T& b) {
           b.second);
 }
 
+template <class V, class T>
+void describe_map(V& v, T& b) {
+  v.field(
+      {.name = "flip_invalid_normals",
+       .doc = "turn normals that face away from the viewer to the other side; false in files of version 0.x"},
+      b.flip_invalid_normals);
+  v.field({.name = "use_shadowing_function",
+           .doc = "let steep places cast shadows, so that light ends softly; false in files of version 0.x"},
+          b.use_shadowing_function);
+}
 template <class V, Of<NormalMapBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "normalmap",
@@ -144,6 +154,48 @@ void describe(V& v, T& b) {
            .fallback = {.5, .5, 1}},
           b.normalmap);
   v.field({.name = "bsdf", .doc = "that sees them", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  describe_map(v, b);
+}
+
+template <class V, Of<BumpMapBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "texture", .doc = "heights, a `bitmap`", .fallback = {0, 0, 0}}, b.texture);
+  v.field({.name = "scale", .doc = "multiplies the heights", .unit = "length"}, b.scale);
+  v.field({.name = "bsdf", .doc = "that sees the slopes", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  describe_map(v, b);
+}
+template <class V, Of<PrincipledBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "base_color", .doc = "the colour", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.base_color);
+  v.field({.name = "roughness", .doc = "its square is GGX's alpha", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.roughness);
+  v.field(
+      {.name = "anisotropic", .doc = "stretches highlights along u", .range = kUnit, .fallback = {0, 0, 0}},
+      b.anisotropic);
+  v.field({.name = "metallic", .doc = "share of metal", .range = kUnit, .fallback = {0, 0, 0}}, b.metallic);
+  v.field({.name = "spec_trans",
+           .doc = "share of glass in what is not metal; not given, or 0, it has one side",
+           .range = kUnit},
+          b.spec_trans);
+  v.field({.name = "eta", .doc = "index of refraction inside over that outside", .range = kPositive}, b.eta);
+  v.field({.name = "spec_tint",
+           .doc = "how far the colour tints the reflection",
+           .range = kUnit,
+           .fallback = {0, 0, 0}},
+          b.spec_tint);
+  v.field({.name = "sheen", .doc = "of cloth, at grazing angles", .range = kUnit, .fallback = {0, 0, 0}},
+          b.sheen);
+  v.field({.name = "sheen_tint", .doc = "how far the colour tints it", .range = kUnit, .fallback = {0, 0, 0}},
+          b.sheen_tint);
+  v.field({.name = "flatness",
+           .doc = "from diffuse to an imitation of light that scatters below",
+           .range = kUnit,
+           .fallback = {0, 0, 0}},
+          b.flatness);
+  v.field({.name = "clearcoat", .doc = "of a thin coat", .range = kUnit, .fallback = {0, 0, 0}}, b.clearcoat);
+  v.field({.name = "clearcoat_gloss", .doc = "of the coat", .range = kUnit, .fallback = {0, 0, 0}},
+          b.clearcoat_gloss);
 }
 
 }  // namespace ls::scene

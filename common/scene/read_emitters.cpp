@@ -13,6 +13,7 @@ void Reader::read_emitter(const Element& e) {
   if (type == "point") return read_point(e);
   if (type == "spot") return read_spot(e);
   if (type == "envmap") return read_envmap(e);
+  if (type == "projector") return read_projector(e);
   if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
   if (type != "constant") return unknown_plugin(e, report_);
   Params p(*this, e);
@@ -60,6 +61,23 @@ void Reader::read_point(const Element& e) {
   bind(p, emitter);
   if (const auto t = p.take_transform("to_world")) emitter.position = transform_point(*t, {0, 0, 0});
   p.finish();
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_projector(const Element& e) {
+  Params p(*this, e);
+  ProjectorEmitter emitter;
+  Sensor lens;  // a projector's field of view is given as a camera's
+  read_fov(p, lens);
+  emitter.fov = lens.fov;
+  emitter.fov_axis = lens.fov_axis;
+  if (!p.has("irradiance")) report_.error(e.at, "emitter \"projector\" needs 'irradiance': what it projects");
+  bind(p, emitter);
+  p.finish();
+  if (!is_rigid(emitter.to_world))
+    report_.error(e.at,
+                  "to_world of a projector may only move, turn and mirror: this one scales or shears; leave "
+                  "its <scale> out and give `scale` for brightness and `fov` for the image's size");
   scene_.emitters.emplace_back(emitter);
 }
 

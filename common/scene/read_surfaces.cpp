@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/scene/bsdf_traits.h"
 #include "common/scene/known.h"
@@ -20,6 +21,7 @@ std::optional<TextureIndex> Reader::read_texture(const Element& e) {
   if (type == "srgb") return read_uniform_texture(e, "color");
   if (type == "bitmap" && e.tag == "texture") return read_plain_texture<BitmapTexture>(e);
   if (type == "checkerboard" && e.tag == "texture") return read_plain_texture<CheckerboardTexture>(e);
+  if (type == "peak" && e.tag == "texture") return read_plain_texture<PeakTexture>(e);
   unknown_plugin(e, report_);
   return std::nullopt;
 }
@@ -74,6 +76,8 @@ std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
   if (type == "mask") return read_mask(e);
   if (type == "blendbsdf") return read_blend(e);
   if (type == "normalmap") return read_normal_map(e);
+  if (type == "bumpmap") return read_bump_map(e);
+  if (type == "principled") return read_principled(e);
   unknown_plugin(e, report_);
   return std::nullopt;
 }
@@ -107,6 +111,8 @@ std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
   Params p(*this, e);
   T b;
   bind_with_alpha(p, b, report_);
+  b.alpha_u = old_number(e, b.alpha_u);
+  b.alpha_v = old_number(e, b.alpha_v);
   p.finish();
   return add_bsdf(e, b);
 }
@@ -117,10 +123,13 @@ std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
   Params p(*this, e);
   T b;
   read_metal_preset(p, b.eta, b.k);
-  if constexpr (std::is_same_v<T, RoughConductorBsdf>)
+  if constexpr (std::is_same_v<T, RoughConductorBsdf>) {
     bind_with_alpha(p, b, report_);
-  else
+    b.alpha_u = old_number(e, b.alpha_u);
+    b.alpha_v = old_number(e, b.alpha_v);
+  } else {
     bind(p, b);
+  }
   p.finish();
   return add_bsdf(e, b);
 }
@@ -183,10 +192,26 @@ std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
   return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
 }
 
+// In files of version 0.x a checkerboard shows the same squares as a number and as a colour (see scene.h): as
+// a number it is another one, of the colours the other way round.
+TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
+  if (!e.old || t.value >= scene_.textures.size()) return t;
+  const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);
+  if (!given) return t;
+  if (const auto it = old_numbers_.find(t); it != old_numbers_.end()) return it->second;
+  const CheckerboardTexture as_colour = *given;  // the list grows
+  // What a texture contains has been read within kMaxReferenceDepth: so deep this goes.
+  const CheckerboardTexture swapped{old_number(e, as_colour.color1), old_number(e, as_colour.color0),
+                                    as_colour.to_uv};
+  scene_.textures.emplace_back(swapped);
+  return old_numbers_[t] = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+}
+
 std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
   Params p(*this, e);
   MaskBsdf b;
   bind(p, b);
+  b.opacity = old_number(e, b.opacity);
   // A mask in error may come without any texture.
   const bool known = b.opacity.value < scene_.textures.size();
   if (const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr) {
@@ -205,6 +230,7 @@ std::optional<BsdfIndex> Reader::read_blend(const Element& e) {
   Params p(*this, e);
   BlendBsdf b;
   bind(p, b);
+  b.weight = old_number(e, b.weight);
   const auto inner = read_inner_bsdfs(p, 2, 2);
   if (!inner) return std::nullopt;
   b.first = inner->front();
@@ -219,6 +245,54 @@ std::optional<BsdfIndex> Reader::read_normal_map(const Element& e) {
   const auto inner = read_inner_bsdfs(p, 1, 1);
   if (!inner) return std::nullopt;
   b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_bump_map(const Element& e) {
+  Params p(*this, e);
+  BumpMapBsdf b;
+  if (!read_heights(p, b)) return std::nullopt;
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+// The texture stands inside under any name, or none.
+bool Reader::read_heights(Params& p, BumpMapBsdf& b) {
+  const bool named = p.has("texture");
+  bind(p, b);
+  const auto nested = named ? std::vector<Params::Nested>{} : p.take_nested("texture");
+  if (nested.size() > 1)
+    return report_.error(nested[1].use->at, fmt::format("{} has a second texture", p.title())), false;
+  if (!nested.empty()) {
+    const auto index = texture(*nested[0].object, *nested[0].use);
+    if (!index) return false;
+    b.texture = *index;
+  }
+  // Of a texture in error nothing is known.
+  if (b.texture.value >= scene_.textures.size()) return false;
+  if (std::holds_alternative<BitmapTexture>(scene_.textures[b.texture.value])) return true;
+  report_.error(p.object().at,
+                fmt::format("{} needs a texture \"bitmap\": others have no slopes", p.title()));
+  return false;
+}
+
+std::optional<BsdfIndex> Reader::read_principled(const Element& e) {
+  Params p(*this, e);
+  PrincipledBsdf b;
+  if (p.has("eta") && p.has("specular"))
+    report_.error(e.at, "bsdf \"principled\" gives both eta and specular; each follows from the other");
+  bind(p, b);
+  if (const Element* given = p.take("specular")) {
+    double specular = .5;
+    p.convert({.name = "specular", .doc = "", .range = kUnit}, *given, specular);
+    b.eta = 2 / (1 - std::sqrt(.08 * specular)) - 1;
+  }
+  p.finish();
+  if (b.spec_trans && b.spec_trans->value < scene_.textures.size())
+    if (const auto* share = std::get_if<ConstantTexture>(&scene_.textures[b.spec_trans->value]))
+      if (share->value == Rgb{0, 0, 0}) b.spec_trans.reset();
   return add_bsdf(e, b);
 }
 

@@ -64,9 +64,13 @@ class Reader {
   template <class T>
   std::optional<BsdfIndex> read_rough(const Element& e);
   std::optional<BsdfIndex> read_twosided(const Element& e);
+  TextureIndex old_number(const Element& e, TextureIndex t);
   std::optional<BsdfIndex> read_mask(const Element& e);
   std::optional<BsdfIndex> read_blend(const Element& e);
   std::optional<BsdfIndex> read_normal_map(const Element& e);
+  std::optional<BsdfIndex> read_bump_map(const Element& e);
+  bool read_heights(Params& p, BumpMapBsdf& b);
+  std::optional<BsdfIndex> read_principled(const Element& e);
   std::optional<std::vector<BsdfIndex>> read_inner_bsdfs(Params& p, std::size_t at_least,
                                                          std::size_t at_most);
   std::optional<BsdfIndex> add_bsdf(const Element& e, const Bsdf& bsdf);
@@ -92,6 +96,7 @@ class Reader {
   void read_directional(const Element& e);
   void read_point(const Element& e);
   void read_spot(const Element& e);
+  void read_projector(const Element& e);
   void read_envmap(const Element& e);
   void check_only_environment(const Element& e);
 
@@ -122,6 +127,7 @@ class Reader {
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
   std::vector<BsdfTraits> bsdf_traits_;                // of the first bsdfs of scene_
 
+  std::map<TextureIndex, TextureIndex> old_numbers_;   // by the textures as they were read
   Memo<TextureIndex> textures_;
   Memo<BsdfIndex> bsdfs_;
   Memo<VolumeIndex> volumes_;

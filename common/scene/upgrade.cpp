@@ -158,6 +158,10 @@ void upgrade_object(Element& e) {
   if (e.tag == "bsdf" && (type == "conductor" || type == "roughconductor") && !child(e, "eta") &&
       !child(e, "k"))
     add_default(e, "string", "material", "Cu");
+  if (e.tag == "bsdf" && (type == "normalmap" || type == "bumpmap")) {
+    add_default(e, "boolean", "flip_invalid_normals", "false");
+    add_default(e, "boolean", "use_shadowing_function", "false");
+  }
   if (e.tag == "volume" && type == "gridvolume") {
     add_default(e, "boolean", "use_grid_bbox", "true");
     add_default(e, "boolean", "node_centred", "true");

@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/scene/bsdf_traits.h"
 #include "common/scene/limits.h"
+#include "common/scene/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -121,6 +124,14 @@ TEST(Surfaces, ANormalMapHoldsImageAndBsdf) {
   const auto& n = at<NormalMapBsdf>(s, bsdf_of<TwoSidedBsdf>(s).front);
   EXPECT_TRUE(std::get<BitmapTexture>(s.textures.at(n.normalmap.value)).raw);
   at<PlasticBsdf>(s, n.bsdf);
+  EXPECT_TRUE(n.flip_invalid_normals && n.use_shadowing_function);
+  const Scene plain = with_bsdf(
+      "<bsdf type=\"normalmap\"><rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf type=\"diffuse\"/>"
+      "<boolean name=\"flip_invalid_normals\" value=\"false\"/><boolean name=\"use_shadowing_function\" "
+      "value=\"false\"/></bsdf>");
+  EXPECT_FALSE(bsdf_of<NormalMapBsdf>(plain).flip_invalid_normals);
+  EXPECT_FALSE(bsdf_of<NormalMapBsdf>(plain).use_shadowing_function);
+  EXPECT_EQ(must_read(write_xml(plain)), plain);
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
 
@@ -155,6 +166,64 @@ TEST(Surfaces, TraitsFollowFromWhatIsContained) {
   EXPECT_EQ((*traits)[3], (scene::BsdfTraits{3, true, true, false}));
   EXPECT_EQ((*traits)[4], (scene::BsdfTraits{2, false, false, true}));
   EXPECT_EQ((*traits)[5], (scene::BsdfTraits{1, true, true, false}));
+}
+
+// Mitsuba 3's defaults, and its relation of specular and eta.
+TEST(Surfaces, PrincipledHasMitsubasDefaults) {
+  const Scene plain = with_bsdf("<bsdf type=\"principled\"/>");
+  const auto& p = bsdf_of<PrincipledBsdf>(plain);
+  EXPECT_EQ(p.eta, 1.5);
+  EXPECT_EQ(colour(plain, p.base_color), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(colour(plain, p.roughness), (Rgb{.5, .5, .5}));
+  for (const TextureIndex none : {p.anisotropic, p.metallic, p.spec_tint, p.sheen, p.sheen_tint, p.flatness,
+                                  p.clearcoat, p.clearcoat_gloss})
+    EXPECT_EQ(colour(plain, none), (Rgb{0, 0, 0}));
+  EXPECT_FALSE(p.spec_trans);
+  const Scene given = with_bsdf(
+      "<bsdf type=\"principled\"><float name=\"specular\" value=\".8\"/><float name=\"spec_trans\" "
+      "value=\".25\"/><float name=\"main_specular_sampling_rate\" value=\"2\"/></bsdf>");
+  const auto& g = bsdf_of<PrincipledBsdf>(given);
+  EXPECT_DOUBLE_EQ(g.eta, 2 / (1 - std::sqrt(.08 * .8)) - 1);
+  EXPECT_EQ(colour(given, g.spec_trans.value()), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(deserialize_scene(serialize(given)).value(), given);
+  EXPECT_THAT(error_of("<bsdf type=\"principled\"><float name=\"eta\" value=\"1.3\"/><float "
+                       "name=\"specular\" value=\".5\"/></bsdf>"),
+              HasSubstr("gives both eta and specular"));
+}
+
+TEST(Surfaces, PrincipledIsTwoSidedOnlyByItsGlass) {
+  EXPECT_EQ(error_of("<bsdf type=\"twosided\"><bsdf type=\"principled\"><float name=\"spec_trans\" "
+                     "value=\"0\"/></bsdf></bsdf>"),
+            "");
+  EXPECT_THAT(error_of("<bsdf type=\"twosided\"><bsdf type=\"principled\"><float name=\"spec_trans\" "
+                       "value=\".1\"/></bsdf></bsdf>"),
+              HasSubstr("has two sides of its own"));
+}
+
+TEST(Surfaces, ABumpMapTakesItsTextureUnderAnyName) {
+  const std::string image =
+      "<string name=\"filename\" value=\"wood.png\"/><boolean name=\"raw\" value=\"true\"/></texture>";
+  for (const char* name : {"", " name=\"texture\"", " name=\"arbitrary\""}) {
+    const Scene s = with_bsdf(fmt::format(
+        "<bsdf type=\"bumpmap\"><texture type=\"bitmap\"{}>{}<float name=\"scale\" value=\"3\"/>{}</bsdf>",
+        name, image, kDiffuse));
+    const auto& b = bsdf_of<BumpMapBsdf>(s);
+    EXPECT_EQ(b.scale, 3);
+    EXPECT_TRUE(std::get<BitmapTexture>(s.textures.at(b.texture.value)).raw);
+    EXPECT_TRUE(std::holds_alternative<DiffuseBsdf>(s.bsdfs.at(b.bsdf.value)));
+    EXPECT_EQ(must_read(write_xml(s)), s);
+  }
+}
+
+TEST(Surfaces, ABumpMapNeedsABitmapAndOneBsdf) {
+  EXPECT_THAT(error_of(fmt::format("<bsdf type=\"bumpmap\">{}</bsdf>", kDiffuse)),
+              HasSubstr("needs a texture \"bitmap\""));
+  EXPECT_THAT(
+      error_of(fmt::format("<bsdf type=\"bumpmap\"><texture type=\"checkerboard\"/>{}</bsdf>", kDiffuse)),
+      HasSubstr("needs a texture \"bitmap\""));
+  EXPECT_THAT(error_of("<bsdf type=\"bumpmap\"><texture type=\"bitmap\"><string name=\"filename\" "
+                       "value=\"wood.png\"/></texture></bsdf>"),
+              HasSubstr("needs one nested bsdf"));
 }
 
 }  // namespace
