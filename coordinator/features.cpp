@@ -19,6 +19,15 @@ bool has_chromatic_media(const Scene& scene) {
   });
 }
 
+bool has_glowing_media(const Scene& scene) {
+  return std::any_of(scene.media.begin(), scene.media.end(), [](const Medium& medium) {
+    if (const auto* m = std::get_if<HomogeneousMedium>(&medium))
+      return m->emission != Rgb{} || m->source_radiance != Rgb{};
+    const auto& m = std::get<HeterogeneousMedium>(medium);
+    return m.emission || m.source_radiance || m.temperature;
+  });
+}
+
 bool has_meshes(const Scene& scene) {
   return std::any_of(scene.shapes.begin(), scene.shapes.end(),
                      [](const Shape& s) { return std::holds_alternative<MeshShape>(s.geometry); });
@@ -38,13 +47,16 @@ SceneFeatures features_of(const Scene& scene) {
   };
   say("surfaces", !scene.shapes.empty());
   say("meshes", has_meshes(scene));
+  say("instances of groups", !scene.instances.empty());
   say("homogeneous media", any<HomogeneousMedium>(scene.media));
   say("heterogeneous media", any<HeterogeneousMedium>(scene.media));
   say("chromatic extinction", has_chromatic_media(scene));
+  say("light given off by media", has_glowing_media(scene));
   say("volume grids", any<GridVolume>(scene.volumes));
   say("anisotropic phase functions", any<HgPhase>(scene.phases));
   say("camera inside a medium", scene.sensor.medium.has_value());
   say("thin lens", scene.sensor.aperture_radius > 0);
+  say("crop of the frame", scene.film.has_crop());
   say("bitmap textures", any<BitmapTexture>(scene.textures));
   say("dielectrics", any<DielectricBsdf>(scene.bsdfs) || any<RoughDielectricBsdf>(scene.bsdfs));
   say("rough surfaces", any<RoughConductorBsdf>(scene.bsdfs) || any<RoughPlasticBsdf>(scene.bsdfs) ||

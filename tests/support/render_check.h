@@ -17,7 +17,7 @@ namespace ls::test {
 
 inline RenderSettings settings_of(const Scene& s, std::uint64_t seed = 0) {
   RenderSettings r;
-  r.size = s.film.size;
+  r.size = s.film.image_size();
   r.seed = seed;
   r.integrator = s.integrator.name;
   r.max_depth = s.integrator.max_depth;
@@ -45,7 +45,7 @@ inline std::shared_ptr<const render::World> world_of(const SceneKit& kit, std::u
 
 inline Estimate estimate(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed = 0, int threads = 2) {
   const auto world = world_of(kit, seed, threads);
-  const FrameSize size = kit.scene.film.size;
+  const FrameSize size = kit.scene.film.image_size();
   const auto rows = static_cast<std::size_t>(size.height);
   std::vector<render::TileResult> results(rows);
   std::atomic<std::size_t> next{0};

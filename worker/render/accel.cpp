@@ -7,32 +7,51 @@
 #include <bit>
 #include <cstddef>
 #include <cstring>
+#include <deque>
 #include <limits>
+#include <optional>
 
 namespace ls::render {
 namespace {
 
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
 
-// Spheres and disks are user geometries: their intersection is our own double-precision code.
+// All but triangles are user geometries: their intersection is our own double-precision code.
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
 };
 
-V3d bounds_radius(const Sphere& s) { return V3d(s.radius); }
-V3d bounds_radius(const Disk& s) {
+struct Box {
+  V3d lo, hi;
+};
+Box box_of(const Sphere& s) { return {s.center - V3d(s.radius), s.center + V3d(s.radius)}; }
+V3d reach(const V3d& u, const V3d& v) {  // of the ellipse u cos a + v sin a
   V3d r;
-  for (int k = 0; k < 3; ++k) r[k] = std::sqrt(s.u[k] * s.u[k] + s.v[k] * s.v[k]);
+  for (int k = 0; k < 3; ++k) r[k] = std::sqrt(u[k] * u[k] + v[k] * v[k]);
   return r;
+}
+Box box_of(const Disk& s) {
+  const V3d r = reach(s.u, s.v);
+  return {s.center - r, s.center + r};
+}
+Box box_of(const Cylinder& s) {
+  const V3d r = reach(s.u, s.v) * s.radius, end = s.p0 + s.axis * s.length;
+  Box b;
+  for (int k = 0; k < 3; ++k) {
+    b.lo[k] = std::min(s.p0[k], end[k]) - r[k];
+    b.hi[k] = std::max(s.p0[k], end[k]) + r[k];
+  }
+  return b;
 }
 
 template <class Shape>
 void bounds_callback(const RTCBoundsFunctionArguments* args) {
   const Shape& s = static_cast<const ShapeSet<Shape>*>(args->geometryUserPtr)->shapes[args->primID];
   // Rounded outwards by more than the last place of the coordinates.
-  const V3d r = bounds_radius(s) * (1 + 1e-6) + V3d(1e-6);
-  const V3 lo(s.center - r), hi(s.center + r);
+  const Box b = box_of(s);
+  const V3d margin = (b.hi - b.lo) * .5e-6 + V3d(1e-6);
+  const V3 lo(b.lo - margin), hi(b.hi + margin);
   *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
 }
 
@@ -53,7 +72,7 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
   rh->ray.tfar = tf;
   rh->hit.primID = args->primID;
   rh->hit.geomID = args->geomID;
-  rh->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rh->hit.instID[0] = args->context->instID[0];
 }
 
 template <class Shape>
@@ -65,8 +84,16 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
   }
 }
 
-// Geometry ids, the same in every scene they are attached to.
-enum : unsigned { kTriangles = 0, kSpheres = 1, kDisks = 2, kKinds = 3 };
+// Geometry ids, the same in every scene they are attached to: kind + side * kKinds, side 0 of what is opaque,
+// 1 of what light passes; from kFirstInstance on the instances in their order.
+enum : unsigned {
+  kTriangles = 0,
+  kSpheres = 1,
+  kDisks = 2,
+  kCylinders = 3,
+  kKinds = 4,
+  kFirstInstance = 2 * kKinds
+};
 
 // Written in the 16-byte words that Embree reads: a load of several smaller stores has to wait for them.
 using F32x4 = float __attribute__((vector_size(16)));
@@ -85,21 +112,36 @@ bool traceable(const V3& o, const V3& d) {  // Embree's behaviour on NaN is unde
   return is_finite(o) && is_finite(d);
 }
 
+// The scenes over one set of primitives. all == opaque where there is nothing that light passes.
+struct Scenes {
+  RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
+  std::uint32_t base[2][kKinds] = {};  // first index of each kind, by side
+  ShapeSet<Sphere> spheres[2];
+  ShapeSet<Disk> disks[2];
+  ShapeSet<Cylinder> cylinders[2];
+
+  Scenes() = default;
+  Scenes(const Scenes&) = delete;  // the BVH points at the sets
+  Scenes& operator=(const Scenes&) = delete;
+  ~Scenes() {
+    for (RTCScene s : {all != opaque ? all : nullptr, opaque, boundary}) {
+      if (s) rtcReleaseScene(s);
+    }
+  }
+};
+
 }  // namespace
 
 struct Accel::State {
   RTCDevice device = nullptr;
-  RTCScene all = nullptr, opaque = nullptr,
-           boundary = nullptr;         // all == opaque where there are no boundaries
-  std::uint32_t base[2][kKinds] = {};  // first index of each kind: opaque, boundary
-  ShapeSet<Sphere> spheres[2];
-  ShapeSet<Disk> disks[2];
+  std::optional<Scenes> own;
+  std::deque<Scenes> groups;
+  std::vector<std::uint32_t> group_of;  // by instance
   std::atomic<std::int64_t> bytes{0};
 
   ~State() {
-    for (RTCScene s : {all != opaque ? all : nullptr, opaque, boundary}) {
-      if (s) rtcReleaseScene(s);
-    }
+    own.reset();
+    groups.clear();
     if (device) rtcReleaseDevice(device);
   }
 };
@@ -138,25 +180,89 @@ RTCScene new_scene(RTCDevice device) {
   return s;
 }
 
-// side 0: opaque, 1: boundaries. Attached under the ids kind + side * kKinds.
-void attach(RTCDevice device, const Geometry& g, Accel::State& st, int side,
+struct Side {
+  std::uint32_t first, last;
+  std::uint32_t count() const { return last - first; }
+};
+Side side_of(const PrimitiveRange& r, int side) {
+  return side ? Side{r.passing, r.last} : Side{r.first, r.passing};
+}
+
+void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes& to, int side,
             std::initializer_list<RTCScene> scenes) {
-  const std::uint32_t t0 = side ? g.opaque_triangles : 0, t1 = side ? g.triangle_count() : g.opaque_triangles;
-  const std::uint32_t s0 = side ? g.opaque_spheres : 0, d0 = side ? g.opaque_disks : 0;
-  const std::size_t s1 = side ? g.spheres.size() : g.opaque_spheres,
-                    d1 = side ? g.disks.size() : g.opaque_disks;
-  st.base[side][kTriangles] = t0;
-  st.base[side][kSpheres] = s0;
-  st.base[side][kDisks] = d0;
-  st.spheres[side].shapes = std::span(g.spheres).subspan(s0, s1 - s0);
-  st.disks[side].shapes = std::span(g.disks).subspan(d0, d1 - d0);
   const auto add = [&](RTCGeometry geom, unsigned kind) {
     for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, kind + static_cast<unsigned>(side) * kKinds);
     rtcReleaseGeometry(geom);
   };
-  if (t1 > t0) add(triangle_geometry(device, g, t0, t1 - t0), kTriangles);
-  if (!st.spheres[side].shapes.empty()) add(shape_geometry(device, st.spheres[side]), kSpheres);
-  if (!st.disks[side].shapes.empty()) add(shape_geometry(device, st.disks[side]), kDisks);
+  const auto add_shapes = [&](const auto& all, const PrimitiveRange& range, auto& part, unsigned kind) {
+    const Side s = side_of(range, side);
+    to.base[side][kind] = s.first;
+    part.shapes = std::span(all).subspan(s.first, s.count());
+    if (s.count() > 0) add(shape_geometry(device, part), kind);
+  };
+  const Side triangles = side_of(set.triangles, side);
+  to.base[side][kTriangles] = triangles.first;
+  if (triangles.count() > 0)
+    add(triangle_geometry(device, g, triangles.first, triangles.count()), kTriangles);
+  add_shapes(g.spheres, set.spheres, to.spheres[side], kSpheres);
+  add_shapes(g.disks, set.disks, to.disks[side], kDisks);
+  add_shapes(g.cylinders, set.cylinders, to.cylinders[side], kCylinders);
+}
+
+// Of the primitives alone, not committed.
+void fill(RTCDevice device, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
+  to.opaque = new_scene(device);
+  if (!boundaries) {
+    to.all = to.opaque;
+    return attach(device, g, set, to, 0, {to.opaque});
+  }
+  to.all = new_scene(device);
+  to.boundary = new_scene(device);
+  attach(device, g, set, to, 0, {to.opaque, to.all});
+  attach(device, g, set, to, 1, {to.boundary, to.all});
+}
+
+void commit(const Scenes& s) {
+  if (s.all != s.opaque) rtcCommitScene(s.all);
+  if (s.boundary) rtcCommitScene(s.boundary);
+  rtcCommitScene(s.opaque);
+}
+
+void attach_instance(RTCDevice device, const Affine& to_world, RTCScene of, unsigned id,
+                     std::initializer_list<RTCScene> scenes) {
+  RTCGeometry geom = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geom, of);
+  const auto& a = to_world.a;
+  const V3 b(to_world.b);
+  const float matrix[12] = {
+      static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2]), b.x,
+      static_cast<float>(a[3]), static_cast<float>(a[4]), static_cast<float>(a[5]), b.y,
+      static_cast<float>(a[6]), static_cast<float>(a[7]), static_cast<float>(a[8]), b.z};
+  rtcSetGeometryTransform(geom, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, matrix);
+  rtcCommitGeometry(geom);
+  for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, id);
+  rtcReleaseGeometry(geom);
+}
+
+void attach_instances(const Geometry& g, Accel::State& st) {
+  Scenes& own = *st.own;
+  for (std::uint32_t i = 0; i < g.instances.size(); ++i) {
+    const PlacedInstance& instance = g.instances[i];
+    st.group_of.push_back(instance.group);
+    if (g.groups[instance.group].count() == 0) continue;
+    const Scenes& group = st.groups[instance.group];
+    const unsigned id = kFirstInstance + i;
+    if (own.all == own.opaque) {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque});
+    } else if (!group.boundary) {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque, own.all});
+    } else {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.all});
+      attach_instance(st.device, instance.to_world, group.boundary, id, {own.boundary});
+      if (g.groups[instance.group].any_opaque())
+        attach_instance(st.device, instance.to_world, group.opaque, id, {own.opaque});
+    }
+  }
 }
 
 std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V3& o, const V3& d,
@@ -170,7 +276,13 @@ std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V
   rtcIntersect1(scene, &context, &rh);
   if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   const unsigned side = rh.hit.geomID / kKinds, kind = rh.hit.geomID % kKinds;
-  return PrimitiveId{static_cast<PrimitiveId::Kind>(kind), st.base[side][kind] + rh.hit.primID};
+  const Scenes* in = &*st.own;
+  std::uint32_t instance = kNone;
+  if (rh.hit.instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    instance = rh.hit.instID[0] - kFirstInstance;
+    in = &st.groups[st.group_of[instance]];
+  }
+  return PrimitiveId{static_cast<PrimitiveId::Kind>(kind), in->base[side][kind] + rh.hit.primID, instance};
 }
 
 }  // namespace
@@ -196,21 +308,16 @@ Result<Accel> Accel::build(const Geometry& g, int threads) {
         return true;
       },
       &st);
-  const bool boundaries = g.triangle_count() > g.opaque_triangles || g.spheres.size() > g.opaque_spheres ||
-                          g.disks.size() > g.opaque_disks;
-  st.opaque = new_scene(st.device);
-  if (boundaries) {
-    st.all = new_scene(st.device);
-    st.boundary = new_scene(st.device);
-    attach(st.device, g, st, 0, {st.opaque, st.all});
-    attach(st.device, g, st, 1, {st.boundary, st.all});
-    rtcCommitScene(st.all);
-    rtcCommitScene(st.boundary);
-  } else {
-    st.all = st.opaque;
-    attach(st.device, g, st, 0, {st.opaque});
+  bool boundaries = g.own.any_passing();
+  for (const PrimitiveSet& set : g.groups) {
+    Scenes& scenes = st.groups.emplace_back();
+    fill(st.device, g, set, set.any_passing(), scenes);
+    commit(scenes);
+    boundaries = boundaries || set.any_passing();
   }
-  rtcCommitScene(st.opaque);
+  fill(st.device, g, g.own, boundaries, st.own.emplace());
+  attach_instances(g, st);
+  commit(*st.own);
   if (const RTCError e = rtcGetDeviceError(st.device); e != RTC_ERROR_NONE) {
     return fail(e == RTC_ERROR_OUT_OF_MEMORY ? Errc::resource_exhausted : Errc::internal,
                 fmt::format("Embree could not build the scene's BVH (code {})", static_cast<int>(e)));
@@ -219,12 +326,12 @@ Result<Accel> Accel::build(const Geometry& g, int threads) {
 }
 
 std::optional<PrimitiveId> Accel::nearest(const V3& o, const V3& d, float t_max) const {
-  return trace(*state_, state_->all, o, d, t_max);
+  return trace(*state_, state_->own->all, o, d, t_max);
 }
 
 std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, float t_max) const {
-  if (!state_->boundary) return std::nullopt;
-  return trace(*state_, state_->boundary, o, d, t_max);
+  if (!state_->own->boundary) return std::nullopt;
+  return trace(*state_, state_->own->boundary, o, d, t_max);
 }
 
 bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
@@ -233,11 +340,11 @@ bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
   set_ray(ray, o, d, t_max);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcOccluded1(state_->opaque, &context, &ray);
+  rtcOccluded1(state_->own->opaque, &context, &ray);
   return ray.tfar < 0;
 }
 
-bool Accel::has_boundaries() const { return state_->boundary != nullptr; }
+bool Accel::has_boundaries() const { return state_->own->boundary != nullptr; }
 std::uint64_t Accel::bytes() const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
 }

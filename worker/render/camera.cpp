@@ -1,6 +1,8 @@
 #include "worker/render/camera.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ls::render {
 namespace {
@@ -25,20 +27,21 @@ double tan_half_x(const Sensor& s, double aspect) {
 
 }  // namespace
 
-Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale) {
+Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const TextureTable* textures)
+    : projection_(s.projection), per_pixel_x_(1. / size.width), per_pixel_y_(1. / size.height) {
   const auto& m = s.to_world.m;
   axis_x_ = V3d(m[0], m[4], m[8]);
   axis_y_ = V3d(m[1], m[5], m[9]);
   axis_z_ = V3d(m[2], m[6], m[10]);
   origin_ = V3((V3d(m[3], m[7], m[11]) - center) * scale);
   const double aspect = static_cast<double>(size.width) / size.height;
-  const double tx = tan_half_x(s, aspect), ty = tx / aspect;
-  // Film position (fx, fy) in pixels -> ndc in [0,1] -> camera space, x to the left and y up. The principal
-  // point moves the image by a fraction of the film.
+  const double tx = projection_ == Projection::perspective ? tan_half_x(s, aspect) : 1, ty = tx / aspect;
+  // Film position (fx, fy) in pixels -> ndc in [0,1] -> camera space, x to the left and y up. The camera
+  // looks as if from positions further to the right and down by fractions of the film.
   const double ox = s.principal_point_offset[0], oy = s.principal_point_offset[1];
-  x0_ = tx * (1 + 2 * ox);
+  x0_ = tx * (1 - 2 * ox);
   dx_ = -2 * tx / size.width;
-  y0_ = ty * (1 + 2 * oy);
+  y0_ = ty * (1 - 2 * oy);
   dy_ = -2 * ty / size.height;
   aperture_ = static_cast<float>(s.aperture_radius);
   focus_ = static_cast<float>(s.focus_distance);
@@ -46,14 +49,31 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale) {
   far_ = static_cast<float>(s.far_clip * scale);
   lens_x_ = V3(axis_x_ * scale);
   lens_y_ = V3(axis_y_ * scale);
+  if (s.aperture_scale) {
+    textures_ = textures;
+    aperture_scale_ = *s.aperture_scale;
+  }
 }
 
 CameraRay Camera::ray(double fx, double fy, V2 lens) const {
+  if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
   const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;
+  if (projection_ == Projection::orthographic) return orthographic_ray(x, y);
+  return perspective_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_,
+                         lens);
+}
+
+// The mean of the map's channels; between 0 and 1 for every texture.
+float Camera::aperture_at(double u, double v) const {
+  const V2 uv(static_cast<float>(std::clamp(u, 0., 1.)), static_cast<float>(std::clamp(v, 0., 1.)));
+  return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);
+}
+
+CameraRay Camera::perspective_ray(double x, double y, float aperture, V2 lens) const {
   V3d local(x, y, 1);
   V3 o = origin_;
-  if (has_lens()) {
-    const V2 p = concentric_disk(lens) * aperture_;
+  if (aperture > 0) {
+    const V2 p = concentric_disk(lens) * aperture;
     // The point in focus is unmoved by the choice of the lens point.
     local = V3d(x * focus_ - p.x, y * focus_ - p.y, focus_);
     o = origin_ + lens_x_ * p.x + lens_y_ * p.y;
@@ -64,6 +84,21 @@ CameraRay Camera::ray(double fx, double fy, V2 lens) const {
   // Clip planes are measured along the axis; the ray starts at the near one.
   const auto per_depth = static_cast<float>(length / local.z);
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
+}
+
+// As in Mitsuba the near plane is where to_world puts it, stretched or not, and from there the ray reaches
+// far - near.
+CameraRay Camera::orthographic_ray(double x, double y) const {
+  const V3d at = V3d(lens_x_) * x + V3d(lens_y_) * y;
+  return {V3(V3d(origin_) + at + axis_z_ * near_), V3(axis_z_.normalized()), far_ - near_};
+}
+
+// u: azimuth from -z by +x, v: from +y down. Every direction is seen from the place itself on.
+CameraRay Camera::spherical_ray(double u, double v) const {
+  const double phi = u * 2 * 3.14159265358979323846, theta = v * 3.14159265358979323846;
+  const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);
+  return {origin_, V3((axis_x_ * x + axis_y_ * y + axis_z_ * z).normalized()),
+          std::numeric_limits<float>::infinity()};
 }
 
 }  // namespace ls::render

@@ -35,12 +35,12 @@ void clamp_to_triangle(Barycentric& b) {
   }
 }
 
-bool complete_triangle(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+bool complete_triangle(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
   const std::uint32_t* idx = &g.indices[3 * i];
   const V3d v0(g.positions[idx[0]]), v1(g.positions[idx[1]]), v2(g.positions[idx[2]]);
   const V3d e1 = v1 - v0, e2 = v2 - v0;
   Barycentric b;
-  if (!meet_triangle(v0, e1, e2, V3d(o), V3d(d), b)) return false;
+  if (!meet_triangle(v0, e1, e2, o, d, b)) return false;
   clamp_to_triangle(b);
   hit.t = static_cast<float>(b.t);
   hit.p = V3(v0 + e1 * b.u + e2 * b.v);
@@ -60,13 +60,15 @@ bool complete_triangle(const Geometry& g, std::uint32_t i, const V3& o, const V3
     hit.shading = Frame(ns);
     return true;
   }
-  V3 tangent(e1);
+  V3 tangent(e1), bitangent(e2);
   if (s.uvs) {
     const V2 du = g.uvs[idx[1]] - g.uvs[idx[0]], dv = g.uvs[idx[2]] - g.uvs[idx[0]];
     const float det = du.x * dv.y - du.y * dv.x;
     if (det != 0) tangent = V3(e1 * (dv.y / det) - e2 * (du.y / det));
+    if (det != 0 && s.wants_slopes) bitangent = V3(e2 * (du.x / det) - e1 * (dv.x / det));
   }
   hit.shading = Frame::from_tangent(ns, tangent);
+  if (s.wants_slopes) hit.set_slopes(tangent, bitangent, g.scale);
   return true;
 }
 
@@ -84,12 +86,12 @@ V2 uv_of(const V3d& local) {
           static_cast<float>(std::acos(std::clamp(local.z, -1., 1.))) * kInvPi};
 }
 
-bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
   const Sphere& s = g.spheres[i];
-  const double t = intersect(s, V3d(o), V3d(d), 0, kInf);
+  const double t = intersect(s, o, d, 0, kInf);
   if (t == kInf) return false;
   hit.t = static_cast<float>(t);
-  V3d n = V3d(o) + V3d(d) * t - s.center;
+  V3d n = o + d * t - s.center;
   const double l = n.length();
   if (!(l > 0)) return false;
   n /= l;
@@ -107,17 +109,26 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3& o, const V3& 
   // Tangent along increasing azimuth about the local z axis.
   const V3d dpdu(-q.y * r[0] + q.x * r[3], -q.y * r[1] + q.x * r[4], -q.y * r[2] + q.x * r[5]);
   hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
+  if (info.wants_slopes) {
+    const double sine = std::hypot(q.x, q.y), c = sine > 0 ? q.x / sine : 1, d = sine > 0 ? q.y / sine : 0;
+    const V3d along(q.z * c, q.z * d, -sine);  // by the polar angle, in the sphere's axes
+    const V3d dpdv(along.x * r[0] + along.y * r[3] + along.z * r[6],
+                   along.x * r[1] + along.y * r[4] + along.z * r[7],
+                   along.x * r[2] + along.y * r[5] + along.z * r[8]);
+    constexpr double kPiD = 3.14159265358979323846;
+    hit.set_slopes(V3(dpdu * (2 * kPiD * s.radius)), V3(dpdv * (kPiD * s.radius)), g.scale);
+  }
   return true;
 }
 
-bool complete_disk(const Geometry& g, std::uint32_t i, const V3& o, const V3& d, SurfaceHit& hit) {
+bool complete_disk(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
   const Disk& s = g.disks[i];
-  const double den = s.n.dot(V3d(d));
+  const double den = s.n.dot(d);
   if (den == 0) return false;
-  const double t = s.n.dot(s.center - V3d(o)) / den;
+  const double t = s.n.dot(s.center - o) / den;
   if (!std::isfinite(t)) return false;
   hit.t = static_cast<float>(t);
-  const V3d q = V3d(o) + V3d(d) * t - s.center;
+  const V3d q = o + d * t - s.center;
   const double uu = s.u.dot(s.u), vv = s.v.dot(s.v), uv = s.u.dot(s.v), det = uu * vv - uv * uv;
   double a = (q.dot(s.u) * vv - q.dot(s.v) * uv) / det, b = (q.dot(s.v) * uu - q.dot(s.u) * uv) / det;
   if (const double r2 = a * a + b * b; r2 > 1) {
@@ -131,6 +142,35 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3& o, const V3& d,
   if (angle < 0) angle += 2 * 3.14159265358979323846;
   hit.uv = {static_cast<float>(std::sqrt(a * a + b * b)), static_cast<float>(angle) * kInvTwoPi};
   hit.shading = Frame::from_tangent(hit.ng, V3(s.u * a + s.v * b));
+  if (g.surfaces[s.surface].wants_slopes) {
+    const double radius = std::sqrt(a * a + b * b);
+    const V3d radial = radius > 0 ? (s.u * a + s.v * b) / radius : s.u;
+    hit.set_slopes(V3(radial), V3((s.v * a - s.u * b) * (2 * 3.14159265358979323846)), g.scale);
+  }
+  return true;
+}
+
+bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
+  const Cylinder& s = g.cylinders[i];
+  const double t = intersect(s, o, d, 0, kInf);
+  if (t == kInf) return false;
+  hit.t = static_cast<float>(t);
+  const V3d q = o + d * t - s.p0;
+  const double x = q.dot(s.u), y = q.dot(s.v), l = std::sqrt(x * x + y * y);
+  if (!(l > 0)) return false;
+  const double z = std::clamp(q.dot(s.axis), 0., s.length);
+  const V3d n = s.u * (x / l) + s.v * (y / l);
+  hit.p = V3(s.p0 + s.axis * z + n * s.radius);
+  hit.surface = s.surface;
+  const SurfaceInfo& info = g.surfaces[s.surface];
+  hit.ng = V3(n) * info.orientation;
+  double angle = std::atan2(y, x);
+  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  hit.uv = {static_cast<float>(angle) * kInvTwoPi, static_cast<float>(z / s.length)};
+  const V3d along = s.v * (x / l) - s.u * (y / l);
+  hit.shading = info.wants_tangent ? Frame::from_tangent(hit.ng, V3(along)) : Frame(hit.ng);
+  if (info.wants_slopes)
+    hit.set_slopes(V3(along * (2 * 3.14159265358979323846 * s.radius)), V3(s.axis * s.length), g.scale);
   return true;
 }
 
@@ -139,6 +179,10 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3& o, const V3& d,
 V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+  return id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit) : complete_instanced(id, o, d, hit);
+}
+
+bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const {
   hit.primitive = id;
   switch (id.kind) {
     case PrimitiveId::Kind::triangle:
@@ -147,8 +191,30 @@ bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hi
       return complete_sphere(*this, id.index, o, d, hit);
     case PrimitiveId::Kind::disk:
       return complete_disk(*this, id.index, o, d, hit);
+    case PrimitiveId::Kind::cylinder:
+      return complete_cylinder(*this, id.index, o, d, hit);
   }
   return false;
+}
+
+// The ray goes to the group's space unscaled: distances along it mean the same in both. Normals come back by
+// the inverse transpose, so that they stay on the side where they were: the cofactors, turned round where the
+// map mirrors.
+bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+  const PlacedInstance& i = instances[id.instance];
+  if (!complete_local(id, i.to_local.point(V3d(o)), i.to_local.vector(V3d(d)), hit)) return false;
+  const auto normal = [&](const V3& n) {
+    return V3(i.to_world.normal(V3d(n)).normalized() * double{i.mirrored});
+  };
+  const auto vector = [&](const V3& v) { return V3(i.to_world.vector(V3d(v))); };
+  const SurfaceInfo& info = surfaces[hit.surface];
+  const Frame local = hit.shading;
+  hit.p = V3(i.to_world.point(V3d(hit.p)));
+  hit.ng = normal(hit.ng);
+  const V3 ns = normal(local.n);
+  hit.shading = info.wants_tangent ? Frame::from_tangent(ns, normalize(vector(local.s))) : Frame(ns);
+  if (info.wants_slopes) hit.set_slopes(vector(local.to_world(hit.du)), vector(local.to_world(hit.dv)), 1);
+  return true;
 }
 
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max) {
@@ -178,11 +244,33 @@ double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double
   return a * a + b * b <= 1 ? t : kInf;
 }
 
+// In the plane across the axis, relative to the point nearest to it, as for spheres. Both meetings are tried:
+// the tube has no ends.
+double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max) {
+  const V3d f = o - s.p0;
+  const double dx = d.dot(s.u), dy = d.dot(s.v), dz = d.dot(s.axis);
+  const double fx = f.dot(s.u), fy = f.dot(s.v), fz = f.dot(s.axis);
+  const double a = dx * dx + dy * dy;
+  if (!(a > 0)) return kInf;  // along the axis
+  const double b = -(fx * dx + fy * dy), nx = fx + dx * (b / a), ny = fy + dy * (b / a);
+  const double disc = s.radius * s.radius - (nx * nx + ny * ny);
+  if (!(disc >= 0)) return kInf;
+  const double outside = fx * fx + fy * fy - s.radius * s.radius;
+  const double q = b + std::copysign(std::sqrt(a * disc), b);
+  double t0 = q != 0 ? outside / q : 0, t1 = q / a;
+  if (t0 > t1) std::swap(t0, t1);
+  for (const double t : {t0, t1}) {
+    const double z = fz + dz * t;
+    if (t > t_min && t < t_max && z >= 0 && z <= s.length) return t;
+  }
+  return kInf;
+}
+
 std::uint64_t Geometry::bytes() const {
   return positions.size() * sizeof(V3) + normals.size() * sizeof(V3) + uvs.size() * sizeof(V2) +
          indices.size() * sizeof(std::uint32_t) + triangle_surface.size() * sizeof(std::uint32_t) +
-         spheres.size() * sizeof(Sphere) + disks.size() * sizeof(Disk) +
-         surfaces.size() * sizeof(SurfaceInfo);
+         spheres.size() * sizeof(Sphere) + disks.size() * sizeof(Disk) + cylinders.size() * sizeof(Cylinder) +
+         instances.size() * sizeof(PlacedInstance) + surfaces.size() * sizeof(SurfaceInfo);
 }
 
 }  // namespace ls::render

@@ -1,6 +1,7 @@
-// The shapes of a world: triangles, spheres and disks in world space (recentred, scaled by a power of two to
-// unit size), and what a ray finds on them. Normals point as the dialect says, flips included; `interior` is
-// the side they point away from.
+// The shapes of a world: triangles, spheres, disks and cylinders in world space (recentred, scaled by a power
+// of two to unit size), and what a ray finds on them. Normals point as the dialect says, flips included;
+// `interior` is the side they point away from. The shapes of a group lie in a space of the group's own, made
+// to unit size likewise; its instances take that to the world.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +13,8 @@
 #include "common/scene/scene.h"
 #include "worker/render/asset_loader.h"
 #include "worker/render/math.h"
+#include "worker/render/texture/uv_point.h"
+#include "worker/render/transform.h"
 
 namespace ls::render {
 
@@ -28,8 +31,9 @@ struct SurfaceInfo {  // one per scene shape
   // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
   // frame.
   bool wants_uv = true, wants_tangent = true;
-  bool smooth = true;     // of its material: next-event estimation makes sense
-  float orientation = 1;  // -1: normals are flipped against winding or the outward direction
+  bool wants_slopes = false;  // hits carry dp/du and dp/dv (bump maps); wants_tangent is true then, too
+  bool smooth = true;         // of its material: next-event estimation makes sense
+  float orientation = 1;      // -1: normals are flipped against winding or the outward direction
 };
 
 struct Sphere {
@@ -42,11 +46,44 @@ struct Disk {  // points center + a u + b v with a^2 + b^2 <= 1
   V3d center, u, v, n;
   std::uint32_t surface = 0;
 };
+struct Cylinder {      // points p0 + z length + (u cos a + v sin a) radius, z in [0, 1]; no caps
+  V3d p0, u, v, axis;  // unit vectors; u, v, axis may be left-handed: normals point away from the axis
+  double radius = 1, length = 1;
+  std::uint32_t surface = 0;
+};
+
+// Where the primitives of one kind lie that belong together: [first, passing) are opaque, [passing, last) let
+// light pass.
+struct PrimitiveRange {
+  std::uint32_t first = 0, passing = 0, last = 0;
+  std::uint32_t count() const { return last - first; }
+};
+// Primitives of one space: the world's own, or those of a group.
+struct PrimitiveSet {
+  PrimitiveRange triangles, spheres, disks, cylinders;
+  std::uint32_t count() const {
+    return triangles.count() + spheres.count() + disks.count() + cylinders.count();
+  }
+  bool any_opaque() const {
+    return triangles.passing > triangles.first || spheres.passing > spheres.first ||
+           disks.passing > disks.first || cylinders.passing > cylinders.first;
+  }
+  bool any_passing() const {
+    return triangles.last > triangles.passing || spheres.last > spheres.passing ||
+           disks.last > disks.passing || cylinders.last > cylinders.passing;
+  }
+};
+struct PlacedInstance {
+  std::uint32_t group = 0;
+  float mirrored = 1;         // -1: the map turns orientations round
+  Affine to_world, to_local;  // between the world's space and the group's
+};
 
 // Which primitive: what the BVH returns and all that is taken from it.
 struct PrimitiveId {
-  enum class Kind : std::uint32_t { triangle, sphere, disk } kind = Kind::triangle;
+  enum class Kind : std::uint32_t { triangle, sphere, disk, cylinder } kind = Kind::triangle;
   std::uint32_t index = 0;
+  std::uint32_t instance = kNone;  // of Geometry::instances, if the primitive is in a group
   bool operator==(const PrimitiveId&) const = default;
 };
 
@@ -56,8 +93,17 @@ struct SurfaceHit {
   V3 ng;  // geometric normal, unit
   Frame shading;
   V2 uv;
+  V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
   std::uint32_t surface = 0;
   PrimitiveId primitive;
+
+  UvPoint uv_point() const { return {uv, du, dv}; }
+  // From dp/du and dp/dv in the world; `scale` is the geometry's.
+  void set_slopes(const V3& dpdu, const V3& dpdv, double scale) {
+    const auto k = static_cast<float>(1 / scale);
+    du = shading.to_local(dpdu) * k;
+    dv = shading.to_local(dpdv) * k;
+  }
 };
 
 class Geometry {
@@ -65,17 +111,19 @@ class Geometry {
   // Reads the scene's shapes. Fails on files and transforms that no surface can be made of.
   static Result<Geometry> build(const Scene& scene, const AssetLoader& files);
 
-  // Triangles, spheres and disks are sorted: first the opaque ones, then those that light passes.
+  // Primitives are sorted: the world's own before those of the groups, in the groups' order, and within each
+  // set the opaque ones before those that light passes.
   std::vector<V3> positions;
   std::vector<V3> normals;             // parallel to positions if any surface has normals, else empty
   std::vector<V2> uvs;                 // likewise
   std::vector<std::uint32_t> indices;  // 3 a triangle
   std::vector<std::uint32_t> triangle_surface;
-  std::uint32_t opaque_triangles = 0;
   std::vector<Sphere> spheres;
-  std::uint32_t opaque_spheres = 0;
   std::vector<Disk> disks;
-  std::uint32_t opaque_disks = 0;
+  std::vector<Cylinder> cylinders;
+  PrimitiveSet own;                  // those that stand in the world by themselves
+  std::vector<PrimitiveSet> groups;  // seen through instances only
+  std::vector<PlacedInstance> instances;
   std::vector<SurfaceInfo> surfaces;
 
   V3d center{0, 0, 0};                  // world = (scene - center) * scale
@@ -90,12 +138,16 @@ class Geometry {
   // Completes a hit on this primitive: t, position, normals, uv, from exact data and plain arithmetic.
   // Nothing if the ray does not meet it after all.
   bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
+
+ private:
+  bool complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const;
+  bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
 };
 
-// Distance along the ray to the sphere or disk within (t_min, t_max), or infinity. For the BVH's callbacks
-// too.
+// Distance along the ray to the shape within (t_min, t_max), or infinity. For the BVH's callbacks too.
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max);
+double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max);
 
 // Azimuth and polar angle, each over its range, of a unit direction from the sphere's centre.
 V2 sphere_uv(const Sphere& s, const V3d& n);

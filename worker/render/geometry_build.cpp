@@ -1,195 +1,16 @@
-// Scene shapes -> one array of world-space primitives, opaque ones first.
+// Scene shapes -> arrays of primitives, in the spaces of the world and of the groups, opaque ones first.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "common/assets/mesh.h"
-#include "common/base/overloaded.h"
 #include "common/scene/bsdf_traits.h"
 #include "worker/render/geometry.h"
-#include "worker/render/transform.h"
+#include "worker/render/geometry_place.h"
 
 namespace ls::render {
 namespace {
-
-// A shape in scene space, in double, before recentring.
-struct LocalMesh {
-  std::vector<V3d> positions;
-  std::vector<V3d> normals;
-  std::vector<V2> uvs;
-  std::vector<std::uint32_t> indices;
-};
-struct Placed {
-  LocalMesh mesh;
-  bool normals_given = false;  // by the file
-  std::optional<Sphere> sphere;
-  std::optional<Disk> disk;
-};
-
-struct Bounds {
-  V3d lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
-  void add(const V3d& p) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  }
-  bool empty() const { return !(lo.x <= hi.x); }
-};
-
-LocalMesh rectangle() {
-  LocalMesh m;
-  m.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
-  m.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  m.indices = {0, 1, 2, 0, 2, 3};
-  return m;
-}
-
-// Six faces; each has the unit square as its uv, u along a and v along a x n (as Mitsuba 3.9.1's cube).
-LocalMesh cube() {
-  struct Face {
-    V3d n, a;
-  };
-  const Face faces[6] = {{{0, -1, 0}, {0, 0, 1}}, {{0, 1, 0}, {-1, 0, 0}}, {{1, 0, 0}, {0, 1, 0}},
-                         {{0, 0, 1}, {0, 1, 0}},  {{-1, 0, 0}, {0, 1, 0}}, {{0, 0, -1}, {0, -1, 0}}};
-  const V2 corners[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  LocalMesh m;
-  for (const Face& f : faces) {
-    const auto base = static_cast<std::uint32_t>(m.positions.size());
-    const V3d b = f.a.cross(f.n);
-    for (const V2& uv : corners) {
-      m.positions.push_back(f.n + f.a * (2. * uv.x - 1) + b * (2. * uv.y - 1));
-      m.uvs.push_back(uv);
-    }
-    for (std::uint32_t k : {0u, 2u, 1u, 0u, 3u, 2u}) m.indices.push_back(base + k);
-  }
-  return m;
-}
-
-Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files) {
-  auto path = files.path(shape.file);
-  if (!path) return tl::unexpected(path.error());
-  auto data = load_mesh(*path, files.name(shape.file));
-  if (!data) return tl::unexpected(data.error());
-  LocalMesh m;
-  m.indices = std::move(data->indices);
-  const std::size_t n = data->vertex_count();
-  m.positions.reserve(n);
-  for (std::size_t i = 0; i < n; ++i)
-    m.positions.emplace_back(data->positions[3 * i], data->positions[3 * i + 1], data->positions[3 * i + 2]);
-  if (!shape.face_normals && !data->normals.empty()) {
-    for (std::size_t i = 0; i < n; ++i)
-      m.normals.emplace_back(data->normals[3 * i], data->normals[3 * i + 1], data->normals[3 * i + 2]);
-  }
-  for (std::size_t i = 0; 2 * i < data->uvs.size(); ++i) {
-    const float v = data->uvs[2 * i + 1];
-    m.uvs.emplace_back(data->uvs[2 * i], shape.flip_tex_coords ? 1 - v : v);
-  }
-  return m;
-}
-
-Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
-  // Uniform scaling: the columns are orthogonal and equally long, up to the rounding of composed transforms.
-  const V3d x = m.vector({1, 0, 0}), y = m.vector({0, 1, 0}), z = m.vector({0, 0, 1});
-  const double l = x.length(), tolerance = 1e-5 * l;
-  if (std::abs(y.length() - l) > tolerance || std::abs(z.length() - l) > tolerance ||
-      std::abs(x.dot(y)) > tolerance * l || std::abs(y.dot(z)) > tolerance * l ||
-      std::abs(z.dot(x)) > tolerance * l) {
-    return fail(Errc::invalid_argument, "a sphere can only be scaled uniformly; use a mesh for an ellipsoid");
-  }
-  Sphere r;
-  r.center = m.point(V3d(s.center[0], s.center[1], s.center[2]));
-  r.radius = s.radius * l;
-  const V3d rows[3] = {x / l, y / l, z / l};
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) r.to_local[3 * i + k] = rows[i][k];
-  return r;
-}
-
-void transform(LocalMesh& m, const Affine& to_scene) {
-  for (V3d& p : m.positions) p = to_scene.point(p);
-  for (V3d& n : m.normals) {
-    n = to_scene.normal(n);
-    if (const double l = n.length(); l > 0) n /= l;
-  }
-}
-
-// Where a file has no normals the dialect makes smooth ones: each vertex's triangles weighted by their angle
-// there (Thuermer and Wuethrich 1998).
-void smooth(LocalMesh& m) {
-  m.normals.assign(m.positions.size(), V3d(0));
-  for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
-    const std::uint32_t* v = &m.indices[i];
-    const V3d n = (m.positions[v[1]] - m.positions[v[0]]).cross(m.positions[v[2]] - m.positions[v[0]]);
-    const double l = n.length();
-    if (!(l > 0) || !std::isfinite(l)) continue;
-    for (int k = 0; k < 3; ++k) {
-      const V3d a = m.positions[v[(k + 1) % 3]] - m.positions[v[k]],
-                b = m.positions[v[(k + 2) % 3]] - m.positions[v[k]];
-      m.normals[v[k]] += n / l * std::atan2(a.cross(b).length(), a.dot(b));
-    }
-  }
-  for (V3d& n : m.normals) {
-    if (const double l = n.length(); l > 0) n /= l;
-  }
-}
-
-Result<Placed> place(const Shape& shape, const AssetLoader& files) {
-  const Affine m(shape.to_world);
-  if (!m.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
-  Placed out;
-  auto ok = std::visit(
-      overloaded{
-          [&](const RectangleShape&) -> Result<void> {
-            out.mesh = rectangle();
-            return {};
-          },
-          [&](const CubeShape&) -> Result<void> {
-            out.mesh = cube();
-            return {};
-          },
-          [&](const SphereShape& s) -> Result<void> {
-            auto r = place_sphere(s, m);
-            if (!r) return tl::unexpected(r.error());
-            out.sphere = *r;
-            return {};
-          },
-          [&](const DiskShape&) -> Result<void> {
-            Disk d;
-            d.center = m.point({0, 0, 0});
-            d.u = m.vector({1, 0, 0});
-            d.v = m.vector({0, 1, 0});
-            d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);  // +z, also mirrored
-            out.disk = d;
-            return {};
-          },
-          [&](const MeshShape& s) -> Result<void> {
-            auto r = load(s, files);
-            if (!r) return tl::unexpected(r.error());
-            out.mesh = std::move(*r);
-            return {};
-          }},
-      shape.geometry);
-  if (!ok) return tl::unexpected(ok.error());
-  transform(out.mesh, m);
-  out.normals_given = !out.mesh.normals.empty();
-  const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
-  if (mesh && !mesh->face_normals && !out.normals_given) smooth(out.mesh);
-  return out;
-}
-
-void add_bounds(const Placed& p, Bounds& b) {
-  for (const V3d& v : p.mesh.positions) b.add(v);
-  if (p.sphere) {
-    b.add(p.sphere->center - V3d(p.sphere->radius));
-    b.add(p.sphere->center + V3d(p.sphere->radius));
-  }
-  if (p.disk) {
-    for (int k = 0; k < 4; ++k)
-      b.add(p.disk->center + p.disk->u * (k & 1 ? 1. : -1.) + p.disk->v * (k & 2 ? 1. : -1.));
-  }
-}
 
 // +1 or -1: what takes the winding normal of a mesh, or the outward normal of a sphere, to the one that the
 // dialect means (checked against Mitsuba 3.9.1; there a mirrored sphere is inside out).
@@ -204,23 +25,44 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
   return sign;
 }
 
-void append(Geometry& g, Placed& p, std::uint32_t surface) {
+// From scene space to one of unit size about a centre; a power of two.
+struct Space {
+  V3d center{0, 0, 0};
+  double scale = 1;
+  V3d operator()(const V3d& p) const { return (p - center) * scale; }
+};
+
+Space unit_space(const Bounds& b) {
+  Space s;
+  if (b.empty()) return s;
+  s.center = (b.lo + b.hi) * .5;
+  const V3d half = (b.hi - b.lo) * .5;
+  const double extent = std::max(half.x, std::max(half.y, half.z));
+  if (extent > 0) {
+    int exponent = 0;
+    std::frexp(extent, &exponent);  // extent <= 2^exponent
+    s.scale = std::ldexp(1., -exponent);
+  }
+  return s;
+}
+
+void append_mesh(Geometry& g, const LocalMesh& mesh, std::uint32_t surface, const Space& space) {
   const auto base = static_cast<std::uint32_t>(g.positions.size());
   SurfaceInfo& info = g.surfaces[surface];
-  for (const V3d& v : p.mesh.positions) g.positions.push_back(V3((v - g.center) * g.scale));
-  if (!p.mesh.normals.empty()) {
+  for (const V3d& v : mesh.positions) g.positions.push_back(V3(space(v)));
+  if (!mesh.normals.empty()) {
     info.normals = true;
     g.normals.resize(base);
-    for (const V3d& n : p.mesh.normals) g.normals.push_back(V3(n));
+    for (const V3d& n : mesh.normals) g.normals.push_back(V3(n));
   }
-  if (!p.mesh.uvs.empty()) {
+  if (!mesh.uvs.empty()) {
     info.uvs = true;
     g.uvs.resize(base);
-    g.uvs.insert(g.uvs.end(), p.mesh.uvs.begin(), p.mesh.uvs.end());
+    g.uvs.insert(g.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
   }
-  for (std::size_t i = 0; i + 2 < p.mesh.indices.size(); i += 3) {
-    const std::uint32_t a = base + p.mesh.indices[i], b = base + p.mesh.indices[i + 1],
-                        c = base + p.mesh.indices[i + 2];
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const std::uint32_t a = base + mesh.indices[i], b = base + mesh.indices[i + 1],
+                        c = base + mesh.indices[i + 2];
     const V3d e1 = V3d(g.positions[b]) - V3d(g.positions[a]), e2 = V3d(g.positions[c]) - V3d(g.positions[a]);
     if (!(e1.cross(e2).length() > 0)) {
       ++g.dropped_triangles;
@@ -229,20 +71,32 @@ void append(Geometry& g, Placed& p, std::uint32_t surface) {
     g.indices.insert(g.indices.end(), {a, b, c});
     g.triangle_surface.push_back(surface);
   }
+}
+
+void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& space) {
+  append_mesh(g, p.mesh, surface, space);
   if (p.sphere) {
     Sphere s = *p.sphere;
-    s.center = (s.center - g.center) * g.scale;
-    s.radius *= g.scale;
+    s.center = space(s.center);
+    s.radius *= space.scale;
     s.surface = surface;
     g.spheres.push_back(s);
   }
   if (p.disk) {
     Disk d = *p.disk;
-    d.center = (d.center - g.center) * g.scale;
-    d.u *= g.scale;
-    d.v *= g.scale;
+    d.center = space(d.center);
+    d.u *= space.scale;
+    d.v *= space.scale;
     d.surface = surface;
     g.disks.push_back(d);
+  }
+  if (p.cylinder) {
+    Cylinder c = *p.cylinder;
+    c.p0 = space(c.p0);
+    c.radius *= space.scale;
+    c.length *= space.scale;
+    c.surface = surface;
+    g.cylinders.push_back(c);
   }
 }
 
@@ -259,17 +113,97 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   return info;
 }
 
-void choose_world(Geometry& g, const Bounds& b) {
-  if (b.empty()) return;
-  g.center = (b.lo + b.hi) * .5;
-  const V3d half = (b.hi - b.lo) * .5;
-  const double extent = std::max(half.x, std::max(half.y, half.z));
-  if (extent > 0) {
-    int exponent = 0;
-    std::frexp(extent, &exponent);  // extent <= 2^exponent
-    g.scale = std::ldexp(1., -exponent);
+bool finite(const Bounds& b) {
+  return b.empty() || (std::isfinite(b.lo.x + b.lo.y + b.lo.z) && std::isfinite(b.hi.x + b.hi.y + b.hi.z));
+}
+
+// The placed shapes of a scene, and where they and the groups' instances reach.
+struct Parts {
+  std::vector<Placed> shapes;
+  Bounds world;
+  std::vector<Bounds> groups;
+};
+
+// Vertices are counted in 32 bits, by the BVH too.
+constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
+
+Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
+  Parts parts;
+  parts.groups.resize(scene.groups.size());
+  std::uint64_t vertices = 0;
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    auto p = place(scene.shapes[i], files);
+    if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
+    vertices += p->mesh.positions.size();
+    if (vertices > kMaxVertices)
+      return fail(Errc::resource_exhausted,
+                  fmt::format("the scene's meshes have more than {} vertices together", kMaxVertices));
+    const auto& group = scene.shapes[i].group;
+    add_bounds(*p, group ? parts.groups[group->value] : parts.world);
+    parts.shapes.push_back(std::move(*p));
   }
-  g.radius = static_cast<float>(half.length() * g.scale);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Affine m(scene.instances[i].to_world);
+    if (!m.invertible())
+      return fail(Errc::invalid_argument, fmt::format("instance {}: its to_world has no inverse", i + 1));
+    const Bounds& b = parts.groups[scene.instances[i].group.value];
+    for (int k = 0; !b.empty() && k < 8; ++k)
+      parts.world.add(m.point({k & 1 ? b.hi.x : b.lo.x, k & 2 ? b.hi.y : b.lo.y, k & 4 ? b.hi.z : b.lo.z}));
+  }
+  if (!finite(parts.world) || !std::all_of(parts.groups.begin(), parts.groups.end(), finite))
+    return fail(Errc::invalid_argument,
+                "the scene's shapes reach to infinity: check transforms and mesh vertices");
+  return parts;
+}
+
+// Those of one space, the opaque ones first.
+PrimitiveSet append_all(Geometry& g, const Scene& scene, const Parts& parts, std::optional<GroupIndex> group,
+                        const Space& space) {
+  PrimitiveSet set;
+  const auto note = [&](std::uint32_t PrimitiveRange::*edge) {
+    set.triangles.*edge = g.triangle_count();
+    set.spheres.*edge = static_cast<std::uint32_t>(g.spheres.size());
+    set.disks.*edge = static_cast<std::uint32_t>(g.disks.size());
+    set.cylinders.*edge = static_cast<std::uint32_t>(g.cylinders.size());
+  };
+  note(&PrimitiveRange::first);
+  for (const bool passes : {false, true}) {
+    note(&PrimitiveRange::passing);
+    for (std::uint32_t i = 0; i < parts.shapes.size(); ++i)
+      if (scene.shapes[i].group == group && (g.surfaces[i].null || g.surfaces[i].veil) == passes)
+        append(g, parts.shapes[i], i, space);
+  }
+  note(&PrimitiveRange::last);
+  return set;
+}
+
+Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& g, const Space& group) {
+  const Affine m(instance.to_world);
+  PlacedInstance out;
+  out.group = instance.group.value;
+  out.to_world = Affine::scale_translate(g.scale, -g.center * g.scale) * m *
+                 Affine::scale_translate(1 / group.scale, group.center);
+  // The translation without the cancellation that the product may have.
+  out.to_world.b = (m.point(group.center) - g.center) * g.scale;
+  if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
+  out.to_local = out.to_world.inverse();
+  // The BVH inverts the map by itself, in float32.
+  const auto in_range = [](double x) { return std::isfinite(static_cast<float>(x)); };
+  if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||
+      !std::all_of(out.to_local.a.begin(), out.to_local.a.end(), in_range))
+    return fail(Errc::invalid_argument,
+                "its to_world makes the group too small or too flat beside the rest of the scene for single "
+                "precision");
+  out.mirrored = out.to_world.determinant() < 0 ? -1.f : 1.f;
+  return out;
+}
+
+bool names_groups_that_exist(const Scene& scene) {
+  const auto there = [&](GroupIndex g) { return g.value < scene.groups.size(); };
+  return std::all_of(scene.shapes.begin(), scene.shapes.end(),
+                     [&](const Shape& s) { return !s.group || (there(*s.group) && !s.emitter); }) &&
+         std::all_of(scene.instances.begin(), scene.instances.end(),
+                     [&](const Instance& i) { return there(i.group); });
 }
 
 }  // namespace
@@ -278,30 +212,30 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
   Geometry g;
   const auto traits = scene::bsdf_traits(scene);
   if (!traits) return fail(Errc::invalid_argument, "the scene's materials contain themselves");
-  std::vector<Placed> placed;
-  Bounds bounds;
-  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    auto p = place(scene.shapes[i], files);
-    if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
-    add_bounds(*p, bounds);
-    g.surfaces.push_back(surface_info(scene, *traits, scene.shapes[i], p->normals_given));
-    placed.push_back(std::move(*p));
-  }
-  if (!bounds.empty() && !(std::isfinite(bounds.lo.x + bounds.lo.y + bounds.lo.z) &&
-                           std::isfinite(bounds.hi.x + bounds.hi.y + bounds.hi.z))) {
+  if (!names_groups_that_exist(scene))
     return fail(Errc::invalid_argument,
-                "the scene's shapes reach to infinity: check transforms and mesh vertices");
-  }
-  choose_world(g, bounds);
-  for (const bool passes : {false, true}) {
-    for (std::uint32_t i = 0; i < placed.size(); ++i) {
-      if ((g.surfaces[i].null || g.surfaces[i].veil) == passes) append(g, placed[i], i);
-    }
-    if (!passes) {
-      g.opaque_triangles = g.triangle_count();
-      g.opaque_spheres = static_cast<std::uint32_t>(g.spheres.size());
-      g.opaque_disks = static_cast<std::uint32_t>(g.disks.size());
-    }
+                "a shape or instance is of a group that the scene does not have, or "
+                "emits light in a group");
+  const auto parts = place_all(scene, files);
+  if (!parts) return tl::unexpected(parts.error());
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i)
+    g.surfaces.push_back(surface_info(scene, *traits, scene.shapes[i], parts->shapes[i].normals_given));
+  const Space world = unit_space(parts->world);
+  g.center = world.center;
+  g.scale = world.scale;
+  if (!parts->world.empty())
+    g.radius = static_cast<float>(((parts->world.hi - parts->world.lo) * .5).length() * g.scale);
+  g.own = append_all(g, scene, *parts, std::nullopt, world);
+  std::vector<Space> spaces;
+  for (std::uint32_t i = 0; i < scene.groups.size(); ++i)
+    g.groups.push_back(
+        append_all(g, scene, *parts, GroupIndex{i}, spaces.emplace_back(unit_space(parts->groups[i]))));
+  g.instances.reserve(scene.instances.size());
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    auto placed = place_instance(scene.instances[i], g, spaces[scene.instances[i].group.value]);
+    if (!placed)
+      return fail(placed.error().code, fmt::format("instance {}: {}", i + 1, placed.error().message));
+    g.instances.push_back(*placed);
   }
   // The BVH loads 16 bytes for a vertex of 12: the last one must not end at the end of its allocation.
   g.positions.reserve(g.positions.size() + 2);

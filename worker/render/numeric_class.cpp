@@ -47,9 +47,9 @@ void add_math_in_double(Sha256& h) {
   for (int i = 0; i < 4096; ++i) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
     // Sine and cosine of different numbers, as they are called: one call for both is another function.
-    for (double y :
-         {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
-          std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4), std::hypot(u, x)}) {
+    for (double y : {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
+                     std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
+                     std::hypot(u, x), std::expm1(x), std::log1p(u)}) {
       v.push_back(y);
     }
   }
@@ -84,7 +84,7 @@ void add_hits(Sha256& h) {
       g.triangle_surface.insert(g.triangle_surface.end(), 2, 0);
     }
   g.positions.reserve(g.positions.size() + 2);
-  g.opaque_triangles = g.triangle_count();
+  g.own.triangles = {0, g.triangle_count(), g.triangle_count()};
   g.surfaces.emplace_back();
   const auto accel = Accel::build(g, 1);
   if (!accel) return;
@@ -116,7 +116,7 @@ void add_sphere_hits(Sha256& h) {
     s.radius = .02 + .2 * double{r.uniform()};
     g.spheres.push_back(s);
   }
-  g.opaque_spheres = 64;
+  g.own.spheres = {0, 64, 64};
   g.surfaces.emplace_back();
   const auto accel = Accel::build(g, 1);
   if (!accel) return;
@@ -162,11 +162,11 @@ void add_bsdf_samples(Sha256& h) {
       const float z = 1 - r.uniform(), angle = kTwoPi * r.uniform(), sine = safe_sqrt(1 - z * z);
       const float lobe = r.uniform(), x = r.uniform(), y = r.uniform();
       const V3 wo(sine * std::cos(angle), sine * std::sin(angle), z);
-      const auto s = bsdfs->sample({b}, {0, 0}, wo, lobe, {x, y});
+      const auto s = bsdfs->sample({b}, V2(0, 0), wo, lobe, {x, y});
       if (!s) continue;
       push(v, s->wi);
       push(v, s->weight);
-      const BsdfEval e = bsdfs->eval({b}, {0, 0}, wo, s->wi);
+      const BsdfEval e = bsdfs->eval({b}, V2(0, 0), wo, s->wi);
       push(v, e.f_cos);
       v.insert(v.end(), {s->pdf, e.pdf});
     }

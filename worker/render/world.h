@@ -46,6 +46,8 @@ class World {
   int rr_depth = 5;
   std::uint64_t seed = 0;
   FrameSize size;
+  // Of the image in the full frame, in pixels: the pixels of a crop are those of the frame.
+  int origin_x = 0, origin_y = 0;
 
   std::uint64_t clamped_inputs = 0;
 

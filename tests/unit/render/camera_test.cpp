@@ -5,11 +5,15 @@
 
 #include <cmath>
 
+#include "tests/support/render_check.h"
 #include "worker/render/hash.h"
 #include "worker/render/pixel_filter.h"
+#include "worker/render/world.h"
 
 namespace ls::render {
 namespace {
+
+using test::operator*;
 
 constexpr FrameSize kSize{200, 100};
 
@@ -119,6 +123,179 @@ TEST(Camera, RaysRunFromTheNearToTheFarPlane) {
     EXPECT_NEAR(r.o.z, .5, 1e-6);
     EXPECT_NEAR((r.o + r.d * r.t_max).z, 8, 1e-5);
   }
+}
+
+// What Mitsuba 3.9.1 gives (scalar_rgb, sample_ray) for a frame of 200 x 100: origin and direction at shares
+// of the rendered part.
+struct SeenRay {
+  double u, v;
+  V3 o, d;
+};
+void expect_rays(const Camera& c, std::array<int, 2> offset, FrameSize part,
+                 std::initializer_list<SeenRay> rays) {
+  for (const SeenRay& r : rays) {
+    const CameraRay ray = c.ray(offset[0] + r.u * part.width, offset[1] + r.v * part.height, {.5f, .5f});
+    EXPECT_LT((ray.o - r.o).length(), 1e-6f) << ray.o << r.o;
+    EXPECT_LT((ray.d - r.d).length(), 2e-6f) << ray.d << r.d;  // printed to 6 digits
+  }
+}
+
+TEST(Camera, PrincipalPointIsMitsubas) {
+  Sensor s;
+  s.fov = 60;
+  s.principal_point_offset = {.1, .2};
+  const Camera c = camera(s);
+
+  expect_rays(c, {0, 0}, kSize,
+              {{0, 0, {.0046188f, .00173205f, .01f}, {.414224f, .155334f, .896822f}},
+               {.25, .75, {.00173205f, -.00259808f, .01f}, {.165333f, -.247999f, .954548f}},
+               {1, 1, {-.0069282f, -.00404145f, .01f}, {-.540453f, -.315264f, .780077f}}});
+  expect_rays(c, {10, 20}, {30, 40},
+              {{0, 0, {.00404145f, .00057735f, .01f}, {.374166f, .0534523f, .92582f}},
+               {1, 1, {.0023094f, -.00173205f, .01f}, {.22188f, -.16641f, .960769f}}});
+}
+
+TEST(Camera, OrthographicRaysAreMitsubas) {
+  Sensor s;
+  s.projection = Projection::orthographic;
+  s.to_world.m = {2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 0, 1};
+  const Camera c = camera(s);
+
+  expect_rays(c, {0, 0}, kSize,
+              {{0, 0, {2, 1.5f, .04f}, {0, 0, 1}},
+               {.25, .75, {1, -.75f, .04f}, {0, 0, 1}},
+               {1, 1, {-2, -1.5f, .04f}, {0, 0, 1}}});
+  expect_rays(c, {10, 20}, {30, 40},
+              {{0, 0, {1.8f, .9f, .04f}, {0, 0, 1}}, {1, 1, {1.2f, -.3f, .04f}, {0, 0, 1}}});
+  EXPECT_NEAR(c.ray(3, 4, {}).t_max, 9999.99, 1e-2);
+}
+
+TEST(Camera, OrthographicIsTheSameInAnyWorld) {
+  // The world is the scene moved by its centre and scaled.
+  Sensor s;
+  s.projection = Projection::orthographic;
+  s.to_world.m = {.5, 0, 0, 7, 0, .5, 0, 8, 0, 0, 1, 9, 0, 0, 0, 1};
+  const V3d center(1, 2, 3);
+  const CameraRay a = Camera(s, kSize, V3d(0), 1).ray(30, 70, {}),
+                  b = Camera(s, kSize, center, .125).ray(30, 70, {});
+
+  EXPECT_LT((V3((V3d(a.o) - center) * .125) - b.o).length(), 1e-6f);
+  EXPECT_EQ(a.d, b.d);
+  EXPECT_NEAR(a.t_max * .125, b.t_max, 1e-3);
+}
+
+TEST(Camera, SphericalSeesEveryDirectionInLatitudeAndLongitude) {
+  Sensor s;
+  s.projection = Projection::spherical;
+  s.to_world.m[3] = 5;
+  const Camera c = camera(s);
+  const struct {
+    double u, v;
+    V3 d;
+  } expected[] = {{.3, 0, {0, 1, 0}},   {.8, 1, {0, -1, 0}}, {0, .5, {0, 0, -1}},
+                  {.25, .5, {1, 0, 0}}, {.5, .5, {0, 0, 1}}, {.75, .5, {-1, 0, 0}}};
+  for (const auto& e : expected) {
+    const CameraRay r = c.ray(200 * e.u, 100 * e.v, {.3f, .4f});
+    EXPECT_LT((r.d - e.d).length(), 1e-6f) << e.u << " " << e.v;
+    EXPECT_EQ(r.o, V3(5, 0, 0));
+    EXPECT_EQ(r.t_max, std::numeric_limits<float>::infinity());
+  }
+}
+
+TEST(Camera, AThinLensWithoutAnApertureIsAPinholeToTheLastBit) {
+  Sensor pinhole, lens;
+  pinhole.to_world = lens.to_world = test::rotate_x(20) * test::rotate_y(-50) * test::translate({1, 2, 3});
+  lens.focus_distance = 3.7;
+  for (int i = 0; i < 1000; ++i) {
+    const double x = .2 * i, y = 37.1 + .05 * i;
+    const CameraRay a = camera(pinhole).ray(x, y, {.7f, .1f}), b = camera(lens).ray(x, y, {.7f, .1f});
+    ASSERT_EQ(a.o, b.o);
+    ASSERT_EQ(a.d, b.d);
+    ASSERT_EQ(a.t_max, b.t_max);
+  }
+}
+
+// ---- aperture maps and crops, in whole worlds
+
+// A checkerboard of 2 x 2 over the frame: closed at the upper left and lower right, open elsewhere.
+test::SceneKit with_aperture_map(double closed, double open) {
+  test::SceneKit kit({16, 8});
+  kit.shape(RectangleShape{}, {}, kit.diffuse(.5));
+  kit.look({0, 0, 5}, {0, 0, 0}, 30, {0, 1, 0});
+  const TextureIndex a = kit.texture({closed, closed, closed}), b = kit.texture({open, open, open});
+  kit.scene.sensor.aperture_radius = .25;
+  kit.scene.sensor.focus_distance = 3;
+  kit.scene.sensor.aperture_scale =
+      test::SceneKit::push<TextureTag>(kit.scene.textures, Texture(CheckerboardTexture{a, b, {}}));
+  return kit;
+}
+
+TEST(ApertureMap, MultipliesTheRadiusWherePixelsAre) {
+  const auto mapped = test::world_of(with_aperture_map(0, 1));
+  test::SceneKit kit = with_aperture_map(0, 1);
+  kit.scene.sensor.aperture_scale.reset();
+  const auto open = test::world_of(kit);
+  kit.scene.sensor.aperture_radius = 0;
+  const auto pinhole = test::world_of(kit);
+  for (const double x : {.5, 3.25, 7.5, 8.5, 12.75, 15.5}) {
+    for (const double y : {.5, 3.5, 4.5, 7.5}) {
+      const bool closed = (x < 8) == (y < 4);
+      const CameraRay r = mapped->camera.ray(x, y, {.8f, .3f}),
+                      e = (closed ? pinhole : open)->camera.ray(x, y, {.8f, .3f});
+      EXPECT_EQ(r.o, e.o) << x << " " << y;
+      EXPECT_EQ(r.d, e.d) << x << " " << y;
+    }
+  }
+}
+
+TEST(ApertureMap, OfOneAndOfNothingChangeNoBit) {
+  const auto render = [](const test::SceneKit& kit) {
+    return render_tile(*test::world_of(kit), {0, 0, 16, 8}, {0, 4}, nullptr, nullptr).sums;
+  };
+  test::SceneKit kit = with_aperture_map(0, 1);
+  kit.environment();
+  test::SceneKit closed = with_aperture_map(0, 0), open = with_aperture_map(1, 1), plain = open,
+                 pinhole = open;
+  plain.scene.sensor.aperture_scale.reset();
+  pinhole.scene.sensor.aperture_scale.reset();
+  pinhole.scene.sensor.aperture_radius = 0;
+  for (test::SceneKit* k : {&closed, &open, &plain, &pinhole}) k->environment();
+  EXPECT_EQ(render(open), render(plain));
+  EXPECT_EQ(render(closed), render(pinhole));
+  EXPECT_NE(render(open), render(pinhole));
+}
+
+test::SceneKit cropped(std::array<int, 2> offset, FrameSize size) {
+  test::SceneKit kit({16, 8});
+  kit.shape(SphereShape{}, {}, kit.diffuse(.5));
+  kit.environment();
+  kit.look({0, 0, 5}, {0, 0, 0}, 30, {0, 1, 0});
+  kit.scene.film.filter = GaussianFilter{};
+  kit.scene.film.crop_offset = offset;
+  kit.scene.film.crop_size = size;
+  return kit;
+}
+TileResult render_size(const test::SceneKit& kit, FrameSize size) {
+  RenderSettings settings = test::settings_of(kit.scene);
+  settings.size = size;
+  const auto w = build_world(kit.scene, settings, kit.files, 1);
+  EXPECT_TRUE(w);
+  return render_tile(**w, {0, 0, size.width, size.height}, {0, 8}, nullptr, nullptr);
+}
+
+TEST(Crop, IsThatPartOfTheFrameToTheLastBit) {
+  const auto whole = render_size(cropped({0, 0}, {0, 0}), {16, 8}),
+             part = render_size(cropped({5, 2}, {7, 4}), {7, 4});
+  for (std::size_t plane = 0; plane < 6; ++plane)
+    for (std::size_t y = 0; y < 4; ++y)
+      for (std::size_t x = 0; x < 7; ++x)
+        ASSERT_EQ(part.sums[plane * 28 + y * 7 + x], whole.sums[plane * 128 + (y + 2) * 16 + x + 5]);
+}
+
+TEST(Crop, AtAnotherSizeIsTheSamePartOfALargerFrame) {
+  test::SceneKit twice = cropped({10, 4}, {14, 8});
+  twice.scene.film.size = {32, 16};
+  EXPECT_EQ(render_size(cropped({5, 2}, {7, 4}), {14, 8}).sums, render_size(twice, {14, 8}).sums);
 }
 
 // ---- filters
