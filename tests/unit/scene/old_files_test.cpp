@@ -7,6 +7,7 @@
 
 #include "common/scene/diagnostic.h"
 #include "common/scene/upgrade.h"
+#include "common/scene/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -237,6 +238,59 @@ TEST(OldFiles, TexturesAreScaledAndThenMoved) {
   EXPECT_EQ(
       to_uv("<string name=\"wrapModeU\" value=\"clamp\"/><string name=\"wrapModeV\" value=\"clamp\"/>").wrap,
       Wrap::clamp);
+}
+
+// There a board shows the same squares as a number: here it is another one, the colours the other way round.
+TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
+  const auto objects = [](std::string_view rough, std::string_view other) {
+    return fmt::format(R"(
+      <texture type="checkerboard" id="inner"><float name="color0" value=".5"/><float name="color1" value=".6"/></texture>
+      <texture type="checkerboard" id="checks"><float name="color0" value=".1"/><ref name="color1" id="inner"/></texture>
+      {}
+      <shape type="disk"><bsdf type="roughconductor"><ref name="alpha" id="{}"/><string name="material" value="Au"/></bsdf></shape>
+      <shape type="disk"><bsdf type="roughdielectric"><ref name="alpha" id="{}"/></bsdf></shape>
+      <shape type="disk"><bsdf type="blendbsdf"><ref name="weight" id="{}"/><bsdf type="diffuse"/><bsdf type="plastic"/></bsdf></shape>
+      <shape type="disk"><bsdf type="mask"><ref name="opacity" id="{}"/>
+        <bsdf type="diffuse"><ref name="reflectance" id="checks"/></bsdf></bsdf></shape>)",
+                       other, rough, rough, rough, rough);
+  };
+  const Scene before = must_read(old(objects("checks", "")));
+  const Scene now = must_read(with_sensor(objects("numbers", R"(
+      <texture type="checkerboard" id="inner_numbers"><float name="color0" value=".6"/><float name="color1" value=".5"/></texture>
+      <texture type="checkerboard" id="numbers"><ref name="color0" id="inner_numbers"/><float name="color1" value=".1"/></texture>)")));
+
+  const auto board = [](const Scene& s, TextureIndex i) {
+    return std::get<CheckerboardTexture>(s.textures.at(i.value));
+  };
+  for (const Scene* s : {&before, &now}) {
+    const auto& metal = std::get<RoughConductorBsdf>(bsdf_of(*s, 0));
+    const auto& mask = std::get<MaskBsdf>(bsdf_of(*s, 3));
+    const auto& inside = std::get<DiffuseBsdf>(s->bsdfs.at(mask.bsdf.value));
+    EXPECT_EQ(colour(*s, board(*s, metal.alpha_u).color1)[0], .1);
+    EXPECT_EQ(colour(*s, board(*s, board(*s, metal.alpha_u).color0).color0)[0], .6);
+    EXPECT_EQ(colour(*s, board(*s, inside.reflectance).color0)[0], .1);
+    EXPECT_EQ(metal.alpha_v, metal.alpha_u);
+    EXPECT_EQ(std::get<RoughDielectricBsdf>(bsdf_of(*s, 1)).alpha_u, metal.alpha_u);
+    EXPECT_EQ(std::get<BlendBsdf>(bsdf_of(*s, 2)).weight, metal.alpha_u);
+    EXPECT_EQ(mask.opacity, metal.alpha_u);
+  }
+  // What is written of it is of the new version, and means the same.
+  const Scene again = must_read(write_xml(before));
+  EXPECT_EQ(serialize(again), serialize(before));
+}
+
+TEST(OldFiles, NormalsAreAsTheyAre) {
+  const std::string map = "<shape type=\"disk\"><bsdf type=\"normalmap\">{}<rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf "
+                          "type=\"diffuse\"/></bsdf></shape>";
+  const auto read_map = [](const Scene& s) { return std::get<NormalMapBsdf>(bsdf_of(s, 0)); };
+  const auto plain = read_map(must_read(old(fmt::format(fmt::runtime(map), ""))));
+  const auto asked = read_map(must_read(
+      old(fmt::format(fmt::runtime(map), "<boolean name=\"useShadowingFunction\" value=\"true\"/>"))));
+  const auto now = read_map(must_read(with_sensor(fmt::format(fmt::runtime(map), ""))));
+  EXPECT_FALSE(plain.flip_invalid_normals || plain.use_shadowing_function);
+  EXPECT_FALSE(asked.flip_invalid_normals);
+  EXPECT_TRUE(asked.use_shadowing_function);
+  EXPECT_TRUE(now.flip_invalid_normals && now.use_shadowing_function);
 }
 
 TEST(OldFiles, WhatTexturesCantBeIsToldAtItsPlace) {
