@@ -34,6 +34,8 @@ void add_surfaces(std::vector<Case>& cases);
 void add_extremes(std::vector<Case>& cases);
 void add_environments(std::vector<Case>& cases);
 void add_materials(std::vector<Case>& cases);
+void add_distant(std::vector<Case>& cases);
+void add_emission(std::vector<Case>& cases);
 
 inline std::array<double, 3> grey(double v) { return {v, v, v}; }
 inline Rgb rgb(double v) { return {v, v, v}; }

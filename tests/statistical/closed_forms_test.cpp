@@ -34,6 +34,8 @@ const std::vector<Case>& table() {
     add_extremes(c);
     add_environments(c);
     add_materials(c);
+    add_distant(c);
+    add_emission(c);
     return c;
   }();
   return cases;

@@ -6,20 +6,20 @@
 // and by next-event estimation, combined by the balance heuristic. At surfaces next-event estimation starts
 // from the path's own vertices. What it does in media is a strategy, `Light` (vertex_light.h: the default;
 // distant_mis.h), which has
-//   Segment ahead(path, medium, t_max, may_scatter)  before each flight through a medium: light scattered
-//                                                    once, anywhere on the way;
-//   Vertex vertex(path, medium, segment, t)          what a vertex that the flight made at t keeps of it;
-//   void at_vertex(path, medium, p, d)               light scattered at that vertex;
-//   Vertex::found_as_light(), (pivot)                the density of all that next-event estimation from there
-//                                                    and from the segment before, over the flight's: of
-//                                                    lights without a place, of those with this pivot. 1 for
-//                                                    a default-constructed one: a vertex on a surface.
+//   Plan ahead(path, medium, segment, may_scatter)  before each flight through a medium: light scattered
+//                                                   once, anywhere on the way;
+//   Vertex vertex(path, medium, plan, t)            what a vertex that the flight made at t keeps of it;
+//   void at_vertex(path, medium, p, d)              light scattered at that vertex;
+//   Vertex::found_as_light(), (pivot)               the density of all that next-event estimation, over the
+//                                                   flight's: of lights without a place, of those with this
+//                                                   pivot. 1 for a default-constructed one, as on surfaces.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
 #include "worker/render/sampler.h"
+#include "worker/render/segment.h"
 #include "worker/render/vertex_light.h"
 #include "worker/render/world.h"
 
@@ -52,12 +52,14 @@ class PathTracer {
   friend class Light<F>;
   struct Vertex {  // where the current ray was scattered from
     V3 p{0, 0, 0};
+    V3 n{0, 0, 0};      // normal of its surface; 0 in a medium
     float pdf = 0;      // of the direction
     bool delta = true;  // chosen by a delta lobe or the camera: lights found are counted in full
     typename Light<F>::Vertex in_medium;
   };
 
   std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
+  void add_glow(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
   void pass_boundary(const SurfaceHit& hit);
@@ -86,6 +88,13 @@ class PathTracer {
   V3 clear_of(const V3& offset, float distance) const {
     const float share = distance * std::abs(dot(offset, d_)) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
+  }
+  // A point at t of a segment keeps as far from the surfaces at both ends as rays that leave them: rounding
+  // must not put it on the other side, where the medium has no end.
+  V3 clear_of_ends(V3 p, const Segment& s, float t) const {
+    if (s.lead > 0) p += clear_of(o_ - start_, t);
+    if (s.end) p += clear_of(offset_point(s.end->p, s.end->ng, -d_) - s.end->p, s.length - t);
+    return p;
   }
   std::uint32_t medium_beyond(const SurfaceHit& hit, const V3& w, std::uint32_t current) const {
     const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
@@ -160,8 +169,10 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 template <Features F, template <Features> class Light>
 std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
   const float lead = dot(o_ - start_, d_), t_max = end ? end->t + lead : kInfinity;
+  const Segment segment{t_max, lead, end};
+  if constexpr (F.emission) add_glow(medium, t_max);
   const bool may_scatter = world_.depth_allows(depth_ + 1);
-  const auto ahead = Light<F>::ahead(*this, medium, t_max, may_scatter);
+  const auto plan = Light<F>::ahead(*this, medium, segment, may_scatter);
   const Group numbers = stream_.group(segment_, Purpose::flight);
   const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], start_, d_, t_max,
                                        stream_.stream(segment_, Purpose::track_flight), counters_);
@@ -174,13 +185,9 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
     return std::nullopt;
   }
   last_ = Vertex{};
-  last_.p = start_ + d_ * flight.t;
-  // A vertex keeps as far from the surfaces at both ends as rays that leave them: rounding must not put it on
-  // the other side, where the medium has no end.
-  if (lead > 0) last_.p += clear_of(o_ - start_, flight.t);
-  if (end) last_.p += clear_of(offset_point(end->p, end->ng, -d_) - end->p, t_max - flight.t);
+  last_.p = clear_of_ends(start_ + d_ * flight.t, segment, flight.t);
   last_.delta = false;
-  last_.in_medium = Light<F>::vertex(*this, medium, ahead, flight.t);
+  last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
   apply(flight);
   ++depth_;
   Light<F>::at_vertex(*this, medium, last_.p, d_);
@@ -198,14 +205,14 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n);
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // The shading normal must not let light through a surface that the geometric one closes; the same for
   // sampled directions.
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
-  const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv, wo, wi);
+  const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
   const V3 p = offset_point(hit.p, hit.ng, light->direction);
@@ -224,7 +231,7 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
   const auto s =
-      world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv, wo, g.u(2), {g.u(0), g.u(1)});
+      world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
   if (!s) return std::nullopt;
   const V3 w = normalize(hit.shading.to_world(s->wi));
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return std::nullopt;  // through the true surface: no such light
@@ -232,6 +239,7 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;
   last_ = Vertex{};
   last_.p = hit.p;
+  last_.n = hit.shading.n;
   last_.pdf = s->pdf;
   last_.delta = s->delta;
   start_ = hit.p;
@@ -251,7 +259,7 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::passes_veil(const SurfaceHit& hit) {
   const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
-  const Veil veil = world_.bsdfs.veil(bsdf, hit.uv, hit.shading.to_local(-d_));
+  const Veil veil = world_.bsdfs.veil(bsdf, hit.uv_point(), hit.shading.to_local(-d_));
   if (!(veil.probability > 0)) return false;
   if (stream_.group(segment_, Purpose::veil).u(0) < veil.probability) {
     beta_ *= veil.transmission / veil.probability;
@@ -275,7 +283,7 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (is_black(emitted)) return;
   float weight = 1;
   if (!last_.delta) {
-    const float p_l = world_.lights.pdf(hit, last_.p, d_);
+    const float p_l = world_.lights.pdf(hit, last_.p, d_, last_.n);
     weight = last_.pdf / (last_.pdf + p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
   add(beta_ * emitted * weight);
@@ -305,4 +313,5 @@ bool PathTracer<F, Light>::survives(float u) {
 
 }  // namespace ls::render
 
+#include "worker/render/path_glow.h"
 #include "worker/render/path_shadow.h"

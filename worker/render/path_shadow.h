@@ -46,7 +46,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     if (!met) return value;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (surface.veil) {
-      value *= world_.bsdfs.veil(surface.bsdf, hit.uv, hit.shading.to_local(-d)).transmission;
+      value *= world_.bsdfs.veil(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
       if (is_black(value)) return value;
     }
     if constexpr (F.media) medium = medium_beyond(hit, d, medium);

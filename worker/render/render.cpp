@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "worker/render/path.h"
+#include "worker/render/variant.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -23,43 +23,26 @@ class FlushDenormals {
   unsigned saved_;
 };
 
-CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
-  const Group g = stream.group(0, Purpose::camera);
-  const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
-  return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
-}
-
-template <Features F>
-SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample) {
-  const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
-  return PathTracer<F>(w, stream).trace(camera_ray(w, stream, x, y));
-}
-
-using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t);
-struct Variant {
-  Features covers;
-  const char* name;
-  SampleFn sample;
-};
-template <Features F>
-constexpr Variant variant(const char* name) {
-  return {F, name, &sample_with<F>};
-}
 // Cheapest first; the last covers everything.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
     variant<Features{.media = true}>("homogeneous grey media"),
     variant<Features{.media = true, .chromatic = true}>("homogeneous chromatic media"),
     variant<Features{.media = true, .grids = true}>("grey grids"),
+    variant<Features{.media = true, .grids = true, .chromatic = true}>("chromatic grids"),
     variant<kEverything>("everything"),
 };
 static_assert(std::end(kVariants)[-1].covers == kEverything);
 
-const Variant& choose(const Features& need) {
-  for (const Variant& v : kVariants) {
-    if (v.covers.covers(need)) return v;
+std::span<const Variant> variants_for(const World& w) {
+  return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
+}
+const Variant& choose(const World& w) {
+  const auto variants = variants_for(w);
+  for (const Variant& v : variants) {
+    if (v.covers.covers(w.need)) return v;
   }
-  return std::end(kVariants)[-1];
+  return variants.back();
 }
 
 // What a sum in float32 can hold of 2^31 samples. A larger sample is an error of the scene; added up it would
@@ -131,19 +114,19 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
 
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb) {
-  return render_tile_with(world, choose(world.need).sample, tile, samples, stop, breadcrumb);
+  return render_tile_with(world, choose(world).sample, tile, samples, stop, breadcrumb);
 }
 
 std::vector<std::string> covering_variants(const World& world) {
   std::vector<std::string> names;
-  for (const Variant& v : kVariants) {
+  for (const Variant& v : variants_for(world)) {
     if (v.covers.covers(world.need)) names.emplace_back(v.name);
   }
   return names;
 }
 
 TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
-  for (const Variant& v : kVariants) {
+  for (const Variant& v : variants_for(world)) {
     if (name == v.name) return render_tile_with(world, v.sample, tile, samples, nullptr, nullptr);
   }
   return {};
@@ -151,24 +134,27 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
 
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
-  const SampleOutcome out = choose(world.need).sample(world, x, y, sample);
+  const SampleOutcome out = choose(world).sample(world, x, y, sample);
   return {{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out)};
 }
 
 WorldReport describe(const World& w) {
   WorldReport r;
-  r.variant = choose(w.need).name;
+  r.variant = choose(w).name;
   const auto feature = [&](bool used, const std::string& text) {
     (used ? r.used : r.left_out).push_back(text);
   };
   feature(w.need.media, "participating media");
   feature(w.need.grids, "density grids, majorants and their trackers");
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
-  feature(w.equiangular, "equi-angular sampling about lights");
+  feature(w.need.emission, "light given off by media");
+  const bool angles = w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
+  feature(w.distant_mis ? angles : w.equiangular, "equi-angular sampling about lights");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");
   feature(w.camera.has_lens(), "thin lens");
+  feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.textures.bytes() > 0, "image textures");
   feature(w.lights.map(), "environment map, sampled by its brightness");
   if (w.lights.left_out())

@@ -10,6 +10,7 @@
 
 #include "worker/render/equiangular.h"
 #include "worker/render/sampler.h"
+#include "worker/render/segment.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -31,7 +32,7 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, float t) {
 template <Features F>
 class VertexLight {
  public:
-  struct Segment {
+  struct Plan {
     bool focused = false;  // sampled equi-angularly, too
     float length = 0;
   };
@@ -49,19 +50,20 @@ class VertexLight {
   };
 
   template <class Path>
-  static Segment ahead(Path& path, const Medium& medium, float t_max, bool may_scatter) {
-    const bool focused = path.world_.equiangular && !medium.grid && std::isfinite(t_max) && may_scatter;
-    if (focused) focus_on_light(path, medium, t_max);
-    return {focused, t_max};
+  static Plan ahead(Path& path, const Medium& medium, const Segment& segment, bool may_scatter) {
+    const bool focused =
+        path.world_.equiangular && !medium.grid && std::isfinite(segment.length) && may_scatter;
+    if (focused) focus_on_light(path, medium, segment.length);
+    return {focused, segment.length};
   }
 
   template <class Path>
-  static Vertex vertex(const Path& path, const Medium& medium, const Segment& segment, float t) {
+  static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
     Vertex v;
-    if (!segment.focused) return v;
+    if (!plan.focused) return v;
     v.o = path.start_;
     v.d = path.d_;
-    v.length = segment.length;
+    v.length = plan.length;
     v.t = t;
     v.flight_pdf = flight_pdf<F>(medium, path.density_, t);
     v.focused = v.flight_pdf > 0;
@@ -74,7 +76,7 @@ class VertexLight {
     const Lights& lights = path.world_.lights;
     if (!lights.can_sample()) return;
     const Group g = path.stream_.group(path.depth_, Purpose::light);
-    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);

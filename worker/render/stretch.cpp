@@ -1,0 +1,63 @@
+#include "worker/render/stretch.h"
+
+#include <algorithm>
+
+namespace ls::render {
+namespace {
+
+// Positive wherever the density is: the mean of a cell with one hot voxel may be rounded to 0.
+float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0x1p-10f); }
+
+}  // namespace
+
+Stretch::Stretch(const Medium& m, const V3& o, const V3& d, float t_max)
+    : medium_(&m), o_(o), d_(d), t_max_(t_max), to_(t_max), total_(t_max) {
+  if (!m.grid) return;
+  double total = 0;
+  to_ = 0;
+  for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
+    const float rate = rate_of(w.cell());
+    if (!(rate > 0)) continue;
+    if (!(total > 0)) from_ = static_cast<float>(w.entry() + w.begin());
+    to_ = std::min(t_max, static_cast<float>(w.entry() + w.end()));
+    total += double{rate} * (w.end() - w.begin());
+  }
+  total_ = static_cast<float>(total);
+}
+
+Stretch::Spot Stretch::grid_at(float t) const {
+  double passed = 0;
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const auto local = static_cast<float>(t - w.entry());
+    const float rate = rate_of(w.cell());
+    if (local < w.end())
+      return {t, static_cast<float>(passed + double{rate} * std::max(0.f, local - w.begin())), rate,
+              w.index(std::max(local, w.begin()))};
+    passed += double{rate} * (w.end() - w.begin());
+  }
+  return {t, total_, 0, {0, 0, 0}};
+}
+
+Stretch::Spot Stretch::grid_after(float x) const {
+  double passed = 0;
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const float rate = rate_of(w.cell());
+    const double here = double{rate} * (w.end() - w.begin());
+    if (here > 0 && passed + here >= x) {
+      const auto local = std::clamp(w.begin() + static_cast<float>((x - passed) / rate), w.begin(), w.end());
+      return {static_cast<float>(w.entry() + local), x, rate, w.index(local)};
+    }
+    passed += here;
+  }
+  return {to_, total_, 0, {0, 0, 0}};  // rounding put x beyond the end
+}
+
+C3 Stretch::scattering(const Spot& spot, const V3& p) const {
+  if (!medium_->grid) return medium_->sigma_s;
+  const Grid& g = *medium_->density;
+  const float density =
+      g.filter() == VolumeFilter::trilinear ? g.trilinear(spot.index) : g.nearest(spot.index);
+  return medium_->scattering_at(p) * density;
+}
+
+}  // namespace ls::render

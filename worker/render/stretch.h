@@ -1,0 +1,44 @@
+// What a ray meets of a medium, measured so that the medium looks homogeneous: `x` grows with the density
+// that has been passed, and light of channel c fades by about exp(-sigma_t[c] x). In a homogeneous medium x
+// is the length itself and that is exact. In a grid it is the integral over the macro cells' mean densities;
+// the cells are walked anew for every question (a few nanoseconds a cell), nothing is stored.
+#pragma once
+
+#include "worker/render/medium.h"
+
+namespace ls::render {
+
+class Stretch {
+ public:
+  struct Spot {
+    float t = 0;     // along the ray
+    float x = 0;     // what has been passed
+    float rate = 0;  // dx / dt; 0 where there is nothing of the medium
+    V3 index{0, 0, 0};
+  };
+
+  // Along o + t d, d of unit length, up to t_max, which may be infinite.
+  Stretch(const Medium& m, const V3& o, const V3& d, float t_max);
+
+  // The part of the ray outside of which nothing scatters; to() is infinite where the medium has no end.
+  float from() const { return from_; }
+  float to() const { return to_; }
+  // What is passed up to to(). 0: nothing of the medium is met.
+  float total() const { return total_; }
+
+  Spot at(float t) const { return medium_->grid ? grid_at(t) : Spot{t, t, 1, {0, 0, 0}}; }
+  Spot after(float x) const { return medium_->grid ? grid_after(x) : Spot{x, x, 1, {0, 0, 0}}; }
+
+  // Scattering coefficients there; p is the spot in the world.
+  C3 scattering(const Spot& spot, const V3& p) const;
+
+ private:
+  Spot grid_at(float t) const;
+  Spot grid_after(float x) const;
+
+  const Medium* medium_;
+  V3 o_, d_;
+  float t_max_, from_ = 0, to_, total_;
+};
+
+}  // namespace ls::render

@@ -1,0 +1,40 @@
+// One sample of a pixel, by the path tracer that a scene's features and integrator call for.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "worker/render/path.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+
+using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t);
+struct Variant {
+  Features covers;
+  const char* name;
+  SampleFn sample;
+};
+
+inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
+  const Group g = stream.group(0, Purpose::camera);
+  const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
+  return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
+}
+template <Features F, template <Features> class Light>
+SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample) {
+  x += w.origin_x;
+  y += w.origin_y;
+  const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
+  return PathTracer<F, Light>(w, stream).trace(camera_ray(w, stream, x, y));
+}
+
+template <Features F, template <Features> class Light = VertexLight>
+constexpr Variant variant(const char* name) {
+  return {F, name, &sample_with<F, Light>};
+}
+
+// Of `volpath_distant_mis`; cheapest first, the last covers everything.
+std::span<const Variant> distant_variants();
+
+}  // namespace ls::render
