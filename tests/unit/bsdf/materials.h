@@ -16,10 +16,11 @@ struct Bench {
   TextureTable textures;
   BsdfTable bsdfs;
   BsdfIndex bsdf;
+  UvPoint at{{.4f, .55f}, {2, 0, 0}, {-.5f, 1.5f, 0}};  // as in make_oracle.py
 
-  BsdfEval eval(const V3& wo, const V3& wi) const { return bsdfs.eval(bsdf, {.5f, .5f}, wo, wi); }
+  BsdfEval eval(const V3& wo, const V3& wi) const { return bsdfs.eval(bsdf, at, wo, wi); }
   std::optional<BsdfSample> sample(const V3& wo, float u_lobe, const V2& u) const {
-    return bsdfs.sample(bsdf, {.5f, .5f}, wo, u_lobe, u);
+    return bsdfs.sample(bsdf, at, wo, u_lobe, u);
   }
 };
 
@@ -34,12 +35,14 @@ inline BsdfIndex add(Scene& s, const Bsdf& b) {
   return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)};
 }
 
-// Ready to evaluate its last material.
-inline std::unique_ptr<Bench> bench(Scene scene) {
+// Ready to evaluate its last material. `image` is what its files hold.
+inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   auto b = std::make_unique<Bench>();
   b->scene = std::move(scene);
-  auto textures =
-      TextureTable::build(b->scene, [](const Asset&) { return fail(Errc::not_found, "no file"); });
+  auto textures = TextureTable::build(b->scene, [&](const Asset&) -> Result<ImageData> {
+    if (image.channels == 0) return fail(Errc::not_found, "no file");
+    return image;
+  });
   EXPECT_TRUE(textures.has_value()) << textures.error().message;
   b->textures = std::move(*textures);
   auto bsdfs = BsdfTable::build(b->scene, b->textures);
@@ -94,6 +97,51 @@ inline Scene thin_glass(double ior, const Rgb& reflectance = {1, 1, 1},
   add(s, ThinDielectricBsdf{ior, 1, texture(s, reflectance), texture(s, transmittance)});
   return s;
 }
+// Burley's, by the dialect's parameters.
+struct PrincipledValues {
+  double roughness = .5, anisotropic = 0, metallic = 0, spec_trans = 0, eta = 1.5, spec_tint = 0, sheen = 0,
+         sheen_tint = 0, flatness = 0, clearcoat = 0, clearcoat_gloss = 0;
+};
+inline double eta_of_specular(double specular) { return 2 / (1 - std::sqrt(.08 * specular)) - 1; }
+inline Scene principled(const PrincipledValues& v, const Rgb& base = {.8, .4, .1}) {
+  Scene s;
+  PrincipledBsdf b;
+  b.base_color = texture(s, base);
+  b.roughness = texture(s, v.roughness);
+  b.anisotropic = texture(s, v.anisotropic);
+  b.metallic = texture(s, v.metallic);
+  if (v.spec_trans > 0) b.spec_trans = texture(s, v.spec_trans);
+  b.eta = v.eta;
+  b.spec_tint = texture(s, v.spec_tint);
+  b.sheen = texture(s, v.sheen);
+  b.sheen_tint = texture(s, v.sheen_tint);
+  b.flatness = texture(s, v.flatness);
+  b.clearcoat = texture(s, v.clearcoat);
+  b.clearcoat_gloss = texture(s, v.clearcoat_gloss);
+  add(s, b);
+  return s;
+}
+inline PrincipledValues metal_values() {
+  return {.roughness = .3, .anisotropic = .5, .metallic = .7, .eta = eta_of_specular(.8), .spec_tint = .4};
+}
+inline PrincipledValues cloth_values() {
+  return {
+      .roughness = .7, .sheen = .8, .sheen_tint = .5, .flatness = .6, .clearcoat = .7, .clearcoat_gloss = .3};
+}
+inline PrincipledValues glass_values() { return {.roughness = .5, .spec_trans = .9, .eta = 1.4}; }
+inline PrincipledValues all_values() {
+  return {.roughness = .45,
+          .anisotropic = .8,
+          .metallic = .3,
+          .spec_trans = .4,
+          .eta = eta_of_specular(.3),
+          .spec_tint = .6,
+          .sheen = .2,
+          .sheen_tint = 1,
+          .flatness = .3,
+          .clearcoat = .5,
+          .clearcoat_gloss = .1};
+}
 // Of the last material.
 inline BsdfIndex last(const Scene& s) { return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)}; }
 inline Scene masked(Scene s, double opacity) {
@@ -104,10 +152,30 @@ inline Scene two_sided(Scene s) {
   add(s, TwoSidedBsdf{last(s), last(s)});
   return s;
 }
-// By a constant normal.
-inline Scene turned(Scene s, const V3& n) {
-  add(s, NormalMapBsdf{texture(s, Rgb{.5 + .5 * n.x, .5 + .5 * n.y, .5 + .5 * n.z}), last(s)});
+// By a constant normal, without the additions of Mitsuba 3.7 (flipping, shadows).
+inline Scene mapped(Scene s, const Rgb& normal, bool plain) {
+  add(s, NormalMapBsdf{texture(s, normal), last(s), !plain, !plain});
   return s;
+}
+inline Scene turned(Scene s, const V3& n) {
+  return mapped(std::move(s), Rgb{.5 + .5 * n.x, .5 + .5 * n.y, .5 + .5 * n.z}, true);
+}
+inline Scene bumped(Scene s, double scale, bool plain) {
+  s.assets.push_back({"heights.exr", {}, 0});
+  BitmapTexture t;
+  t.raw = true;
+  s.textures.emplace_back(t);
+  add(s, BumpMapBsdf{{static_cast<std::uint32_t>(s.textures.size() - 1)}, scale, last(s), !plain, !plain});
+  return s;
+}
+// Of make_oracle.py.
+inline ImageData oracle_heights() {
+  ImageData d;
+  d.width = 4;
+  d.height = 2;
+  d.channels = 1;
+  d.f32 = {.1f, .4f, .8f, .3f, .2f, .9f, .5f, .6f};
+  return d;
 }
 // The materials of `b` go behind those of `a`; those that contain others are not moved along.
 inline Scene blend(Scene a, const Scene& b, double weight) {

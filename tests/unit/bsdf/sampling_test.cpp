@@ -13,10 +13,10 @@ namespace {
 // The statistical tests of this file together reject a right program with this probability (seeds are fixed,
 // so that in fact they always or never do), split evenly over kChiSquareTests by Sidak.
 constexpr double kFalsePositives = 1e-3;
-constexpr int kMaterials = 29;
+constexpr int kMaterials = 36;
 const double kViewCosines[] = {.98, .5, .1};
 const double kViewCosinesFromBehind[] = {-.95, -.6, -.2};
-constexpr int kChiSquareTests = 17 * 3 + 12 * 6;
+constexpr int kChiSquareTests = 17 * 3 + 12 * 6 + 3 * 3 + 4 * 6;
 
 // x with P(Z > x) = p for a standard normal Z.
 double normal_quantile(double p) {
@@ -69,6 +69,17 @@ std::vector<Named> smooth_materials() {
                                rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1), .6));
   wide("masked gold and glass", blend(masked(rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .3),
                                       rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1), .4));
+  all.push_back({"principled", bench(principled({}))});
+  all.push_back({"principled metal", bench(principled(metal_values()))});
+  all.push_back({"principled cloth", bench(principled(cloth_values()))});
+  wide("gold under a flipping normal map",
+       two_sided(mapped(rough_metal(Microfacet::beckmann, .4, .2, kGoldEta, kGoldK), {.9, .4, .6}, false)));
+  all.push_back({"gold under a bump map",
+                 bench(two_sided(bumped(rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .7, false)),
+                       oracle_heights()),
+                 true});
+  wide("principled glass", principled(glass_values()));
+  wide("principled with everything", principled(all_values()));
   return all;
 }
 

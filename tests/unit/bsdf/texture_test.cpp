@@ -171,6 +171,28 @@ TEST(Checkerboard, ChoosesAsMitsubaDoes) {
   expect(turned(), {0, 1, 1, 0, 1, 0, 1, 1, 1, 0, 1});
 }
 
+// As Mitsuba 3.9.1's eval_1: 0.9 where eval gives 0.1.
+TEST(Checkerboard, IsTheOtherWayRoundAsANumber) {
+  Scene s;
+  s.textures = {ConstantTexture{{.1, .1, .1}}, ConstantTexture{{0, 1, 0}}, CheckerboardTexture{{0}, {1}, {}},
+                CheckerboardTexture{{2}, {0}, {}}, PeakTexture{{2}}};
+  const TextureTable t = table(s, ramp());
+  const V2 even(.2f, .2f), odd(.7f, .2f);
+
+  EXPECT_EQ(t.eval({2}, even), C3(.1f));
+  EXPECT_EQ(t.eval({2}, odd), C3(0, 1, 0));
+  EXPECT_FLOAT_EQ(t.number({2}, even), luminance(C3(0, 1, 0)));
+  EXPECT_FLOAT_EQ(t.number({2}, odd), .1f);
+  // Boards in boards: even of the outer one is its color1, odd its color0, which is a board as a number, too.
+  EXPECT_FLOAT_EQ(t.number({3}, even), .1f);
+  EXPECT_FLOAT_EQ(t.number({3}, odd), .1f);
+  EXPECT_EQ(t.eval({3}, even), C3(.1f));
+  // What is between is asked for its colours.
+  EXPECT_FLOAT_EQ(t.number({4}, even), .1f);
+  EXPECT_FLOAT_EQ(t.number({4}, odd), 1);
+  EXPECT_FLOAT_EQ(t.number({0}, even), .1f);
+}
+
 TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
   Scene s;
   s.textures = {CheckerboardTexture{{1}, {1}, {}}, CheckerboardTexture{{0}, {0}, {}}};

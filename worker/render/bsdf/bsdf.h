@@ -20,6 +20,7 @@
 #include "common/scene/scene.h"
 #include "worker/render/math.h"
 #include "worker/render/texture/texture.h"
+#include "worker/render/texture/uv_point.h"
 
 namespace ls::render {
 
@@ -54,32 +55,37 @@ class BsdfTable {
   // not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
-  BsdfEval eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const;
+  BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;
   // Nothing: absorbed, or the sampled direction is on the wrong side. u_lobe and u are in [0, 1).
-  std::optional<BsdfSample> sample(BsdfIndex i, V2 uv, const V3& wo, float u_lobe, V2 u) const;
+  std::optional<BsdfSample> sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe, V2 u) const;
 
   // For light along w, from either side.
-  Veil veil(BsdfIndex i, V2 uv, const V3& w) const;
+  Veil veil(BsdfIndex i, const UvPoint& uv, const V3& w) const;
 
-  bool is_null(BsdfIndex i) const;      // index-matched boundary: light passes unchanged
-  bool has_veil(BsdfIndex i) const;     // some light passes straight on, some does not
-  bool has_smooth(BsdfIndex i) const;   // any lobe that is not a delta: next-event estimation makes sense
-  bool reads_uv(BsdfIndex i) const;     // some value of it is a texture
-  bool anisotropic(BsdfIndex i) const;  // the tangents of the local frame matter
+  bool is_null(BsdfIndex i) const;       // index-matched boundary: light passes unchanged
+  bool has_veil(BsdfIndex i) const;      // some light passes straight on, some does not
+  bool has_smooth(BsdfIndex i) const;    // any lobe that is not a delta: next-event estimation makes sense
+  bool reads_uv(BsdfIndex i) const;      // some value of it is a texture
+  bool anisotropic(BsdfIndex i) const;   // the tangents of the local frame matter
+  bool reads_slopes(BsdfIndex i) const;  // dp/du and dp/dv matter (UvPoint)
   std::size_t size() const;
   std::uint64_t bytes() const;
   std::uint64_t clamped_inputs() const;  // reflectances above 1 or below 0 brought into [0, 1]
 
   struct Material;
+  struct Principled;
 
  private:
-  BsdfEval eval_wide(const Material& m, V2 uv, const V3& wo, const V3& wi) const;
-  std::optional<BsdfSample> sample_wide(const Material& m, V2 uv, const V3& wo, float u_lobe, V2 u) const;
-  std::optional<BsdfSample> sample_part(std::uint32_t part, V2 uv, const V3& wo, float u_lobe, V2 u) const;
+  BsdfEval eval_wide(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
+  std::optional<BsdfSample> sample_wide(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
+                                        V2 u) const;
+  std::optional<BsdfSample> sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo, float u_lobe,
+                                        V2 u) const;
   struct Mixture;
-  Mixture mixture(const Material& m, V2 uv, const V3& wo) const;
+  Mixture mixture(const Material& m, const UvPoint& uv, const V3& wo) const;
 
   std::vector<Material> materials_;
+  std::vector<Principled> principled_;  // what those materials have beyond the others
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;
 };

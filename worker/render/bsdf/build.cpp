@@ -8,6 +8,7 @@
 #include "common/scene/limits.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
+#include "worker/render/bsdf/principled.h"
 
 namespace ls::render {
 
@@ -28,6 +29,7 @@ class Builder {
 
   std::optional<Error> error;
   std::uint64_t clamped = 0;
+  std::vector<BsdfTable::Principled> principled;
 
   Material operator()(const DiffuseBsdf& b) {
     Material m = make(MaterialKind::diffuse);
@@ -128,7 +130,42 @@ class Builder {
     Material m = make(MaterialKind::normal_map);
     m.veil = traits_[b.bsdf.value].passes;
     m.specular_slot = slot(b.normalmap);
+    m.flips = b.flip_invalid_normals;
+    m.shadows = b.use_shadowing_function;
     m.front = b.bsdf.value;
+    return m;
+  }
+  Material operator()(const BumpMapBsdf& b) {
+    Material m = make(MaterialKind::bump_map);
+    m.veil = traits_[b.bsdf.value].passes;
+    m.specular_slot = slot(b.texture);
+    m.flips = b.flip_invalid_normals;
+    m.shadows = b.use_shadowing_function;
+    m.specular_weight = static_cast<float>(b.scale);
+    if (!std::isfinite(m.specular_weight)) refuse(fmt::format("a bump map's scale is {}", b.scale));
+    m.front = b.bsdf.value;
+    return m;
+  }
+  Material operator()(const PrincipledBsdf& b) {
+    Material m = make(MaterialKind::principled);
+    m.front = static_cast<std::uint32_t>(principled.size());
+    BsdfTable::Principled p;
+    p.base_color = reflectance(b.base_color);
+    p.roughness = reflectance(b.roughness);
+    p.anisotropic = reflectance(b.anisotropic);
+    p.metallic = reflectance(b.metallic);
+    p.spec_tint = reflectance(b.spec_tint);
+    p.sheen = reflectance(b.sheen);
+    p.sheen_tint = reflectance(b.sheen_tint);
+    p.flatness = reflectance(b.flatness);
+    p.clearcoat = reflectance(b.clearcoat);
+    p.clearcoat_gloss = reflectance(b.clearcoat_gloss);
+    p.transmits = b.spec_trans.has_value();
+    p.spec_trans = b.spec_trans ? reflectance(*b.spec_trans) : Slot{C3(0), {}, true};
+    p.eta = static_cast<float>(index(b.eta, 1));
+    // As Mitsuba: a boundary without contrast has no facets to be seen.
+    if (p.transmits && std::abs(p.eta - 1) < 1e-3f) p.eta = 1.001f;
+    principled.push_back(p);
     return m;
   }
 
@@ -228,6 +265,7 @@ bool any_part(const Material& m, F holds) {
       return holds(BsdfIndex{m.front}) || holds(BsdfIndex{m.back});
     case MaterialKind::mask:
     case MaterialKind::normal_map:
+    case MaterialKind::bump_map:
       return holds(BsdfIndex{m.front});
     default:
       return false;
@@ -255,11 +293,14 @@ Result<BsdfTable> BsdfTable::build(const Scene& scene, const TextureTable& textu
                   fmt::format("material {}: {}", table.materials_.size() - 1, builder.error->message));
   }
   table.clamped_ = builder.clamped;
+  table.principled_ = std::move(builder.principled);
   return table;
 }
 
 std::size_t BsdfTable::size() const { return materials_.size(); }
-std::uint64_t BsdfTable::bytes() const { return materials_.size() * sizeof(Material); }
+std::uint64_t BsdfTable::bytes() const {
+  return materials_.size() * sizeof(Material) + principled_.size() * sizeof(Principled);
+}
 std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 
 bool BsdfTable::is_null(BsdfIndex i) const { return materials_[i.value].kind == MaterialKind::null; }
@@ -272,6 +313,7 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
     case MaterialKind::rough_plastic:
     case MaterialKind::plastic:
     case MaterialKind::rough_dielectric:
+    case MaterialKind::principled:
       return true;
     default:
       return any_part(m, [&](BsdfIndex part) { return has_smooth(part); });
@@ -279,16 +321,22 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
 }
 bool BsdfTable::reads_uv(BsdfIndex i) const {
   const Material& m = materials_[i.value];
+  if (m.kind == MaterialKind::principled) return principled_[m.front].reads_uv();
   return !(m.specular_slot.constant && m.second_slot.constant && m.alpha_u.constant && m.alpha_v.constant) ||
          any_part(m, [&](BsdfIndex part) { return reads_uv(part); });
 }
 bool BsdfTable::anisotropic(BsdfIndex i) const {
   const Material& m = materials_[i.value];
-  if (m.kind == MaterialKind::normal_map) return true;
+  if (m.kind == MaterialKind::normal_map || m.kind == MaterialKind::bump_map) return true;
+  if (m.kind == MaterialKind::principled) return principled_[m.front].is_anisotropic();
   const bool same = m.alpha_u.constant ? m.alpha_v.constant && m.alpha_u.value == m.alpha_v.value
                                        : !m.alpha_v.constant && m.alpha_u.texture == m.alpha_v.texture;
   return ((m.kind == MaterialKind::rough_conductor || m.kind == MaterialKind::rough_dielectric) && !same) ||
          any_part(m, [&](BsdfIndex part) { return anisotropic(part); });
+}
+bool BsdfTable::reads_slopes(BsdfIndex i) const {
+  const Material& m = materials_[i.value];
+  return m.kind == MaterialKind::bump_map || any_part(m, [&](BsdfIndex part) { return reads_slopes(part); });
 }
 
 }  // namespace ls::render

@@ -10,7 +10,7 @@ namespace ls::render {
 
 struct Lookup {
   const TextureTable& textures;
-  V2 uv;
+  V2 uv;  // of the surface
 
   C3 reflectance(const Slot& s) const {
     if (s.constant) return s.value;
@@ -18,7 +18,8 @@ struct Lookup {
     return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
   }
   float scalar(const Slot& s) const {
-    const C3 c = s.constant ? s.value : textures.eval(s.texture, uv);
+    if (!s.constant) return textures.number(s.texture, uv);
+    const C3& c = s.value;
     return c.x == c.y && c.y == c.z ? c.x : luminance(c);
   }
   float share(const Slot& s) const { return std::clamp(scalar(s), 0.f, 1.f); }

@@ -21,7 +21,9 @@ enum class MaterialKind : std::uint8_t {
   rough_dielectric,
   mask,
   blend,
-  normal_map
+  normal_map,
+  bump_map,
+  principled
 };
 inline constexpr MaterialKind kFirstWide = MaterialKind::thin_dielectric;
 
@@ -36,16 +38,19 @@ struct BsdfTable::Material {
   MaterialKind kind = MaterialKind::diffuse;
   Microfacet distribution = Microfacet::beckmann;
   bool nonlinear = false;
-  bool specular = false;  // rough plastic with a smooth coat
-  bool veil = false;      // some light passes straight on, and some does not
+  bool specular = false;                // rough plastic with a smooth coat
+  bool veil = false;                    // some light passes straight on, and some does not
+  bool flips = false, shadows = false;  // maps: flip_invalid_normals, use_shadowing_function
   std::uint32_t front = 0,
-                back = 0;  // two_sided: materials that are not two-sided themselves; parts of others
-  Slot specular_slot;      // specular_reflectance; opacity of mask, weight of blend, colours of normal_map
+                back = 0;  // two_sided: materials that are not two-sided themselves; parts of others;
+                           // principled: front is its place in the list of those
+  Slot specular_slot;      // specular_reflectance; opacity of mask, weight of blend, colours of normal_map,
+                           // heights of bump_map
   Slot second_slot;        // specular_transmittance; diffuse reflectance of diffuse and plastics
   Slot alpha_u, alpha_v;
   C3 eta{0, 0, 0}, k{1, 1, 1};  // conductors
   float ior = 1;                // inside over outside
-  float specular_weight = 1;    // plastics: how often the coat is sampled, before Fresnel
+  float specular_weight = 1;    // plastics: how often the coat is sampled, before Fresnel; bump_map: scale
   RoughPlasticTable coat;       // of plastic only its internal reflectance
 };
 

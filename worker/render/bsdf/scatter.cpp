@@ -121,7 +121,7 @@ V3 flipped(const V3& w) { return {w.x, w.y, -w.z}; }
 
 }  // namespace
 
-BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
+BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Material* m = &materials_[i.value];
   V3 o = wo, in = wi;
   if (m->kind == MaterialKind::two_sided) {
@@ -148,7 +148,8 @@ BsdfEval BsdfTable::eval(BsdfIndex i, V2 uv, const V3& wo, const V3& wi) const {
   }
 }
 
-std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, V2 uv, const V3& wo, float u_lobe, V2 u) const {
+std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe,
+                                            V2 u) const {
   const Material* m = &materials_[i.value];
   if (m->kind == MaterialKind::null) {
     BsdfSample s;

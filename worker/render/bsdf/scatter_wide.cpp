@@ -1,6 +1,7 @@
 // Kinds that scatter to both sides of the surface, let light pass, or consist of others. Materials that
 // consist of others recurse into them, at most scene::kMaxBsdfNesting deep (checked by build()).
 #include "worker/render/bsdf/lobes.h"
+#include "worker/render/bsdf/principled.h"
 #include "worker/render/bsdf/rough_dielectric.h"
 
 namespace ls::render {
@@ -15,11 +16,31 @@ float sheet_reflectance(float cos, float ior) {
   return static_cast<float>(2 * r / (1 + r));
 }
 
-// The frame that a normal map's material sees, in the surface's own: s as near to the surface's as the normal
-// allows.
-Frame mapped_frame(const Material& m, const Lookup& look) {
-  const C3 c = look.reflectance(m.specular_slot);
-  return Frame::from_tangent(normalize(c * 2 - V3(1)), V3(1, 0, 0));
+// The normal of a normal or bump map in the surface's own frame, of any length. A bump map lifts the surface
+// by h along its normal n, which changes only the components along n of dp/du and dp/dv, to dh/du and dh/dv
+// (Blinn 1978, without the change of n itself).
+V3 mapped_normal(const Material& m, const Lookup& look, const UvPoint& at) {
+  if (m.kind == MaterialKind::normal_map) return look.reflectance(m.specular_slot) * 2 - V3(1);
+  if (m.specular_slot.constant) return {0, 0, 1};
+  const V2 slope = look.textures.slope(m.specular_slot.texture, at.uv) * m.specular_weight;
+  const V3 n = cross({at.du.x, at.du.y, slope.x}, {at.dv.x, at.dv.y, slope.y});
+  if (n.z == 0) return {0, 0, 1};  // u and v are no directions here
+  return n.z < 0 ? -n : n;         // they may run either way
+}
+// The frame that the material in it sees: s as near to the surface's as the normal allows. A normal that
+// faces away from the viewer is turned by half a circle about the surface's (Schuessler et al. 2017).
+Frame mapped_frame(const Material& m, const Lookup& look, const UvPoint& at, const V3& wo) {
+  V3 n = mapped_normal(m, look, at);
+  if (m.flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
+  const float l2 = dot(n, n);
+  return l2 > 0 && std::isfinite(l2) ? Frame::from_tangent(n * (1 / std::sqrt(l2)), V3(1, 0, 0)) : Frame();
+}
+// What the shadow that facets of the map's slope cast on each other leaves of light from wi (Estevez, Lecocq,
+// Stein 2019).
+float mapped_shadow(const Material& m, const V3& n, const V3& wi) {
+  if (!m.shadows) return 1;
+  const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
+  return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
 }
 // Both frames must have a direction on the same side: nothing is lit, or seen, through the surface.
 bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
@@ -34,7 +55,7 @@ struct BsdfTable::Mixture {
   float share[2], chance[2];
 };
 
-BsdfTable::Mixture BsdfTable::mixture(const Material& m, V2 uv, const V3& wo) const {
+BsdfTable::Mixture BsdfTable::mixture(const Material& m, const UvPoint& uv, const V3& wo) const {
   const float w = Lookup{*textures_, uv}.share(m.specular_slot);
   Mixture x{{1 - w, w}, {1 - w, w}};
   if (!m.veil) return x;
@@ -46,7 +67,7 @@ BsdfTable::Mixture BsdfTable::mixture(const Material& m, V2 uv, const V3& wo) co
   return x;
 }
 
-Veil BsdfTable::veil(BsdfIndex i, V2 uv, const V3& w) const {
+Veil BsdfTable::veil(BsdfIndex i, const UvPoint& uv, const V3& w) const {
   const Material& m = materials_[i.value];
   const Lookup look{*textures_, uv};
   switch (m.kind) {
@@ -69,13 +90,21 @@ Veil BsdfTable::veil(BsdfIndex i, V2 uv, const V3& w) const {
               a.probability * (1 - weight) + b.probability * weight};
     }
     case MaterialKind::normal_map:
-      return m.veil ? veil({m.front}, uv, mapped_frame(m, look).to_local(w)) : Veil{};
+    case MaterialKind::bump_map: {
+      if (!m.veil) return {};
+      const Frame frame = mapped_frame(m, look, uv, w);
+      const V3 in = frame.to_local(w);
+      if (!same_side(in, w)) return {};
+      Veil v = veil({m.front}, uv.seen_in(frame), in);
+      v.transmission *= mapped_shadow(m, frame.n, w);  // as of all that it scatters
+      return v;
+    }
     default:
       return {};
   }
 }
 
-BsdfEval BsdfTable::eval_wide(const Material& m, V2 uv, const V3& wo, const V3& wi) const {
+BsdfEval BsdfTable::eval_wide(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Lookup look{*textures_, uv};
   switch (m.kind) {
     case MaterialKind::rough_dielectric: {
@@ -94,26 +123,31 @@ BsdfEval BsdfTable::eval_wide(const Material& m, V2 uv, const V3& wo, const V3& 
       const BsdfEval a = eval({m.front}, uv, wo, wi), b = eval({m.back}, uv, wo, wi);
       return {a.f_cos * x.share[0] + b.f_cos * x.share[1], a.pdf * x.chance[0] + b.pdf * x.chance[1]};
     }
-    case MaterialKind::normal_map: {
-      const Frame frame = mapped_frame(m, look);
+    case MaterialKind::normal_map:
+    case MaterialKind::bump_map: {
+      const Frame frame = mapped_frame(m, look, uv, wo);
       const V3 o = frame.to_local(wo), in = frame.to_local(wi);
       if (!same_side(o, wo) || !same_side(in, wi)) return {};
-      return eval({m.front}, uv, o, in);
+      BsdfEval e = eval({m.front}, uv.seen_in(frame), o, in);
+      e.f_cos *= mapped_shadow(m, frame.n, wi);
+      return e;
     }
+    case MaterialKind::principled:
+      return eval_principled(principled_[m.front], look, wo, wi);
     default:
       return {};
   }
 }
 
 // Of what a part of a material scatters: a part that is nothing but a veil scatters nothing.
-std::optional<BsdfSample> BsdfTable::sample_part(std::uint32_t part, V2 uv, const V3& wo, float u_lobe,
-                                                 V2 u) const {
+std::optional<BsdfSample> BsdfTable::sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo,
+                                                 float u_lobe, V2 u) const {
   if (materials_[part].kind == MaterialKind::null) return std::nullopt;
   return sample({part}, uv, wo, u_lobe, u);
 }
 
-std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, V2 uv, const V3& wo, float u_lobe,
-                                                 V2 u) const {
+std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoint& uv, const V3& wo,
+                                                 float u_lobe, V2 u) const {
   const Lookup look{*textures_, uv};
   switch (m.kind) {
     case MaterialKind::thin_dielectric:
@@ -149,15 +183,19 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, V2 uv, const
       s->pdf = pdf;
       return s;
     }
-    case MaterialKind::normal_map: {
-      const Frame frame = mapped_frame(m, look);
+    case MaterialKind::principled:
+      return sample_principled(principled_[m.front], look, wo, u_lobe, u);
+    case MaterialKind::normal_map:
+    case MaterialKind::bump_map: {
+      const Frame frame = mapped_frame(m, look, uv, wo);
       const V3 o = frame.to_local(wo);
       if (!same_side(o, wo)) return std::nullopt;
-      auto s = sample_part(m.front, uv, o, u_lobe, u);
+      auto s = sample_part(m.front, uv.seen_in(frame), o, u_lobe, u);
       if (!s) return s;
       const V3 w = normalize(frame.to_world(s->wi));
       if (!same_side(w, s->wi)) return std::nullopt;
       s->wi = w;
+      s->weight *= mapped_shadow(m, frame.n, w);
       return s;
     }
     default:

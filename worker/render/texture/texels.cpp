@@ -25,6 +25,11 @@ float fold(float u, Wrap wrap) {
   return std::clamp(u, 0.f, 1.f);
 }
 
+// Its derivative; beyond the edges of a clamped image neighbours() are the same texel, and slopes 0 anyway.
+float fold_slope(float u, Wrap wrap) {
+  return wrap == Wrap::mirror && u - 2 * std::floor(u * .5f) > 1 ? -1.f : 1.f;
+}
+
 struct Span2 {
   std::uint32_t lo, hi;
   float t;  // weight of hi
@@ -106,6 +111,16 @@ C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
   const C3 top = texel(x.lo, y.lo) * (1 - x.t) + texel(x.hi, y.lo) * x.t;
   const C3 bottom = texel(x.lo, y.hi) * (1 - x.t) + texel(x.hi, y.hi) * x.t;
   return top * (1 - y.t) + bottom * y.t;
+}
+
+V2 Texels::slope(const V2& uv, Wrap wrap) const {
+  const Span2 x = neighbours(fold(uv.x, wrap), width, wrap), y = neighbours(fold(uv.y, wrap), height, wrap);
+  const float f00 = luminance(texel(x.lo, y.lo)), f10 = luminance(texel(x.hi, y.lo)),
+              f01 = luminance(texel(x.lo, y.hi)), f11 = luminance(texel(x.hi, y.hi));
+  const float across = (f10 - f00) * (1 - y.t) + (f11 - f01) * y.t;
+  const float down = (f01 - f00) * (1 - x.t) + (f11 - f10) * x.t;
+  return {across * static_cast<float>(width) * fold_slope(uv.x, wrap),
+          down * static_cast<float>(height) * fold_slope(uv.y, wrap)};
 }
 
 Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha) {

@@ -35,6 +35,8 @@ struct Texels {
   }
   // uv finite, (0, 0) the upper left corner of the image.
   C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
+  // Derivatives of the luminance of the bilinear lookup() by u and v.
+  V2 slope(const V2& uv, Wrap wrap) const;
 };
 
 // Drops alpha, decodes sRGB unless raw, refuses NaN and infinity with the texel's place. With `alpha` it is

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <tuple>
@@ -33,13 +34,13 @@ Result<UvAffine> affine(const UvTransform& t) {
   return UvAffine{m(0), m(1), m(2), m(3), m(4), m(5)};
 }
 
-enum class Kind : std::uint8_t { constant, bitmap, checkerboard };
+enum class Kind : std::uint8_t { constant, bitmap, checkerboard, peak, hue };
 
 struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  std::uint32_t first = 0, second = 0;  // texels, or the two textures of a checkerboard
+  std::uint32_t first = 0, second = 0;  // texels, the two textures of a checkerboard, the one of a peak
   C3 value{0, 0, 0};                    // of a constant; else the mean
   UvAffine to_uv;
 };
@@ -73,33 +74,61 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
 }
 
-// Means of checkerboards, children first. A chain of n takes n passes; one that never settles is a circle.
-Result<void> resolve_checkerboards(TextureTable::Data& data) {
+C3 peak_of(const C3& c) {
+  const float peak = std::max({c.x, c.y, c.z});
+  return {peak, peak, peak};
+}
+C3 hue_of(const C3& c) {
+  const float peak = std::max({c.x, c.y, c.z});
+  return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
+}
+
+// Means of what contains other textures, children first. A chain of n takes n passes; one that never settles
+// is a circle.
+Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {
     bool changed = false;
     for (std::size_t i = 0; i < data.entries.size(); ++i) {
       Entry& e = data.entries[i];
-      if (e.kind != Kind::checkerboard) continue;
-      e.value = (data.entries[e.first].value + data.entries[e.second].value) * .5f;
-      const int d = 1 + std::max(depth[e.first], depth[e.second]);
+      int d = 1;
+      if (e.kind == Kind::checkerboard) {
+        e.value = (data.entries[e.first].value + data.entries[e.second].value) * .5f;
+        d += std::max(depth[e.first], depth[e.second]);
+      } else if (e.kind == Kind::peak || e.kind == Kind::hue) {
+        const C3& inner = data.entries[e.first].value;
+        e.value = e.kind == Kind::peak ? peak_of(inner) : hue_of(inner);
+        d += depth[e.first];
+      } else {
+        continue;
+      }
       changed |= d != depth[i];
       depth[i] = d;
     }
     if (!changed) return {};
   }
   return fail(Errc::invalid_argument,
-              fmt::format("checkerboard textures contain each other in a circle, or more than {} deep",
+              fmt::format("textures contain each other in a circle, or more than {} deep",
                           scene::kMaxReferenceDepth));
 }
 
-const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv) {
+enum class Read { colour, number };
+
+const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv, Read as) {
   while (e->kind == Kind::checkerboard) {
     const V2 p = e->to_uv(uv);
     const bool right = p.x - std::floor(p.x) > .5f, lower = p.y - std::floor(p.y) > .5f;
-    e = &data.entries[right == lower ? e->first : e->second];
+    e = &data.entries[(right == lower) == (as == Read::colour) ? e->first : e->second];
   }
   return *e;
+}
+
+// Of what is no checkerboard. As deep as textures nest: kMaxReferenceDepth at most.
+C3 value_of(const TextureTable& table, const Entry& t, const V2& uv) {
+  if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv));
+  if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv));
+  return t.kind == Kind::constant ? t.value
+                                  : table.data().texels[t.first].lookup(t.to_uv(uv), t.filter, t.wrap);
 }
 
 }  // namespace
@@ -135,20 +164,43 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
       return fail(Errc::invalid_argument, "a checkerboard names a texture that does not exist");
     return Entry{Kind::checkerboard, {}, {}, t.color0.value, t.color1.value, {0, 0, 0}, *to_uv};
   };
+  const auto peak = [&](const PeakTexture& t) -> Result<Entry> {
+    if (t.texture.value >= scene.textures.size())
+      return fail(Errc::invalid_argument, "a texture \"peak\" names a texture that does not exist");
+    return Entry{t.hue ? Kind::hue : Kind::peak, {}, {}, t.texture.value, 0, {0, 0, 0}, {}};
+  };
   for (const Texture& t : scene.textures) {
-    auto entry = std::visit(overloaded{constant, bitmap, checkerboard}, t);
+    auto entry = std::visit(overloaded{constant, bitmap, checkerboard, peak}, t);
     if (!entry) return tl::unexpected(entry.error());
     data.entries.push_back(*entry);
   }
-  if (auto ok = resolve_checkerboards(data); !ok) return tl::unexpected(ok.error());
+  if (auto ok = resolve_nested(data); !ok) return tl::unexpected(ok.error());
   return table;
 }
 
 C3 TextureTable::eval(TextureIndex i, V2 uv) const {
   const Entry* e = &data_->entries[i.value];
   if (e->kind == Kind::constant) return e->value;
-  const Entry& t = leaf(*data_, e, uv);
-  return t.kind == Kind::constant ? t.value : data_->texels[t.first].lookup(t.to_uv(uv), t.filter, t.wrap);
+  return value_of(*this, leaf(*data_, e, uv, Read::colour), uv);
+}
+
+float TextureTable::number(TextureIndex i, V2 uv) const {
+  const C3 c = value_of(*this, leaf(*data_, &data_->entries[i.value], uv, Read::number), uv);
+  return c.x == c.y && c.y == c.z ? c.x : luminance(c);
+}
+
+V2 TextureTable::slope(TextureIndex i, V2 uv) const {
+  const Entry& e = data_->entries[i.value];
+  if (e.kind != Kind::bitmap || e.filter != TextureFilter::bilinear) return {0, 0};
+  const V2 s = data_->texels[e.first].slope(e.to_uv(uv), e.wrap);
+  return {e.to_uv.a * s.x + e.to_uv.d * s.y, e.to_uv.b * s.x + e.to_uv.e * s.y};
+}
+
+double TextureTable::aspect(TextureIndex i) const {
+  const Entry& e = data_->entries[i.value];
+  if (e.kind != Kind::bitmap) return 1;
+  const Texels& t = data_->texels[e.first];
+  return static_cast<double>(t.width) / t.height;
 }
 
 bool TextureTable::is_constant(TextureIndex i) const {

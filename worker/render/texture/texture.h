@@ -28,6 +28,11 @@ class TextureTable {
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load);
 
   C3 eval(TextureIndex i, V2 uv) const;
+  // Where one number is wanted: the luminance, and of checkerboards the other colour (see scene.h).
+  float number(TextureIndex i, V2 uv) const;
+  // Derivatives by u and v of the luminance of a bilinear bitmap; 0 of anything else.
+  V2 slope(TextureIndex i, V2 uv) const;
+  double aspect(TextureIndex i) const;  // width over height of a bitmap; 1 of anything else
   bool is_constant(TextureIndex i) const;
   C3 constant(TextureIndex i) const;  // its value if is_constant(i), else its mean
   C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights

@@ -1,0 +1,36 @@
+// Burley's principled material ("Physically Based Shading at Disney", 2012; "Extending the Disney BRDF to a
+// BSDF with Integrated Subsurface Scattering", 2015) with the parameters and formulas of Mitsuba 3's plugin
+// `principled`. It has four lobes: diffuse (with retro-reflection, sheen and an imitation of scattering
+// below), a clear coat (GTR1), and GGX facets that reflect and, with spec_trans, refract.
+//
+// Sampling: a lobe is chosen from what is known at wo alone; of the facets, a visible normal first and then,
+// by its Fresnel reflectance F, whether it reflects. With m metallic, t spec_trans and b = (1 - m) t the
+// chances are, from the front and up to their sum, 1 for the facets (of which 1 - b (1 - F) reflect), 1/4 of
+// the coat for the coat, (1 - m) (1 - t) for the diffuse lobe; from behind there are the facets alone, of
+// which F reflect.
+#pragma once
+
+#include "worker/render/bsdf/lobes.h"
+
+namespace ls::render {
+
+struct BsdfTable::Principled {
+  Slot base_color, roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness,
+      clearcoat, clearcoat_gloss;
+  bool transmits = false;
+  float eta = 1.5f;  // inside over outside
+
+  bool reads_uv() const {
+    for (const Slot* s : {&base_color, &roughness, &anisotropic, &metallic, &spec_trans, &spec_tint, &sheen,
+                          &sheen_tint, &flatness, &clearcoat, &clearcoat_gloss})
+      if (!s->constant) return true;
+    return false;
+  }
+  bool is_anisotropic() const { return !anisotropic.constant || anisotropic.value.x > 0; }
+};
+
+BsdfEval eval_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo, const V3& wi);
+std::optional<BsdfSample> sample_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo,
+                                            float u_lobe, const V2& u);
+
+}  // namespace ls::render
