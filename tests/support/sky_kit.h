@@ -30,8 +30,8 @@ struct SkyImage {
   }
 };
 
-// The kit's environment from now on, as a file of floats.
-inline void add_sky(SceneKit& kit, const SkyImage& image, const Transform& to_world = {}, double scale = 1) {
+// As a file of floats.
+inline AssetIndex add_image(SceneKit& kit, const SkyImage& image) {
   static const ScratchFolder folder;
   ExrPicture picture;
   picture.size = {image.width, image.height};
@@ -48,8 +48,13 @@ inline void add_sky(SceneKit& kit, const SkyImage& image, const Transform& to_wo
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
   kit.files[asset.digest] = path;
+  return SceneKit::push<AssetTag>(kit.scene.assets, asset);
+}
+
+// The kit's environment from now on.
+inline void add_sky(SceneKit& kit, const SkyImage& image, const Transform& to_world = {}, double scale = 1) {
   EnvmapEmitter e;
-  e.file = SceneKit::push<AssetTag>(kit.scene.assets, asset);
+  e.file = add_image(kit, image);
   e.to_world = to_world;
   e.scale = scale;
   kit.scene.emitters.push_back(e);

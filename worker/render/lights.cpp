@@ -24,17 +24,17 @@ float one_minus_cos(const Sphere& s, float sign, const V3& x) {
 
 }  // namespace
 
-LightChoice Lights::choose(const LightNumbers& numbers) const {
-  const auto it = std::lower_bound(last_.begin(), last_.end() - 1, numbers.light);
+LightChoice Lights::chosen(const LightNumbers& numbers, const Drawn& drawn) const {
   LightChoice c;
-  c.light = static_cast<std::uint32_t>(it - last_.begin());
+  c.light = drawn.light;
+  c.probability = drawn.probability;
   const Light& l = lights_[c.light];
-  c.probability = l.probability;
   c.numbers = numbers;
   c.has_place = has_place(l.kind);
   switch (l.kind) {
     case Kind::point:
     case Kind::spot:
+    case Kind::projector:
       c.pivot = l.position;
       break;
     case Kind::sphere:
@@ -43,9 +43,11 @@ LightChoice Lights::choose(const LightNumbers& numbers) const {
     case Kind::parallelogram:
     case Kind::mesh:
     case Kind::disk:
+    case Kind::cylinder:
       c.pivot = area_point(l, numbers).p;
       break;
     case Kind::directional:
+    case Kind::sun:
     case Kind::map:
       break;
   }
@@ -55,6 +57,7 @@ LightChoice Lights::choose(const LightNumbers& numbers) const {
 Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) const {
   if (l.kind == Kind::mesh) return mesh_point(l, numbers);
   const V2 u(unit_float(numbers.x), unit_float(numbers.y));
+  if (l.kind == Kind::cylinder) return cylinder_point(l, u);
   if (l.kind == Kind::parallelogram) {
     return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y};
   }
@@ -64,6 +67,13 @@ Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) co
   return {l.position + l.axis_u * q.x + l.axis_v * q.y,
           l.normal,
           {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi}};
+}
+
+Lights::Point Lights::cylinder_point(const Light& l, V2 u) const {
+  const Cylinder& c = geometry_->cylinders[l.primitive];
+  const V2 q = unit_circle(u.y);
+  const V3d n = c.u * double{q.x} + c.v * double{q.y};
+  return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * l.sign, {u.y, u.x}};
 }
 
 // The first number chooses the triangle and is stretched to be used again.
@@ -87,7 +97,7 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
   return y;
 }
 
-std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, const V3& x) const {
+std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, const V3& x, float p) const {
   const V3 target = offset_point(y.p, y.n, y.n);  // just in front of the light: the shadow ray ends before it
   const V3 f = target - x;
   const float d2 = dot(f, f);
@@ -99,13 +109,14 @@ std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, c
   s.target = target;
   const float cosine = -dot(s.direction, y.n);
   if (!(cosine > 0)) return std::nullopt;
-  s.radiance = area_radiance(l, y.uv);
-  s.pdf = static_cast<float>(d2 / (cosine * l.area)) * l.probability;
+  s.radiance = area_radiance(l, y.uv, cosine);
+  if (l.beam && is_black(s.radiance)) return std::nullopt;
+  s.pdf = static_cast<float>(d2 / (cosine * l.area)) * p;
   if (!std::isfinite(s.pdf)) return std::nullopt;
   return s;
 }
 
-std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3& x) const {
+std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3& x, float p) const {
   const Sphere& sphere = geometry_->spheres[l.primitive];
   const float cone = one_minus_cos(sphere, l.sign, x);
   if (!(cone > 0)) return std::nullopt;
@@ -126,13 +137,14 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   // At the rim rounding may miss the sphere: the nearest point of the ray stands for it.
   const double reach = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * reach - sphere.center).normalized();
-  const V3 p(sphere.center + n * sphere.radius);
-  const V3 target = offset_point(p, V3(n), V3(n) * l.sign), f = target - x;
+  const V3 y(sphere.center + n * sphere.radius);
+  const V3 target = offset_point(y, V3(n), V3(n) * l.sign), f = target - x;
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
-  s.pdf = l.probability / (kTwoPi * cone);
-  s.radiance = area_radiance(l, l.textured ? sphere_uv(sphere, n) : V2(0, 0));
-  if (!(s.distance > 0) || !std::isfinite(s.pdf)) return std::nullopt;
+  s.pdf = p / (kTwoPi * cone);
+  const float facing = l.beam ? -l.sign * dot(V3(n), s.direction) : 1.f;
+  s.radiance = area_radiance(l, l.textured ? sphere_uv(sphere, n) : V2(0, 0), facing);
+  if (!(s.distance > 0) || !std::isfinite(s.pdf) || (l.beam && is_black(s.radiance))) return std::nullopt;
   return s;
 }
 
@@ -145,35 +157,26 @@ std::optional<LightSample> Lights::sample_map(const LightNumbers& numbers) const
   return LightSample{direction, kInfinity, V3(0), light.radiance, pdf, false};
 }
 
-C3 Lights::spot_radiance(const Light& l, const V3& towards) const {
-  const float z = dot(towards, l.normal);
-  if (z <= l.cos_cutoff) return {0, 0, 0};
-  C3 value = l.value;
-  if (z < l.cos_beam) value *= (l.cutoff - std::acos(std::min(z, 1.f))) * l.inv_transition;
-  if (l.textured) {
-    const float k = .5f / (z * l.tan_cutoff);
-    value *=
-        textures_->eval(l.radiance, {.5f + dot(towards, l.axis_u) * k, .5f + dot(towards, l.axis_v) * k});
-  }
-  return value;
-}
-
 std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) const {
   const Light& l = lights_[c.light];
   switch (l.kind) {
     case Kind::parallelogram:
     case Kind::mesh:
     case Kind::disk:
-      return sample_area(l, area_point(l, c.numbers), x);
+    case Kind::cylinder:
+      return sample_area(l, area_point(l, c.numbers), x, c.probability);
     case Kind::sphere:
-      return sample_sphere(l, {unit_float(c.numbers.x), unit_float(c.numbers.y)}, x);
+      return sample_sphere(l, {unit_float(c.numbers.x), unit_float(c.numbers.y)}, x, c.probability);
     case Kind::directional: {
       return LightSample{-l.normal, kInfinity, V3(0), l.value, l.probability, true};
     }
+    case Kind::sun:
+      return sample_sun(l, {unit_float(c.numbers.x), unit_float(c.numbers.y)});
     case Kind::map:
       return sample_map(c.numbers);
     case Kind::point:
     case Kind::spot:
+    case Kind::projector:
       break;
   }
   const V3 f = l.position - x;
@@ -183,8 +186,11 @@ std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) con
   s.distance = std::sqrt(d2);
   s.direction = f / s.distance;
   s.target = l.position;
-  s.radiance = (l.kind == Kind::spot ? spot_radiance(l, -s.direction) : l.value) / d2;
-  s.pdf = l.probability;
+  if (l.kind == Kind::projector)
+    s.radiance = projected(l, -s.direction) / d2;
+  else
+    s.radiance = (l.kind == Kind::spot ? spot_radiance(l, -s.direction) : l.value) / d2;
+  s.pdf = c.probability;
   s.delta = true;
   if (is_black(s.radiance) || !is_finite(s.radiance)) return std::nullopt;
   return s;
@@ -194,19 +200,22 @@ C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
   const std::uint32_t i = geometry_->surfaces[hit.surface].light;
   if (i == kNone || !(dot(hit.ng, w) > 0)) return {0, 0, 0};
   return area_radiance(lights_[i],
-                       lights_[i].kind == Kind::sphere && !lights_[i].textured ? V2(0, 0) : hit.uv);
+                       lights_[i].kind == Kind::sphere && !lights_[i].textured ? V2(0, 0) : hit.uv,
+                       dot(hit.ng, w));
 }
 
-float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction) const {
-  const Light& l = lights_[geometry_->surfaces[hit.surface].light];
+float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n) const {
+  const std::uint32_t light = geometry_->surfaces[hit.surface].light;
+  const Light& l = lights_[light];
+  const float p = by_tree(n) ? probability_at(light, x, n) : l.probability;
   if (l.kind == Kind::sphere) {
     const float cone = one_minus_cos(geometry_->spheres[l.primitive], l.sign, x);
-    return cone > 0 ? l.probability / (kTwoPi * cone) : 0;
+    return cone > 0 ? p / (kTwoPi * cone) : 0;
   }
   const V3 f = hit.p - x;
   const float cosine = std::abs(dot(direction, hit.ng));
   if (!(cosine > 0)) return 0;
-  return static_cast<float>(dot(f, f) / (cosine * l.area)) * l.probability;
+  return static_cast<float>(dot(f, f) / (cosine * l.area)) * p;
 }
 
 V3 Lights::pivot(const SurfaceHit& hit) const {

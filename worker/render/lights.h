@@ -13,6 +13,7 @@
 #include "common/scene/scene.h"
 #include "worker/render/envmap.h"
 #include "worker/render/geometry.h"
+#include "worker/render/lights_tree.h"
 #include "worker/render/math.h"
 #include "worker/render/texture/texture.h"
 
@@ -35,7 +36,7 @@ struct LightNumbers {
   std::uint32_t light = 0, x = 0, y = 0;
 };
 
-// What is chosen before the shaded point is known.
+// Which light, and for area lights which point of it.
 struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
@@ -53,49 +54,84 @@ class Lights {
 
   bool can_sample() const { return !lights_.empty(); }  // any light that next-event estimation can reach
   bool any_with_place() const { return any_with_place_; }
-  LightChoice choose(const LightNumbers& numbers) const;
+  // Before the shaded point is known: half by power, half each as often.
+  LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
+  // For the point x of a surface of normal n, or of a medium (n = 0): of many lights, by a tree.
+  LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
+    return chosen(numbers, by_tree(n) ? draw(numbers.light, x, n) : draw(numbers.light));
+  }
   // Light arriving at x from the chosen light; nothing if none can (behind, outside the cone, zero solid
   // angle).
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
 
   // Emission of a surface light towards a viewer (w points from the surface to it).
   C3 emitted(const SurfaceHit& hit, const V3& w) const;
-  // Density, per steradian at x and with the choice of the light, of sampling this point of a surface light.
-  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction) const;
+  // Density, per steradian at x and with the choice of the light, of sampling this point of a surface light
+  // from choose(numbers, x, n).
+  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0)) const;
   V3 pivot(const SurfaceHit& hit) const;
   // Radiance from the surroundings, for a path that leaves the scene in this direction (a unit vector),
   // weighted against sampling it as a light. `pdf`: of the direction, per steradian; infinity where it had no
   // choice, for the full radiance. A constant surrounding is never sampled: it is smooth, and paths that
   // leave find it.
   C3 environment(const V3& direction, float pdf) const {
-    if (!map_) return environment_;
+    const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
+    if (!map_) return beside;
     const EnvironmentMap::Light light = map_->at(direction);
     const float as_light = light.pdf * map_probability_;
-    return environment_ + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
+    return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
-  bool has_environment() const { return map_ || !is_black(environment_); }
+  bool has_environment() const { return map_ || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_ ? &*map_ : nullptr; }
+
+  // Points in media choose by the tree, too, if there is one: for those who light them from nowhere else.
+  void use_tree_in_media() { tree_in_media_ = true; }
+  bool has_tree() const { return !tree_.empty(); }
+  std::uint64_t tree_bytes() const { return tree_.bytes(); }
 
   std::size_t count() const { return lights_.size(); }
   std::uint64_t left_out() const { return left_out_; }
   std::uint64_t clamped_inputs() const { return clamped_; }  // negative texels made 0
 
  private:
-  enum class Kind { parallelogram, mesh, sphere, disk, directional, point, spot, map };
-  static bool has_place(Kind kind) { return kind != Kind::directional && kind != Kind::map; }
+  enum class Kind {
+    parallelogram,
+    mesh,
+    sphere,
+    disk,
+    cylinder,
+    directional,
+    sun,
+    point,
+    spot,
+    projector,
+    map
+  };
+  struct Drawn {
+    std::uint32_t light;
+    float probability;
+  };
+  static bool has_place(Kind kind) {
+    return kind != Kind::directional && kind != Kind::sun && kind != Kind::map;
+  }
   struct Light {
     Kind kind = Kind::point;
-    C3 value;               // intensity (point, spot), irradiance (directional)
-    TextureIndex radiance;  // area lights; spot: projected texture
+    C3 value;  // intensity (point, spot), irradiance (directional; projector: of a texture of 1 on
+               // the plane at distance 1), radiance (sun)
+    TextureIndex radiance;  // area lights; spot, projector: projected texture
     bool textured = false;
+    bool beam = false;  // area lights: radiance depends on the angle
     V3 position, axis_u, axis_v,
         normal;          // parallelogram: corner and edges; disk: centre and axes; directional: travel
     V2 uv0, uv_u, uv_v;  // parallelogram: uv at the corner and along the edges
     double area = 0;
-    std::uint32_t primitive = 0;  // sphere; mesh: first triangle
+    std::uint32_t primitive = 0;  // sphere, cylinder; mesh: first triangle
     std::vector<double> cdf;      // mesh: of triangle areas
     float sign = 1;               // orientation of the emitting side
     float cos_cutoff = 0, cos_beam = 0, cutoff = 0, inv_transition = 0, tan_cutoff = 0;  // spot
+    float falloff = 1;                // beam: with cos_cutoff, cos_beam and, by cosines, inv_transition
+    float tan_x = 0, tan_y = 0;       // projector: of half its fields of view
+    float cone = 0, sun_density = 0;  // sun: 1 - cos of its angular radius; 1 / solid angle
     float probability = 0;
   };
   struct Point {  // on an area light
@@ -108,24 +144,50 @@ class Lights {
     std::uint32_t first = kNone, count = 0;
   };
   struct Primitives {
-    std::vector<Range> triangles, spheres, disks;  // by surface
+    std::vector<Range> triangles, spheres, disks, cylinders;  // by surface
   };
 
   static Primitives primitives_of(const Geometry& geometry);
   void add_area(const Scene& scene, std::uint32_t shape, const Primitives& primitives, Geometry& geometry);
   Result<void> add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images);
   Result<void> add_map(const Scene& scene, const EnvmapEmitter& emitter, const ImageLoader& images);
+  static void set_sun(Light& light, double degrees);
+  void set_projector(Light& light, const ProjectorEmitter& emitter);
+  static void set_beam(Light& light, const AreaEmitter& emitter);
   void set_probabilities(float scene_radius);
+  void sort_places_first();
+  void build_tree();
+  LightBounds bounds(const Light& light) const;
+  LightBounds shape_bounds(const Light& light) const;
+  LightBounds mesh_bounds(const Light& light) const;
   double power(const Light& light, float scene_radius) const;
+  bool by_tree(const V3& n) const { return !tree_.empty() && (tree_in_media_ || dot(n, n) > 0); }
+  Drawn draw(std::uint32_t word) const;
+  Drawn draw(std::uint32_t word, const V3& x, const V3& n) const;
+  float probability_at(std::uint32_t light, const V3& x, const V3& n) const;
+  std::uint64_t table_words(std::uint32_t light) const;
+  LightChoice chosen(const LightNumbers& numbers, const Drawn& drawn) const;
   Point area_point(const Light& light, const LightNumbers& numbers) const;
   Point mesh_point(const Light& light, const LightNumbers& numbers) const;
-  std::optional<LightSample> sample_area(const Light& light, const Point& y, const V3& x) const;
-  std::optional<LightSample> sample_sphere(const Light& light, V2 u, const V3& x) const;
+  Point cylinder_point(const Light& light, V2 u) const;
+  // p: the probability that the light was chosen with.
+  std::optional<LightSample> sample_area(const Light& light, const Point& y, const V3& x, float p) const;
+  std::optional<LightSample> sample_sphere(const Light& light, V2 u, const V3& x, float p) const;
   std::optional<LightSample> sample_map(const LightNumbers& numbers) const;
+  static LightSample sample_sun(const Light& light, V2 u);
+  C3 suns(const V3& direction, float pdf) const;
   C3 spot_radiance(const Light& light, const V3& towards) const;
-  C3 area_radiance(const Light& light, V2 uv) const { return textures_->eval(light.radiance, uv); }
+  C3 projected(const Light& light, const V3& towards) const;
+  // Towards a viewer at an angle of this cosine > 0 from the normal.
+  C3 area_radiance(const Light& light, V2 uv, float cosine) const {
+    const C3 value = textures_->eval(light.radiance, uv);
+    return light.beam ? value * beam_share(light, cosine) : value;
+  }
+  static float beam_share(const Light& light, float cosine);
+  static double beam_flux(const Light& light);  // per radiance and area; pi without a beam
 
   std::vector<Light> lights_;
+  std::vector<std::uint32_t> suns_;  // those of that kind
   // Light i is chosen by the words above last_[i - 1] up to last_[i]: its probability is exactly their share.
   std::vector<std::uint32_t> last_;
   const Geometry* geometry_ = nullptr;
@@ -133,6 +195,11 @@ class Lights {
   C3 environment_{0, 0, 0};
   std::optional<EnvironmentMap> map_;
   float map_probability_ = 0;
+  // Of many lights: those with a place come first in the list, and the tree is theirs. Their words of the
+  // table, the first ones, are shared out anew at each point, but for every kTableShare-th.
+  LightTree tree_;
+  std::uint64_t tree_words_ = 0, table_words_ = 0;
+  bool tree_in_media_ = false;
   bool any_with_place_ = false;
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };

@@ -4,20 +4,29 @@
 
 #include "common/base/overloaded.h"
 #include "worker/render/color.h"
+#include "worker/render/fov.h"
 #include "worker/render/lights.h"
 #include "worker/render/transform.h"
 
 namespace ls::render {
+namespace {
+
+constexpr double kPiD = 3.14159265358979323846;
+// Degrees. Directions in float32 are good to 4e-6 of them; a smaller disk is a point.
+constexpr double kSmallestSun = 1e-3;
+
+}  // namespace
 
 Lights::Primitives Lights::primitives_of(const Geometry& g) {
   Primitives p;
-  for (auto* ranges : {&p.triangles, &p.spheres, &p.disks}) ranges->resize(g.surfaces.size());
+  for (auto* ranges : {&p.triangles, &p.spheres, &p.disks, &p.cylinders}) ranges->resize(g.surfaces.size());
   const auto add = [](Range& r, std::size_t i) {
     if (r.count++ == 0) r.first = static_cast<std::uint32_t>(i);
   };
   for (std::size_t i = 0; i < g.triangle_surface.size(); ++i) add(p.triangles[g.triangle_surface[i]], i);
   for (std::size_t i = 0; i < g.spheres.size(); ++i) add(p.spheres[g.spheres[i].surface], i);
   for (std::size_t i = 0; i < g.disks.size(); ++i) add(p.disks[g.disks[i].surface], i);
+  for (std::size_t i = 0; i < g.cylinders.size(); ++i) add(p.cylinders[g.cylinders[i].surface], i);
   return p;
 }
 
@@ -27,12 +36,18 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
   l.radiance = s.emitter->radiance;
   l.textured = !textures_->is_constant(l.radiance);
   l.sign = g.surfaces[shape].orientation;
+  set_beam(l, *s.emitter);
   const Range triangles = primitives.triangles[shape], spheres = primitives.spheres[shape],
-              disks = primitives.disks[shape];
+              disks = primitives.disks[shape], cylinders = primitives.cylinders[shape];
   if (spheres.count > 0) {
     l.kind = Kind::sphere;
     l.primitive = spheres.first;
     l.area = 4 * 3.14159265358979323846 * sqr(g.spheres[l.primitive].radius);
+  } else if (cylinders.count > 0) {
+    l.kind = Kind::cylinder;
+    l.primitive = cylinders.first;
+    const Cylinder& c = g.cylinders[l.primitive];
+    l.area = 2 * 3.14159265358979323846 * c.radius * c.length;
   } else if (disks.count > 0) {
     const Disk& d = g.disks[disks.first];
     l.kind = Kind::disk;
@@ -109,7 +124,9 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
                           l.kind = Kind::directional;
                           l.normal = V3(V3d(e.direction[0], e.direction[1], e.direction[2]).normalized());
                           l.value = color(e.irradiance);
+                          if (e.angular_radius >= kSmallestSun) set_sun(l, e.angular_radius);
                         },
+                        [&](const ProjectorEmitter& e) { set_projector(l, e); },
                         [&](const PointEmitter& e) {
                           l.kind = Kind::point;
                           l.position = place({e.position[0], e.position[1], e.position[2]});
@@ -137,19 +154,68 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
                         }},
              emitter);
   if (l.probability < 0) return {};
-  if (is_black(l.value)) {
+  if (is_black(l.value) || (l.kind == Kind::projector && is_black(textures_->mean(l.radiance)))) {
     ++left_out_;
     return {};
   }
+  if (l.kind == Kind::sun) suns_.push_back(static_cast<std::uint32_t>(lights_.size()));
   lights_.push_back(std::move(l));
   return {};
 }
 
+// Of one radiance L a disk of angular radius a gives a plane that faces its centre the irradiance
+// integral of L cos = L 2 pi integral_0^a cos sin = L pi sin^2 a.
+void Lights::set_sun(Light& l, double degrees) {
+  const double a = degrees * (kPiD / 180), half = std::sin(a / 2), sine = std::sin(a);
+  l.kind = Kind::sun;
+  l.value *= static_cast<float>(1 / (kPiD * sine * sine));
+  l.cone = static_cast<float>(2 * half * half);
+  l.sun_density = static_cast<float>(1 / (4 * kPiD * half * half));
+}
+
+void Lights::set_projector(Light& l, const ProjectorEmitter& e) {
+  const double s = geometry_->scale;
+  const Affine m(e.to_world);
+  l.kind = Kind::projector;
+  l.position = V3((m.b - geometry_->center) * s);
+  l.axis_u = V3(m.vector({1, 0, 0}).normalized());
+  l.axis_v = V3(m.vector({0, 1, 0}).normalized());
+  l.normal = V3(m.vector({0, 0, 1}).normalized());
+  l.radiance = e.irradiance;
+  l.textured = true;
+  l.value = C3(static_cast<float>(kPiD * e.scale * s * s));
+  const double aspect = textures_->aspect(e.irradiance), tan_x = tan_half_fov_x(e.fov, e.fov_axis, aspect);
+  l.tan_x = static_cast<float>(tan_x);
+  l.tan_y = static_cast<float>(tan_x / aspect);
+}
+
+void Lights::set_beam(Light& l, const AreaEmitter& e) {
+  l.beam = e.beam_width < 90;
+  if (!l.beam) return;
+  const double cutoff = std::cos(e.cutoff_angle * (kPiD / 180)), beam = std::cos(e.beam_width * (kPiD / 180));
+  l.cos_cutoff = static_cast<float>(e.cutoff_angle < 90 ? cutoff : 0);
+  l.cos_beam = static_cast<float>(beam);
+  l.inv_transition = l.cos_beam > l.cos_cutoff ? 1 / (l.cos_beam - l.cos_cutoff) : 0.f;
+  l.falloff = static_cast<float>(e.falloff);
+}
+
+// 2 pi integral of share(c) c dc: with c = cutoff + w s in between, w = beam - cutoff,
+// w integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
+double Lights::beam_flux(const Light& l) {
+  if (!l.beam) return kPiD;
+  const double cutoff = l.cos_cutoff, beam = l.cos_beam, w = beam - cutoff, p = l.falloff;
+  return 2 * kPiD * (w * (cutoff / (p + 1) + w / (p + 2)) + (1 - beam * beam) / 2);
+}
+
 double Lights::power(const Light& l, float radius) const {
-  const double pi = 3.14159265358979323846;
+  const double pi = kPiD;
   switch (l.kind) {
     case Kind::directional:
       return luminance(l.value) * pi * radius * radius;
+    case Kind::sun:  // the irradiance again
+      return luminance(l.value) * pi * double{l.cone} * (2 - double{l.cone}) * pi * radius * radius;
+    case Kind::projector:
+      return luminance(l.value * textures_->mean(l.radiance)) * 4 * l.tan_x * l.tan_y;
     case Kind::point:
       return luminance(l.value) * 4 * pi;
     case Kind::spot:
@@ -160,9 +226,10 @@ double Lights::power(const Light& l, float radius) const {
     case Kind::mesh:
     case Kind::sphere:
     case Kind::disk:
+    case Kind::cylinder:
       break;
   }
-  return luminance(textures_->mean(l.radiance)) * pi * l.area;
+  return luminance(textures_->mean(l.radiance)) * beam_flux(l) * l.area;
 }
 
 // Half by power, half uniform: no light that matters somewhere is rarer than 1/2n. What is used are shares of
@@ -201,7 +268,9 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
   for (const Emitter& e : scene.emitters) {
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
   }
+  l.sort_places_first();
   l.set_probabilities(geometry.radius);
+  l.build_tree();
   return l;
 }
 

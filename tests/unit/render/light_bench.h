@@ -1,0 +1,63 @@
+// Scenes of lights, and the irradiance that their own sampling gives.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "tests/support/render_check.h"
+#include "worker/render/hash.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+
+// From numbers in [0, 1).
+inline LightNumbers numbers(float light, float x, float y) {
+  const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
+  return {bits(light), bits(x), bits(y)};
+}
+
+// A scene of one light; its world, and points given in scene coordinates.
+struct LightBench {
+  std::shared_ptr<const World> world;
+  explicit LightBench(const test::SceneKit& kit) : world(test::world_of(kit)) {}
+  V3 at(const V3d& p) const { return V3((p - world->geometry.center) * world->geometry.scale); }
+
+  struct Irradiance {
+    double mean, se;
+  };
+  // On a plane through x with normal n, over a stratified square of light samples.
+  Irradiance irradiance(const V3d& x, const V3& n, int side = 128) const {
+    RandomStream r(11);
+    double sum = 0, square = 0;
+    for (int i = 0; i < side * side; ++i) {
+      const float u = (static_cast<float>(i % side) + r.uniform()) / static_cast<float>(side);
+      const float v = (static_cast<float>(i / side) + r.uniform()) / static_cast<float>(side);
+      const auto s = world->lights.sample(world->lights.choose(numbers(r.uniform(), u, v)), at(x));
+      const double e = s ? s->radiance.x * std::max(0.f, dot(n, s->direction)) / s->pdf : 0;
+      sum += e;
+      square += e * e;
+    }
+    const double count = double{1} * side * side, mean = sum / count;
+    return {mean,
+            std::sqrt(std::max(0., square / count - mean * mean) / count)};  // of unstratified samples: more
+  }
+};
+inline test::SceneKit area(const ls::Geometry& g, const Transform& t, bool flip = false) {
+  test::SceneKit kit;
+  const TextureIndex one = kit.texture({1, 1, 1});
+  const BsdfIndex black = kit.diffuse(0);
+  Shape& s = kit.shape(g, t, black);
+  s.emitter = AreaEmitter{one};
+  s.flip_normals = flip;
+  return kit;
+}
+// 5 standard errors of what independent samples would give, and float32 (the light's offset from its own
+// surface: 2^-20 of the world).
+inline void expect_close(const LightBench::Irradiance& e, double expected) {
+  EXPECT_NEAR(e.mean, expected, 5 * e.se + expected * 1e-5);
+  EXPECT_LT(e.se, .02 * expected);
+}
+
+}  // namespace ls::render
