@@ -3,136 +3,11 @@
 #include <cmath>
 
 #include "common/assets/image.h"
-#include "common/base/overloaded.h"
-#include "worker/render/color.h"
-#include "worker/render/grid_load.h"
+#include "worker/render/media_build.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
 namespace {
-
-Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
-Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
-
-// Beyond this, products of an extinction with a density and a length leave float32.
-constexpr double kMaxExtinction = 1e30;
-
-// g as float32 holds it: .99999999 is 1 there, where the phase function is no function.
-Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
-  const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
-  if (!hg) return HenyeyGreenstein{0};
-  const auto g = static_cast<float>(hg->g);
-  if (!(std::abs(g) < 1)) {
-    return fail(Errc::invalid_argument,
-                fmt::format("a phase function's g = {} is, to the precision of the renderer, not between -1 "
-                            "and 1; light scattered so far forward passes as if there were no medium",
-                            hg->g));
-  }
-  return HenyeyGreenstein{g};
-}
-
-// sigma: per world unit; largest: of the density.
-Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
-  for (const double s : sigma) {
-    if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
-    return fail(Errc::invalid_argument,
-                fmt::format("a medium's extinction reaches {} per scene unit: check its sigma_t, scale and "
-                            "densities",
-                            s * largest * world_scale));
-  }
-  return {};
-}
-
-// Lengths shrink by the world's scale, so coefficients grow by its inverse.
-Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
-  Medium out;
-  const Rgb sigma_t = times(m.sigma_t, m.scale / scale);
-  if (auto ok = check_extinction(sigma_t, 1, scale); !ok) return tl::unexpected(ok.error());
-  auto phase = phase_of(scene, m.phase);
-  if (!phase) return tl::unexpected(phase.error());
-  out.sigma_t = color(sigma_t);
-  out.sigma_s = color(times(sigma_t, m.albedo));
-  out.phase = *phase;
-  return out;
-}
-
-Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, const AssetLoader& files,
-                             World& w) {
-  Medium out;
-  out.grid = true;
-  auto phase = phase_of(scene, m.phase);
-  if (!phase) return tl::unexpected(phase.error());
-  out.phase = *phase;
-  const double per_unit = m.scale / w.geometry.scale;
-  auto density =
-      load_volume(scene.volumes.at(m.sigma_t.value), files, w.geometry.center, w.geometry.scale, per_unit);
-  if (!density) return tl::unexpected(density.error());
-  w.clamped_inputs += density->clamped;
-  Rgb sigma{per_unit, per_unit, per_unit};
-  if (const auto* c = std::get_if<ConstVolume>(&scene.volumes[m.sigma_t.value])) {
-    sigma = times(c->value,
-                  per_unit);  // the colour goes into the coefficients, the grid is 1 where the medium is
-    auto ones = load_volume(ConstVolume{{1, 1, 1}}, files, w.geometry.center, w.geometry.scale, per_unit);
-    if (!ones) return tl::unexpected(ones.error());
-    density = std::move(ones);
-  } else if (density->channels.size() != 1) {
-    return fail(
-        Errc::invalid_argument,
-        fmt::format("{}: a density grid has one channel, this one has {}; give colour through the albedo",
-                    files.name(std::get<GridVolume>(scene.volumes[m.sigma_t.value]).file),
-                    density->channels.size()));
-  }
-  if (auto ok = check_extinction(sigma, density->channels[0].max_value(), w.geometry.scale); !ok)
-    return tl::unexpected(ok.error());
-  w.grids.push_back(std::move(density->channels[0]));
-  out.density = &w.grids.back();
-  out.sigma_t = color(sigma);
-  if (const auto* a = std::get_if<ConstVolume>(&scene.volumes.at(m.albedo.value))) {
-    out.sigma_s = color(times(sigma, a->value));
-    return out;
-  }
-  auto albedo =
-      load_volume(scene.volumes[m.albedo.value], files, w.geometry.center, w.geometry.scale, per_unit);
-  if (!albedo) return tl::unexpected(albedo.error());
-  w.clamped_inputs += albedo->clamped;
-  for (Grid& g : albedo->channels) {
-    w.clamped_inputs += g.count_above(1);  // look-ups stop at 1: no medium scatters more than it takes
-    w.grids.push_back(std::move(g));
-  }
-  const std::size_t n = albedo->channels.size(), first = w.grids.size() - n;
-  for (std::size_t k = 0; k < 3; ++k) out.albedo[k] = &w.grids[first + (n == 1 ? 0 : k)];
-  return out;
-}
-
-// The media that the camera or some surface names.
-std::vector<bool> named_media(const Scene& scene) {
-  std::vector<bool> named(scene.media.size(), false);
-  if (scene.sensor.medium) named[scene.sensor.medium->value] = true;
-  for (const Shape& s : scene.shapes) {
-    if (!s.is_medium_transition) continue;
-    if (s.interior) named[s.interior->value] = true;
-    if (s.exterior) named[s.exterior->value] = true;
-  }
-  return named;
-}
-
-// The others keep their place in the list, but nothing of them is loaded.
-Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w) {
-  const std::vector<bool> named = named_media(scene);
-  for (std::size_t i = 0; i < scene.media.size(); ++i) {
-    if (!named[i]) {
-      w.media.emplace_back();
-      continue;
-    }
-    Result<Medium> m = std::visit(
-        overloaded{[&](const HomogeneousMedium& h) { return homogeneous(scene, h, w.geometry.scale); },
-                   [&](const HeterogeneousMedium& h) { return heterogeneous(scene, h, files, w); }},
-        scene.media[i]);
-    if (!m) return tl::unexpected(m.error());
-    w.media.push_back(*m);
-  }
-  return {};
-}
 
 Features needs_of(const World& w) {
   Features f;
@@ -140,8 +15,10 @@ Features needs_of(const World& w) {
   const auto use = [&](std::uint32_t i) {
     if (i == kNone) return;
     const Medium& m = w.media[i];
-    if (is_black(m.sigma_t)) return;
+    const bool glows = m.glow != Glow::none;
+    if (is_black(m.sigma_t) && !glows) return;
     f.media = true;
+    f.emission = f.emission || glows;
     f.grids = f.grids || m.grid;
     f.chromatic = f.chromatic || m.chromatic();
   };
@@ -161,9 +38,26 @@ void note_surface_needs(const Scene& scene, World& w) {
     const auto& emitter = scene.shapes[i].emitter;
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
+    s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
     s.smooth = w.bsdfs.has_smooth(s.bsdf);
     w.veils = w.veils || s.veil;
   }
+}
+
+// A crop is rendered with the pixels of the whole frame, those that it has: the same samples give the same
+// bits. At another size than the crop's own it is the same part of a frame of another size.
+void place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
+  const FilmSettings& film = scene.film;
+  FrameSize frame = settings.size;
+  if (film.has_crop()) {
+    const double kx = static_cast<double>(settings.size.width) / film.crop_size.width,
+                 ky = static_cast<double>(settings.size.height) / film.crop_size.height;
+    const auto scaled = [](int pixels, double k) { return static_cast<int>(std::lround(pixels * k)); };
+    frame = {std::max(1, scaled(film.size.width, kx)), std::max(1, scaled(film.size.height, ky))};
+    w.origin_x = scaled(film.crop_offset[0], kx);
+    w.origin_y = scaled(film.crop_offset[1], ky);
+  }
+  w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
 }
 
 Result<void> check_indices(const Scene& scene) {
@@ -176,6 +70,8 @@ Result<void> check_indices(const Scene& scene) {
                   "a shape refers to a material, medium or texture that the scene does not have");
     }
   }
+  if (scene.sensor.aperture_scale && bad(scene.sensor.aperture_scale->value, scene.textures.size()))
+    return fail(Errc::invalid_argument, "the sensor refers to a texture that the scene does not have");
   if (scene.sensor.medium && bad(scene.sensor.medium->value, scene.media.size())) {
     return fail(Errc::invalid_argument, "the sensor refers to a medium that the scene does not have");
   }
@@ -235,12 +131,14 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto accel = Accel::build(w.geometry, threads);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
-  w.camera = Camera(scene.sensor, settings.size, w.geometry.center, w.geometry.scale);
+  place_camera(scene, settings, w);
   w.filter = PixelFilter(scene.film.filter);
   w.need = needs_of(w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = w.need.media && homogeneous_media && w.lights.any_with_place();
+  // Lights chosen for a whole segment know no point: what is weighed against them must choose alike.
+  if (!w.equiangular && settings.integrator != "volpath_distant_mis") w.lights.use_tree_in_media();
   return std::shared_ptr<const World>(world);
 }
 
