@@ -10,6 +10,7 @@
 #include "common/scene/integrators.h"
 #include "common/scene/known.h"
 #include "common/scene/materials.h"
+#include "common/scene/nori_words.h"
 #include "common/scene/upgrade.h"
 
 namespace ls {
@@ -173,6 +174,8 @@ A whole scene, a ball of fog in a white surrounding:
 - `<transform name="to_world">` holds `<translate>`, `<rotate>`, `<scale>`, `<lookat>`, `<matrix>` (9 or 16 numbers, row by row),
   each applied after those before it. `<rotate>` turns by `angle` degrees about the direction `x`, `y`, `z`; if that is not of
   length 1 there is a warning, as Mitsuba 3 then shears.
+- Where one number is wanted (a roughness, an opacity, the weight of a blend, all of `principled` but its colour) a coloured texture
+  gives its luminance; of a `checkerboard`, color1 then stands where its color0 would, as in Mitsuba 3.
 - `nested` in a table: an element of this kind stands inside, with no name needed. Where a kind such as texture or medium is
   listed for a parameter, the element (or a `<ref>`) carries the parameter's name: `<ref name="interior" id="fog"/>`.
 - Objects have a `type`, and may have an `id`; `<ref id="..."/>` stands for the object, wherever it is defined. `<alias id="old"
@@ -181,7 +184,7 @@ A whole scene, a ball of fog in a white surrounding:
   value="..."/>` before it. A `-D` that nothing in the scene asks for is a warning over HTTP and an error on the command line.
 - `<include filename="..."/>` puts in the objects of another file, `<path value="folder"/>` adds a folder in which files are
   looked for. Names are relative to the main scene file, those in an included file first to the folder of that file.
-- Files of version 0.x are read as Mitsuba 0.5 and 0.6 do: see its section.
+- Files of version 0.x are read as Mitsuba 0.5 and 0.6 do, files of Nori as Nori does: see their sections.
 
 )";
 
@@ -207,6 +210,8 @@ What else such files mean:
   `<srgb>` is not.
 - Textures: `uscale`, `vscale`, `uoffset`, `voffset` give u * uscale + uoffset; `gamma` 1 is `raw`; the filters `trilinear` and `ewa`
   are `bilinear`.
+- A `checkerboard` that gives a number has its color0 where it has it as a colour.
+- `normalmap` and `bumpmap` neither flip normals nor cast shadows unless they say so.
 - A film "mfilm" is of one pixel with a box filter unless it says otherwise.
 
 )"};
@@ -215,7 +220,21 @@ constexpr std::string_view kCanonical = R"(## Canonical form
 
 A scene that was read travels as canonical JSON: every field written, keys sorted, numbers in the shortest form that reads back
 to the same bits, files named by SHA-256. Objects that nothing uses are left out. The SHA-256 of this text is the scene's digest.
-A grid of an OpenVDB file is placed by the file's own transform, then by `to_world`.
+
+## Grids and light given off by media
+
+- What a file is follows from its name. A grid of an OpenVDB or NanoVDB file is placed by the file's own transform, then by
+  `to_world`; the volumes of a medium may name several grids of one file, each by its `grid_name`. Grids of numbers are read (of
+  NanoVDB, ABI 32: float, double, half, Fp4, Fp8, Fp16, FpN; plain, zlib or Blosc), level sets and vectors are refused.
+- A `.bin` file is int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of its box; nx ny nz values of float32; all little
+  endian and nothing else. The outermost values lie on the faces of the box, in scene units, which `to_world` then moves. `order`
+  says whether x or z runs fastest.
+- A `heterogeneous` medium gives off light by one of `emission` (radiance per length), `source_radiance` (sigma_a times it) and
+  `temperature` (sigma_a times the radiance of a black body). A black body of spectral radiance 1 W/(m^2 sr nm) at all wavelengths
+  would have luminance 1: at 1500 K it is (0.35, 0.046, 0), at 6500 K (4.4e4, 4.1e4, 4.4e4); `emission_scale` brings it to
+  the scene's units. Colours outside of sRGB are cut off at 0. Such light counts like that of an emitter that a path meets:
+  `max_depth` 1 shows it, `hide_emitters` hides it where the camera looks straight at it. It lights the scene where paths come by:
+  next-event estimation does not look for it.
 )";
 
 std::string old_files_section() {
@@ -234,7 +253,10 @@ std::string integrators_section() {
                          row.other_method ? ", with a warning" : "");
   for (const WrapperRow& row : integrator_wrappers())
     out += fmt::format("| `{}` | the integrator within it, with a warning: {} |\n", row.name, row.lost);
-  return out + "\n";
+  return out +
+         "\nLight that passes straight through a surface (`null`, `mask`, `thindielectric`) adds no segment to its "
+         "path, and shadow rays go\non, as in Mitsuba's `volpath`; Mitsuba's `path` counts a segment there. "
+         "Without a limit to the depth both are the same.\n\n";
 }
 
 std::string meaningless_section() {
@@ -296,7 +318,7 @@ std::string scene_format_markdown() {
   out +=
       "A sampler, whatever its type, gives `sample_count` (default 4) samples a pixel. The films `ldrfilm`, "
       "`mfilm` and\n`tiledhdrfilm` are read as `hdrfilm`, with a warning.\n\n";
-  out += old_files_section() + meaningless_section() + unsupported_section() + names_section();
+  out += old_files_section() + nori::markdown() + meaningless_section() + unsupported_section() + names_section();
   return out += kCanonical;
 }
 

@@ -49,21 +49,29 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// One kind of light; what scales it needs it.
-void check_emission(const Params& p, const HeterogeneousMedium& m, Report& report) {
-  if (m.emission.has_value() + m.source_radiance.has_value() + m.temperature.has_value() > 1)
+// What is given that means something only beside another parameter; to be asked before parameters are taken.
+struct Factors {
+  explicit Factors(const Params& p)
+      : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {}
+  bool light, heat;
+};
+
+void check_emission(const Params& p, const Factors& given, const HeterogeneousMedium& m, Report& report) {
+  const int sources = m.emission.has_value() + m.source_radiance.has_value() + m.temperature.has_value();
+  if (sources > 1)
     report.error(p.object().at,
                  fmt::format("{} gives more than one of emission, source_radiance and temperature; give one",
                              p.title()));
-  for (const char* name : {"temperature_scale", "temperature_offset"})
-    if (p.has(name) && !m.temperature)
-      report.error(p.object().at, fmt::format("{} gives {}, but no temperature", p.title(), name));
-  if (p.has("emission_scale") && !m.emission && !m.source_radiance && !m.temperature)
+  if (given.heat && !m.temperature)
+    report.error(
+        p.object().at,
+        fmt::format("{} gives temperature_scale or temperature_offset, but no temperature", p.title()));
+  if (given.light && sources == 0)
     report.error(p.object().at,
                  fmt::format("{} gives emission_scale, but none of emission, source_radiance and temperature",
                              p.title()));
 }
-void check_emission(const Params&, const HomogeneousMedium&, Report&) {}
+void check_emission(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
 
 }  // namespace
 
@@ -128,8 +136,9 @@ std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
   Params p(*this, e);
   T medium;
   if (e.old) read_old_coefficients(p, medium, report_);
+  const Factors given(p);
   bind(p, medium);
-  check_emission(p, medium, report_);
+  check_emission(p, given, medium, report_);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
     if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr;
         t && ((*t)[0] != (*t)[1] || (*t)[1] != (*t)[2]))

@@ -11,8 +11,9 @@ namespace {
 using ::testing::HasSubstr;
 
 std::string medium(const std::string& type, const std::string& inside) {
-  return with_sensor("<medium type=\"" + type + "\" id=\"m\">" + inside +
-                     "</medium><shape type=\"cube\"><ref name=\"interior\" id=\"m\"/></shape>");
+  return with_sensor(
+      "<medium type=\"" + type + "\" id=\"m\">" + inside +
+      "</medium><shape type=\"cube\"><bsdf type=\"null\"/><ref name=\"interior\" id=\"m\"/></shape>");
 }
 std::string number(const char* name, const char* value) {
   return std::string("<float name=\"") + name + "\" value=\"" + value + "\"/>";
@@ -50,7 +51,7 @@ TEST(Emission, WhatContradictsItselfIsRefused) {
       {"heterogeneous", number("emission", "1") + number("temperature", "1"),
        "gives more than one of emission, source_radiance and temperature"},
       {"heterogeneous", number("emission", "1") + number("temperature_scale", "1"),
-       "gives temperature_scale, but no temperature"},
+       "gives temperature_scale or temperature_offset, but no temperature"},
       {"heterogeneous", number("emission_scale", "2"), "gives emission_scale, but none of"},
       {"heterogeneous", "<rgb name=\"temperature\" value=\"1 2 3\"/>", "is one number, not a colour"},
       {"heterogeneous", number("emission", "-1"), "emission"},
@@ -80,10 +81,33 @@ TEST(Emission, ADensityOfVersion0ThatIsEverywhereCannotGlow) {
   EXPECT_THAT(messages(r), HasSubstr("write it as a medium \"homogeneous\" to give it an emission"));
 }
 
+TEST(RawGrid, AloneHasAnOrder) {
+  MemoryAssets assets;
+  assets.files.emplace("smoke.bin", "s");
+  const auto volume = [&](const std::string& file, const std::string& inside) {
+    return read_scene("test.xml",
+                      with_sensor("<medium type=\"heterogeneous\" id=\"m\"><volume type=\"gridvolume\" "
+                                  "name=\"sigma_t\"><string name=\"filename\" value=\"" +
+                                  file + "\"/>" + inside +
+                                  "</volume></medium><shape type=\"cube\"><bsdf type=\"null\"/><ref "
+                                  "name=\"interior\" id=\"m\"/></shape>"),
+                      assets, {});
+  };
+  const std::string order = "<string name=\"order\" value=\"z_fastest\"/>";
+  const auto raw = volume("smoke.bin", order);
+  ASSERT_TRUE(raw.scene) << messages(raw);
+  const auto& m = std::get<HeterogeneousMedium>(raw.scene->media.at(0));
+  EXPECT_EQ(std::get<GridVolume>(raw.scene->volumes.at(m.sigma_t.value)).order, GridOrder::z_fastest);
+  EXPECT_THAT(write_xml(*raw.scene), HasSubstr(order));
+  EXPECT_THAT(messages(volume("cloud.vol", order)), HasSubstr("'order' is of .bin files"));
+  EXPECT_THAT(messages(volume("smoke.bin", "<string name=\"wrap_mode\" value=\"repeat\"/>")),
+              HasSubstr("'wrap_mode' can only be clamp"));
+}
+
 TEST(ConstVolume, IsMovedByItsTransform) {
   const std::string text = R"(<medium type="heterogeneous" id="m"><volume type="constvolume" name="sigma_t">
     <float name="value" value="3"/><transform name="to_world"><translate x="-0.5"/></transform></volume></medium>
-    <shape type="cube"><ref name="interior" id="m"/></shape>)";
+    <shape type="cube"><bsdf type="null"/><ref name="interior" id="m"/></shape>)";
   const auto r = read(with_sensor(text));
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_TRUE(r.diagnostics.empty()) << messages(r);
