@@ -372,5 +372,29 @@ TEST(World, AnEmptySceneIsItsSky) {
   for (const float s : r.sums) EXPECT_EQ(s, .5f);  // two samples a half
 }
 
+// Such light counts like that of an emitter that the path meets.
+TEST(World, LightGivenOffByMediaCountsAtTheDepthOfItsPath) {
+  const auto mean = [](int max_depth, bool hidden, double floor) {
+    SceneKit kit({4, 4});
+    const MediumIndex m = kit.homogeneous({0, 0, 0}, {0, 0, 0});
+    std::get<HomogeneousMedium>(kit.scene.media[m.value]).emission = {1, 2, 3};
+    kit.container(CubeShape{}, translate({0, 0, 5}), kit.null(), m);
+    kit.shape(RectangleShape{}, test::scale(100), kit.diffuse(floor));
+    kit.scene.integrator.max_depth = max_depth;
+    kit.scene.integrator.hide_emitters = hidden;
+    kit.look({0, 0, 9}, {0, 0, 0}, 1e-3, {0, 1, 0});
+    return test::estimate(kit, 64).mean;
+  };
+  // Through 2 units of it, to a black floor.
+  const std::array<double, 3> through{2, 4, 6}, dark{0, 0, 0};
+  EXPECT_EQ(mean(0, false, 0), dark);
+  EXPECT_EQ(mean(1, false, 0), through);
+  EXPECT_EQ(mean(1, true, 0), dark);
+  // What a white floor scatters meets it a segment later, seen or not.
+  EXPECT_EQ(mean(1, false, 1), through);
+  EXPECT_GT(mean(2, false, 1)[0], 2.001);
+  EXPECT_GT(mean(2, true, 1)[0], .001);
+}
+
 }  // namespace
 }  // namespace ls::render
