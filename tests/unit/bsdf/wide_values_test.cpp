@@ -250,6 +250,29 @@ TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
               1e-4 * bare->eval(local(wo), local(wi)).f_cos.x);
 }
 
+// As Mitsuba 3.9.1's sample() of what goes on unscattered: shadowed as a reflection would be, and nothing
+// where the map's normal has the direction on its other side.
+TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {
+  const auto map = [](bool flips, bool shadows) {
+    Scene s = masked(diffuse({.5, .5, .5}), .25);
+    add(s, NormalMapBsdf{texture(s, Rgb{.85, .35, .75}), last(s), flips, shadows});  // (.7, -.3, .5)
+    return bench(s);
+  };
+  const auto veil = [](const Bench& b, const V3& w) { return b.bsdfs.veil(b.bsdf, V2(0, 0), w); };
+  const double slope2 = (.7 * .7 + .3 * .3) / (.5 * .5);
+  for (const V3& w : {V3(.6f, 0, .8f), V3(-.6f, 0, -.8f)}) {
+    const double lit = 2 / (1 + std::sqrt(1 + slope2 / 8 * sqr(.6 / .8)));
+    EXPECT_EQ(veil(*map(true, true), w).probability, .75f);
+    EXPECT_NEAR(veil(*map(true, true), w).transmission.y, .75 * lit, 1e-6);
+    EXPECT_EQ(veil(*map(true, false), w).transmission, C3(.75f));
+    EXPECT_EQ(veil(*map(false, false), w).transmission, C3(.75f));
+  }
+  const V3 away(-.8f, 0, .6f);
+  EXPECT_EQ(veil(*map(false, false), away).probability, 0);
+  EXPECT_FALSE(map(false, false)->sample(away, .5f, {.3f, .6f}));
+  EXPECT_EQ(veil(*map(true, false), away).probability, .75f);
+}
+
 TEST(Nesting, FlagsFollowFromTheParts) {
   Scene s = diffuse({.5, .5, .5});
   s.textures.push_back(CheckerboardTexture{{0}, {0}, {}});
