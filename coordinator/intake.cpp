@@ -9,6 +9,7 @@
 
 #include "common/protocol/limits.h"
 #include "common/scene/integrators.h"
+#include "common/scene/nori_words.h"
 #include "common/scene/serialize.h"
 #include "coordinator/features.h"
 #include "coordinator/limits.h"
@@ -76,17 +77,19 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
                                std::vector<std::string>& warnings) {
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
   const scene::IntegratorRow* known = scene::integrator_row(asked);
-  if (!known) {
+  const scene::nori::IntegratorRow* nori = known ? nullptr : scene::nori::integrator_row(asked);
+  if (!known && !nori) {
     std::vector<std::string_view> names;
     for (const auto& row : scene::integrators()) names.push_back(row.name);
     return tl::unexpected(
         invalid(fmt::format("there is no integrator \"{}\"; there are {}", asked, fmt::join(names, ", "))));
   }
-  if (known->ours == "path" && !scene.media.empty())
+  const std::string_view ours = known ? known->ours : nori->ours;
+  if (ours == "path" && !scene.media.empty())
     warnings.push_back("the integrator `path` renders without media: the scene's " +
                        std::to_string(scene.media.size()) + " media are left out");
-  settings.integrator = known->ours;
-  settings.max_depth = known->max_depth.value_or(scene.integrator.max_depth);
+  settings.integrator = ours;
+  settings.max_depth = (known ? known->max_depth : nori->max_depth).value_or(scene.integrator.max_depth);
   settings.rr_depth = scene.integrator.rr_depth;
   return {};
 }

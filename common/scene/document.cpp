@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/scene/limits.h"
+#include "common/scene/nori.h"
 #include "common/scene/suggest.h"
 #include "common/scene/upgrade.h"
 
@@ -139,10 +140,11 @@ class Loader {
     if (!tree) return false;
     root = std::move(*tree);
     const Attribute* version = root.find("version");
+    if (nori::is_nori(root)) return expand(root, false);
     if (!version) {
-      report_.error(
-          root.at,
-          fmt::format("<{}> has no version: a Mitsuba file begins with <scene version=\"3.0.0\">", root.tag));
+      report_.error(root.at, fmt::format("<{}> has no version: a Mitsuba file begins with <scene "
+                                         "version=\"3.0.0\">, a Nori file has a <camera>",
+                                         root.tag));
       return false;
     }
     if (version->value.empty() || !std::isdigit(static_cast<unsigned char>(version->value[0]))) {

@@ -1,6 +1,7 @@
 // Camera with filter and sampler; integrator.
 #include <fmt/format.h>
 
+#include "common/image/render_limits.h"
 #include "common/scene/nori_parts.h"
 #include "common/scene/suggest.h"
 #include "common/scene/transform.h"
@@ -18,6 +19,9 @@ std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   }
   if (row.ours != "path")
     p.push_back({"inmedium", kBoolean, "false", "the camera is in the medium of the mesh around it"});
+  if (!row.max_depth)
+    p.push_back({"maxDepth", kInteger, "-1", "longest path in segments, as `max_depth`; -1: no limit",
+                 {.min = -1, .max = kMaxDepthSetting}});
   if (row.name == "photonmapper")
     for (const std::string_view name : {"photonCount", "photonRadius"})
       p.push_back(
@@ -115,6 +119,7 @@ std::optional<Integrator> integrator(const Element& e, Report& report) {
                    fmt::format("{} is read as \"{}\": {}", o.title(), row->ours, row->but));
   Integrator out{made("integrator", row->ours, e.at), false};
   if (row->max_depth) add(out.element, "integer", "max_depth", fmt::format("{}", *row->max_depth), e.at);
+  add_as(out.element, o.take("maxDepth"), "max_depth");
   add_as(out.element, o.take("distance"), "distance");
   add_as(out.element, o.take("heuristic"), "heuristic");
   if (const Element* given = o.take("inmedium")) out.inmedium = parse_boolean(given->get("value")) == true;

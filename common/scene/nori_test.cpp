@@ -116,9 +116,10 @@ class TestReader {
     if (b + s == 0) return report_.error(root.at, "nothing stands in this test that could be tested");
     if (test_.kind != NoriTestKind::t_test) return;
     const std::size_t wanted = b > 0 ? b * test_.angles.size() : s;
-    if (test_.references.size() != wanted)
+    const bool by_channel = s > 0 && test_.references.size() == 3 * s;
+    if (test_.references.size() != wanted && !by_channel)
       report_.error(root.at, fmt::format("{} references are given for {} {}", test_.references.size(), wanted,
-                                         b > 0 ? "bsdfs times angles" : "scenes"));
+                                         b > 0 ? "bsdfs times angles" : "scenes, or three for each"));
     else if (wanted == 0)
       report_.error(root.at, "no angles are given at which the bsdfs are to be tested");
   }
@@ -145,7 +146,7 @@ NoriTestResult read_nori_test(std::string_view file_name, std::string_view text,
                               const ReadOptions& options) {
   scene::Report report(options.strict);
   NoriTestResult result;
-  if (auto document = scene::load_document(file_name, text, assets, options, report)) {
+  if (auto document = scene::load_document(file_name, text, assets, options.defines, report)) {
     if (document->root.tag == "test")
       result.test = scene::TestReader(*document, assets, report).read();
     else

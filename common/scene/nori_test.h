@@ -23,7 +23,8 @@ struct NoriTest {
   // rectangle (normal +z) that wears it: scene.bsdfs[scene.shapes[0].bsdf.value].
   std::vector<Scene> scenes, bsdfs;
 
-  // t_test. Of scenes: references[i] is the luminance expected of scenes[i]'s whole frame, averaged. Of
+  // t_test. Of scenes: references[i] is the luminance expected of scenes[i]'s whole frame, averaged; or,
+  // which Nori has not, references[3 i], [3 i + 1] and [3 i + 2] are its red, green and blue. Of
   // bsdfs: references[b * angles.size() + a] is the expected luminance of weights (f cos / pdf) of bsdfs[b]
   // sampled for light that arrives angles[a] degrees from the normal.
   std::vector<double> references, angles;

@@ -6,6 +6,7 @@
 
 #include "common/scene/known.h"
 #include "common/scene/limits.h"
+#include "common/scene/nori.h"
 #include "common/scene/read.h"
 #include "common/scene/suggest.h"
 #include "common/scene/transform.h"
@@ -151,6 +152,12 @@ const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
       for (const TextureIndex inner : {checks->color0, checks->color1})
         if (inner.value < i && texture_bounds_[inner.value])
           include(texture_bounds_[inner.value]->low, texture_bounds_[inner.value]->high);
+    } else if (const auto* peak = std::get_if<PeakTexture>(&scene_.textures[i])) {
+      const TextureIndex inner = peak->texture;
+      if (peak->hue)
+        include(0, 1);
+      else if (inner.value < i && texture_bounds_[inner.value])
+        include(texture_bounds_[inner.value]->low, texture_bounds_[inner.value]->high);
     }
     texture_bounds_.push_back(b);
   }
@@ -195,7 +202,8 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
                       const ReadOptions& options) {
   scene::Report report(options.strict);
   ReadResult result;
-  if (const auto document = scene::load_document(file_name, text, assets, options.defines, report)) {
+  auto document = scene::load_document(file_name, text, assets, options.defines, report);
+  if (document && scene::nori::translate(*document, report)) {
     const Scene read = scene::Reader(*document, assets, report).read();
     if (!report.has_errors()) result.scene = scene::compacted(read);
   }
