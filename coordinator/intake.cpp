@@ -51,8 +51,11 @@ class UploadedAssets final : public AssetSource {
                                                       name, asset->bytes, limits::kMaxIncludeBytes));
     const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
     if (!bytes) return tl::unexpected(bytes.error());
+    text_bytes_ += bytes->size();
     return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   }
+
+  std::size_t text_bytes() const { return text_bytes_; }
 
  private:
   std::string offered() const {
@@ -67,6 +70,7 @@ class UploadedAssets final : public AssetSource {
   }
 
   std::map<std::string, Digest> assets_;
+  std::size_t text_bytes_ = 0;
   const BlobStore& blobs_;
 };
 
@@ -122,12 +126,12 @@ Result<void> check_spec(const JobSpec& spec) {
   return {};
 }
 
-Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec,
+Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std::uint32_t frame,
                                    std::vector<std::string>& warnings) {
   RenderSettings settings;
-  settings.size = spec.size.value_or(scene.film.size);
+  settings.size = spec.size.value_or(scene.film.image_size());
   if (auto ok = check_size(settings.size); !ok) return tl::unexpected(ok.error());
-  settings.seed = spec.seed.value_or(0);
+  settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
   return settings;
 }
@@ -138,7 +142,8 @@ Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
 
 }  // namespace
 
-tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs) {
+tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs,
+                                       std::optional<std::uint32_t> frame) {
   const auto refuse = [](Error error, std::vector<Diagnostic> found = {}) {
     return tl::unexpected(rejected(std::move(error), std::move(found)));
   };
@@ -151,7 +156,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   if (auto ok = check_spec(request.spec); !ok) return refuse(ok.error());
 
   UploadedAssets assets(request.assets, blobs);
-  ReadResult read = read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false});
+  ReadResult read = read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame});
   if (!read.scene)
     return refuse(invalid(fmt::format("the scene {} cannot be read", request.scene_name)),
                   std::move(read.diagnostics));
@@ -162,7 +167,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   job.name = request.scene_name.substr(0, limits::kMaxNameBytes);
   for (const auto& d : read.diagnostics)
     if (job.warnings.size() < limits::kMaxWarnings) job.warnings.push_back(format_diagnostic(d));
-  auto settings = settings_of(scene, request.spec, job.warnings);
+  auto settings = settings_of(scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return refuse(settings.error());
   job.settings = std::move(*settings);
   job.spec = request.spec;
@@ -183,6 +188,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   const SceneFeatures features = features_of(scene);
   job.features_used = features.used;
   job.features_left_out = features.left_out;
+  intake.text_bytes = request.scene_text.size() + assets.text_bytes();
   intake.scene_json = serialize(scene);
   job.scene = sha256(intake.scene_json);
   JobPlan plan = plan_of(job);

@@ -14,11 +14,19 @@ namespace ls::coordinator {
 struct Intake {
   StoredJob job;           // without id and time
   std::string scene_json;  // canonical; its digest is job.scene
+  std::size_t text_bytes = 0;  // of all scene files that were read
 };
 
 // Reads the scene with the request's assets as its only files, so a scene can never reach a path of this
 // machine. Only assets that the scene uses go into the job; each must be in `blobs`. Nothing is stored.
-tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs);
+// `frame`: of a sequence. It is read with this number, and its seed is the job's plus this number: frames
+// have noise of their own, and each is rendered alone to the same pixels.
+tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs,
+                                       std::optional<std::uint32_t> frame = {});
+
+// All frames of spec.frames, or what is wrong with them: limits.h bounds what they take together.
+tl::expected<std::vector<Intake>, Rejected> take_in_sequence(const SubmitRequest& request,
+                                                             const BlobStore& blobs);
 
 // The farm's view of a stored job.
 JobPlan plan_of(const StoredJob& job);

@@ -26,6 +26,14 @@ using ls::kMaxSpp;
 inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
 inline constexpr int kMaxPriority = 1'000'000;
 
+// ---- sequences (how many frames: common/base/frame_range.h) ----
+inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;  // read for all frames together
+inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;  // 24 bytes each from the start
+inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // named by all frames together
+inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1}
+                                                 << 26;  // of done frames that are extended at once
+inline constexpr std::size_t kFramesPerEvent = 2500;  // a sequence of more tells of itself less often
+
 // ---- results ----
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg
 inline constexpr std::uint32_t kMaxSegments = 1u << 20;

@@ -102,6 +102,8 @@ void Service::tick() {
   run_locked(Tick{});
   for (const auto& [id, entry] : entries_)
     if (entry->progress_due) publish_progress_locked(*entry);
+  for (const auto& [id, sequence] : sequences_)
+    if (sequence.progress_due) publish_sequence_locked(id, false);
 }
 
 bool Service::ready(std::string* why_not) const {

@@ -15,6 +15,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/base/frame_range.h"
 #include "common/base/id.h"
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
@@ -33,6 +34,30 @@ struct ConvergencePoint {
   double core_seconds = 0;  // CPU time of workers
   double spp = 0;
   ErrorFigures error;
+};
+
+// ---- sequences: a job with frames. Every frame is a job, too, with an id made of both ----
+struct FrameId {
+  JobId sequence;
+  std::uint32_t frame = 0;
+};
+JobId frame_job(const JobId& sequence, std::uint32_t frame);  // "j-7f3a91c2-frame12"
+std::optional<FrameId> frame_of(const JobId& job);            // nothing: the job is no frame
+
+struct FrameView {
+  std::uint32_t frame = 0;
+  JobId job;
+  JobState state = JobState::queued;
+  double progress = 0;
+  double spp_done = 0;
+  std::optional<double> relmse;
+  std::string error;
+};
+struct FramesView {
+  FrameRange range;
+  std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
+  std::uint32_t current = 0;   // the frame to look at: the first that is being rendered, or has been
+  std::vector<FrameView> all;  // ascending; only in Coordinator::job()
 };
 
 struct JobView {
@@ -56,6 +81,9 @@ struct JobView {
   double elapsed_seconds = 0, core_seconds = 0;
   double submitted_unix = 0;  // wall clock, for people
   UnitHealth health;
+  // Of a sequence; its other figures are those of all frames together: sums, means over pixels, and
+  // elapsed_seconds from the first ray of any frame to the last fold.
+  std::optional<FramesView> frames;
 };
 
 // What a user wants changed of a job: all of it or, when something is refused, nothing.
@@ -101,7 +129,7 @@ struct StreamEvent {
 
 struct SubmitRequest {
   std::string scene_name;                // of the main file, for diagnostics
-  std::string scene_text;                // Mitsuba XML
+  std::string scene_text;                // Mitsuba or Nori XML
   std::map<std::string, Digest> assets;  // the files it may name; their blobs must be in the store
   JobSpec spec;
 };
@@ -165,8 +193,10 @@ class Coordinator {
   virtual ~Coordinator() = default;
 
   // ---- jobs ----
+  // With spec.frames the id is of the sequence. What changes or tells of a job takes it, too; what belongs to
+  // one image takes frame_job() of it.
   virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
-  virtual std::vector<JobView> jobs() const = 0;
+  virtual std::vector<JobView> jobs() const = 0;  // a sequence is one of them, its frames are not
   virtual Result<JobView> job(const JobId& id) const = 0;
   virtual Result<void> change(const JobId& id, const JobChange& change) = 0;
   // A job that has ended goes with all that was rendered of it; one that has not is cancelled, and stays.

@@ -20,16 +20,18 @@ bool is_end(JobState state) {
   return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
 }
 
+}  // namespace
+
 Result<void> check_priority(int priority) {
   if (std::abs(std::int64_t{priority}) > limits::kMaxPriority)
     return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", limits::kMaxPriority));
   return {};
 }
 
-}  // namespace
-
 Result<void> Service::change(const JobId& id, const JobChange& change) {
   const std::lock_guard lock(mutex_);
+  if (const auto sequence = sequences_.find(id); sequence != sequences_.end())
+    return change_sequence_locked(id, sequence->second, change);
   const auto entry = usable_locked(id);
   if (!entry) return tl::unexpected(entry.error());
   if (change.priority)
@@ -167,19 +169,32 @@ Result<void> Service::extend_locked(JobEntry& entry, std::uint64_t spp) {
 
 Result<void> Service::remove(const JobId& id) {
   const std::lock_guard lock(mutex_);
+  if (const auto sequence = sequences_.find(id); sequence != sequences_.end())
+    return remove_sequence_locked(id, sequence->second);
   const auto found = entry_locked(id);
   if (!found) return tl::unexpected(found.error());
   const EntryPtr entry = *found;
+  if (const auto frame = frame_of(id))
+    return fail(Errc::failed_precondition,
+                fmt::format("{} is a frame of job {}: it can be cancelled, and is removed with all frames",
+                            id.value, frame->sequence.value));
   if (!is_end(shown_state(*entry)) && entry->finishing == 0) {
     run_locked(JobCancelled{id});
     return {};
   }
   if (auto removed = store_->remove_job(id); !removed) return removed;
+  std::erase(order_, id);
+  drop_locked(entry);
+  return {};
+}
+
+// Out of the books, when its record is gone.
+void Service::drop_locked(const EntryPtr& entry) {
+  const JobId id = entry->stored.id;
   entry->removed = true;
   entry->finishing = 0;
   if (!entry->dormant) run_locked(JobForgotten{id});
   entries_.erase(id);
-  std::erase(order_, id);
   log_info(fmt::format("job={}", id.value), "removed");
   // Chores of the job may still stand in the queue; what they leave behind goes with the folder.
   chores_.push([this, id] {
@@ -193,7 +208,6 @@ Result<void> Service::remove(const JobId& id) {
     if (error && error != std::errc::no_such_file_or_directory)
       log_warn(fmt::format("job={}", id.value), "its folder cannot be removed: " + error.message());
   });
-  return {};
 }
 
 }  // namespace ls::coordinator

@@ -48,6 +48,8 @@ void Service::on(const RecordUnit& e, Todo&) {
   if (entry->clock_zero) return;
   const auto figures = farm_.job(e.unit.job);
   entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : now();
+  if (entry->stored.totals.began_unix == 0)
+    entry->stored.totals.began_unix = unix_now() - elapsed_locked(*entry);
 }
 
 // From memory, or from the log when it came before a restart or too many wait.
@@ -147,6 +149,7 @@ void Service::on(const JobStateChanged& e, Todo&) {
   }
   if (e.to == JobState::cancelled || e.to == JobState::failed) {
     entry->stored.totals.render_seconds = entry->fold_seconds;
+    entry->stored.totals.ended_unix = unix_now();
     entry->clock_zero.reset();
     entry->leased.clear();
     if (entry->assembly) entry->assembly->forget_waiting();
@@ -187,6 +190,7 @@ void Service::on(const JobFinished& e, Todo&) {
   if (!entry) return;
   entry->stored.stopped = e.stopped;
   entry->stored.totals.render_seconds = entry->fold_seconds;
+  entry->stored.totals.ended_unix = unix_now();
   entry->clock_zero.reset();
   entry->finishing = ++last_final_;
   entry->leased.clear();
@@ -206,6 +210,10 @@ void Service::on(const JobFailed& e, Todo&) {
 
 bool Service::persist_locked(JobEntry& entry) {
   if (entry.removed) return true;
+  if (unsaved_ && !entry.pin_unsaved) {
+    unsaved_->insert(entries_.at(entry.stored.id));
+    return true;
+  }
   if (const auto put = store_->put_job(entry.stored); !put) {
     store_trouble_ = put.error().message;
     log_error(fmt::format("job={}", entry.stored.id.value), put.error().message);
@@ -237,7 +245,13 @@ double Service::elapsed_locked(const JobEntry& entry) const {
 void Service::publish_job_locked(JobEntry& entry) {
   entry.progress_due = false;
   entry.last_progress = now();
-  if (!restoring_) hub_->publish("job", job_json(view_locked(entry)), entry.stored.id.value);
+  if (restoring_) return;
+  const JobView view = view_locked(entry);
+  hub_->publish("job", job_json(view), entry.stored.id.value);
+  if (const auto frame = frame_of(entry.stored.id)) {
+    const bool changed = std::exchange(entry.last_state, view.state) != view.state;
+    publish_sequence_locked(frame->sequence, changed && !unsaved_);
+  }
 }
 
 void Service::publish_progress_locked(JobEntry& entry) {

@@ -57,6 +57,7 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
 }
 
 Result<void> Service::write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors) {
+  if (auto made = make_folder(folder(entry->stored.id)); !made) return made;  // nothing may have come of it
   return write_atomically(folder(entry->stored.id) / "film.snap",
                           save_snapshot(film, errors, snapshot_format()));
 }

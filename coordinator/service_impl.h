@@ -15,6 +15,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -53,6 +54,7 @@ struct JobEntry {
   bool snapshot_running = false;
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
+  JobState last_state = JobState::queued;  // as published
   std::optional<TimePoint> clock_zero;   // of the job's seconds, while it runs
   std::optional<TimePoint> still_since;  // paused: its clock stands
   double fold_seconds = 0;               // job seconds at the last fold
@@ -61,6 +63,13 @@ struct JobEntry {
   // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
   std::vector<std::pair<double, double>> replay;
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
+};
+
+struct Sequence {
+  std::vector<std::shared_ptr<JobEntry>> frames;  // ascending, never empty
+  std::vector<std::string> warnings;              // of all frames, each once
+  TimePoint last_progress{};
+  bool progress_due = false;
 };
 
 struct Connection {
@@ -141,12 +150,30 @@ class Service final : public Coordinator {
   Result<void> restore();
 
   // ---- restart (service_restore.cpp) ----
-  Result<EntryPtr> make_entry(StoredJob stored, bool with_log);
+  EntryPtr make_entry(StoredJob stored) const;
   Result<void> take_up_locked(JobEntry& entry, JobState state);
   void set_aside_locked(JobEntry& entry, const Error& why);
   void remove_leftovers() const;
 
-  // ---- changes (service_jobs.cpp) ----
+  // ---- sequences (service_sequence.cpp, service_sequence_views.cpp) ----
+  tl::expected<JobId, Rejected> submit_sequence(const SubmitRequest& request);
+  void register_locked(const EntryPtr& entry);
+  void publish_sequence_locked(const JobId& id, bool at_once);
+  Result<void> edit_locked(const std::vector<EntryPtr>& frames, const std::function<void(StoredJob&)>& edit);
+  Result<void> change_sequence_locked(const JobId& id, const Sequence& sequence, const JobChange& change);
+  Result<std::vector<EntryPtr>> may_retarget_locked(const JobId& id, const std::vector<EntryPtr>& open,
+                                                    double target_error) const;
+  Result<std::vector<EntryPtr>> may_extend_locked(const Sequence& sequence, std::uint64_t spp) const;
+  Result<void> become_together_locked(const std::vector<EntryPtr>& frames, JobState asked);
+  Result<void> remove_sequence_locked(const JobId& id, const Sequence& sequence);
+  JobView sequence_view_locked(const JobId& id, const Sequence& sequence, bool with_frames) const;
+  Result<std::string> sequence_report(const JobId& id) const;
+  Result<std::string> sequence_log(const JobId& id) const;
+  bool is_sequence(const JobId& id) const;
+
+  // ---- changes (service_jobs.cpp, service_changes.cpp) ----
+  JobId unused_id_locked() const;
+  void drop_locked(const EntryPtr& entry);
   Result<EntryPtr> usable_locked(const JobId& id) const;
   Result<void> may_become_locked(const JobEntry& entry, JobState asked, bool extended) const;
   Result<void> become_locked(const EntryPtr& entry, JobState asked);
@@ -239,7 +266,9 @@ class Service final : public Coordinator {
   mutable std::condition_variable ended_;
   Farm farm_;
   std::map<JobId, EntryPtr> entries_;
-  std::vector<JobId> order_;  // of submission
+  std::map<JobId, Sequence> sequences_;     // by their own id; their frames are in entries_
+  std::vector<JobId> order_;                // of submission; a sequence stands for its frames
+  std::set<EntryPtr>* unsaved_ = nullptr;   // while jobs change together: those to be stored after it
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
   std::string store_trouble_;     // the last result that could not be stored
@@ -257,5 +286,7 @@ class Service final : public Coordinator {
 };
 
 double unix_now();
+Result<void> check_priority(int priority);
+std::string log_text(const std::vector<LogLine>& lines);
 
 }  // namespace ls::coordinator

@@ -11,18 +11,13 @@
 
 namespace ls::coordinator {
 
-Result<Service::EntryPtr> Service::make_entry(StoredJob stored, bool with_log) {
+Service::EntryPtr Service::make_entry(StoredJob stored) const {
   auto entry = std::make_shared<JobEntry>();
   entry->stored = std::move(stored);
   entry->settings_digest = digest_of(entry->stored.settings);
   entry->grid = {entry->stored.settings.size, entry->stored.settings.tile};
   entry->last_snapshot = now();
   entry->fold_seconds = entry->stored.totals.render_seconds;
-  if (on_disk() && with_log) {
-    auto log = PartialLog::open(folder(entry->stored.id));
-    if (!log) return tl::unexpected(log.error());
-    entry->log = std::move(*log);
-  }
   return entry;
 }
 
@@ -36,10 +31,9 @@ Result<void> Service::restore() {
   for (StoredJob& job : *jobs) {
     const JobState state = job.state;
     const bool ended = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-    const auto entry = make_entry(std::move(job), false).value();  // fails with a log only
+    const auto entry = make_entry(std::move(job));
     entry->dormant = ended;
-    entries_.emplace(entry->stored.id, entry);
-    order_.push_back(entry->stored.id);
+    register_locked(entry);
     if (entry->stored.damaged)
       set_aside_locked(*entry, {Errc::internal, entry->stored.error});
     else if (auto taken = take_up_locked(*entry, state); !taken)
@@ -66,7 +60,11 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
   if (auto sound = check_plan(event->plan); !sound) return sound;
   log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event->accepted.size()),
            "restored");
-  if (event->elapsed_seconds > 0) entry.clock_zero = now() - from_seconds(event->elapsed_seconds);
+  if (event->elapsed_seconds > 0) {
+    entry.clock_zero = now() - from_seconds(event->elapsed_seconds);
+    if (entry.stored.totals.began_unix == 0)
+      entry.stored.totals.began_unix = unix_now() - event->elapsed_seconds;
+  }
   if (state == JobState::paused) entry.still_since = now();
   run_locked(std::move(*event));
   entry.replay.clear();

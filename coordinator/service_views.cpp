@@ -1,10 +1,8 @@
 // What users see.
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "common/image/final_image.h"
 #include "coordinator/service_impl.h"
@@ -18,7 +16,16 @@ Service::EntryPtr Service::find_locked(const JobId& id) const {
 
 Result<Service::EntryPtr> Service::entry_locked(const JobId& id) const {
   if (auto entry = find_locked(id)) return entry;
-  return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  const auto frame = frame_of(id);
+  const auto sequence = sequences_.find(frame ? frame->sequence : id);
+  if (sequence == sequences_.end()) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  const std::string frames =
+      to_string(sequence_view_locked(sequence->first, sequence->second, false).frames->range);
+  if (frame)
+    return fail(Errc::not_found, fmt::format("job {} has no frame {}: its frames are {}",
+                                             frame->sequence.value, frame->frame, frames));
+  return fail(Errc::invalid_argument,
+              fmt::format("job {} is a sequence: say which of its frames {} is meant", id.value, frames));
 }
 
 // One that was taken up at the start: of another only the reason why not is known, and it may be removed.
@@ -115,12 +122,23 @@ JobView Service::view_locked(const JobEntry& entry) const {
 std::vector<JobView> Service::jobs() const {
   const std::lock_guard lock(mutex_);
   std::vector<JobView> all;
-  for (const JobId& id : order_) all.push_back(view_locked(*entries_.at(id)));
+  for (const JobId& id : order_) {
+    const auto sequence = sequences_.find(id);
+    all.push_back(sequence == sequences_.end() ? view_locked(*entries_.at(id))
+                                               : sequence_view_locked(id, sequence->second, false));
+  }
   return all;
+}
+
+bool Service::is_sequence(const JobId& id) const {
+  const std::lock_guard lock(mutex_);
+  return sequences_.contains(id);
 }
 
 Result<JobView> Service::job(const JobId& id) const {
   const std::lock_guard lock(mutex_);
+  if (const auto sequence = sequences_.find(id); sequence != sequences_.end())
+    return sequence_view_locked(id, sequence->second, true);
   const auto entry = entry_locked(id);
   if (!entry) return tl::unexpected(entry.error());
   return view_locked(**entry);
@@ -163,6 +181,7 @@ Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposu
 }
 
 Result<std::string> Service::report_json(const JobId& id) const {
+  if (is_sequence(id)) return sequence_report(id);
   std::unique_lock lock(mutex_);
   const auto entry = usable_locked(id);
   if (!entry) return tl::unexpected(entry.error());
@@ -213,17 +232,14 @@ Result<std::vector<TileView>> Service::tiles(const JobId& id) const {
 }
 
 Result<std::string> Service::job_log(const JobId& id) const {
+  if (is_sequence(id)) return sequence_log(id);
   {
     const std::lock_guard lock(mutex_);
     if (const auto entry = entry_locked(id); !entry) return tl::unexpected(entry.error());
   }
   const auto lines = store_->log(id);
   if (!lines) return tl::unexpected(lines.error());
-  std::string text;
-  for (const LogLine& line : *lines)
-    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)),
-                        line.text);
-  return text;
+  return log_text(*lines);
 }
 
 WorkerView Service::view_locked(const WorkerId& id, const WorkerEntry& worker) const {

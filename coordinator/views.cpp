@@ -15,6 +15,22 @@ json text_or_null(const std::string& text) { return text.empty() ? json() : json
 // Names come from strangers: what is not UTF-8 is replaced.
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
 
+json to_value(const FramesView& v) {
+  json j{{"range", to_string(v.range)}, {"total", v.total},         {"done", v.done},      {"running", v.running},
+         {"failed", v.failed},          {"cancelled", v.cancelled}, {"current", v.current}};
+  if (v.all.empty()) return j;
+  auto& list = j["list"] = json::array();
+  for (const FrameView& f : v.all)
+    list.push_back({{"frame", f.frame},
+                    {"id", f.job.value},
+                    {"state", to_string(f.state)},
+                    {"progress", number(f.progress)},
+                    {"spp_done", number(f.spp_done)},
+                    {"relmse", f.relmse ? number(*f.relmse) : json()},
+                    {"error", text_or_null(f.error)}});
+  return j;
+}
+
 json to_value(const JobView& v) {
   json j{{"id", v.id.value},
          {"name", v.name},
@@ -39,6 +55,10 @@ json to_value(const JobView& v) {
           {{"nonfinite", v.health.nonfinite},
            {"negative", v.health.negative},
            {"majorant_violations", v.health.majorant_violations}}}};
+  const auto frame = frame_of(v.id);
+  j["sequence"] = frame ? json(frame->sequence.value) : json();
+  j["frame"] = frame ? json(frame->frame) : json();
+  j["frames"] = v.frames ? to_value(*v.frames) : json();
   j["rmse"] = v.error_now ? number(v.error_now->rmse) : json();
   j["relmse"] = v.error_now ? number(v.error_now->relmse) : json();
   j["relmse_ci95"] =

@@ -40,6 +40,19 @@ void read_defines(Fields& fields, JobSpec& spec) {
   }
 }
 
+// "1-10", or 7: one frame alone.
+void read_frames(Fields& fields, JobSpec& spec) {
+  const Json* v = fields.find("frames");
+  if (!v) return;
+  if (!v->is_string() && !v->is_number_unsigned())
+    return fields.wrong("frames", "must be a text like \"1-10\" or \"1-10x2\", or the number of one frame");
+  const auto range = parse_frames(v->is_string() ? v->get<std::string>() : v->dump());
+  if (!range) return fields.wrong("frames", "is not possible: " + range.error().message);
+  spec.frames = *range;
+  if (spec.defines.contains("frame"))
+    fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
+}
+
 }  // namespace
 
 std::string canonical_json(const RenderSettings& s) {
@@ -109,6 +122,7 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.seed) json["seed"] = *spec.seed;
   if (spec.size) json["size"] = size_json(*spec.size);
   if (spec.integrator) json["integrator"] = *spec.integrator;
+  if (spec.frames) json["frames"] = to_string(*spec.frames);
   return dump(json);
 }
 
@@ -117,7 +131,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   if (!json) return tl::unexpected(json.error());
   Fields fields(*json, "spec",
                 {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
-                 "float", "tags"});
+                 "float", "tags", "frames"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -130,6 +144,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   spec.priority = static_cast<int>(fields.integer("priority", -kMaxPriority, kMaxPriority).value_or(0));
   spec.float_output = fields.boolean("float").value_or(false);
   spec.tags = fields.names("tags").value_or(spec.tags);
+  read_frames(fields, spec);
   if (fields.error()) return tl::unexpected(*fields.error());
   return spec;
 }

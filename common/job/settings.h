@@ -11,6 +11,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
+#include "common/base/frame_range.h"
 #include "common/image/frame.h"
 
 namespace ls {
@@ -41,6 +42,7 @@ struct JobSpec {
   int priority = 0;
   bool float_output = false;
   std::vector<std::string> tags;
+  std::optional<FrameRange> frames;  // a sequence: one film per frame; absent: one image
   bool operator==(const JobSpec&) const = default;
 };
 

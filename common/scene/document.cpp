@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/frame_range.h"
 #include "common/scene/limits.h"
 #include "common/scene/nori.h"
 #include "common/scene/suggest.h"
@@ -15,17 +16,22 @@
 namespace ls::scene {
 namespace {
 
+constexpr std::string_view kFrameParameter = "frame";
+
 bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
 
 // `$name` -> value. What is put in is not searched again, so there is no recursion and no explosion.
 class Parameters {
  public:
-  Parameters(const std::map<std::string, std::string>& defines, Report& report)
-      : values_(defines.begin(), defines.end()), report_(report) {
-    for (const auto& [name, value] : defines) {
+  Parameters(const ReadOptions& options, Report& report)
+      : values_(options.defines.begin(), options.defines.end()), report_(report) {
+    for (const auto& [name, value] : options.defines) {
       unused_.insert(name);
       note_length(name);
     }
+    if (!options.frame) return;  // a scene need not ask for it
+    values_.insert_or_assign(std::string(kFrameParameter), std::to_string(*options.frame));
+    note_length(std::string(kFrameParameter));
   }
 
   // Something defined from outside that nothing asks for is a typing error, but no reason to stop.
@@ -128,8 +134,8 @@ class Parameters {
 
 class Loader {
  public:
-  Loader(AssetSource& assets, const std::map<std::string, std::string>& defines, Report& report)
-      : assets_(assets), parameters_(defines, report), report_(report) {}
+  Loader(AssetSource& assets, const ReadOptions& options, Report& report)
+      : assets_(assets), parameters_(options, report), report_(report), frame_(options.frame) {}
 
   bool load(std::string name, std::string text, const Span* included_at, Element& root) {
     total_bytes_ += text.size();
@@ -223,7 +229,8 @@ class Loader {
       if (!parameters_.substitute(a)) return false;
     if (!check_attributes(e, {"filename"})) return false;
     const Span at = e.find("filename")->value_at;
-    const std::string name(e.get("filename"));
+    const std::string name =
+        frame_ ? numbered(e.get("filename"), *frame_) : std::string(e.get("filename"));
     if (static_cast<int>(including_.size()) >= kMaxIncludeDepth || ++includes_ > kMaxIncludes) {
       report_.error(at, fmt::format("includes are limited to {} within each other and {} altogether",
                                     kMaxIncludeDepth, kMaxIncludes));
@@ -272,6 +279,7 @@ class Loader {
   AssetSource& assets_;
   Parameters parameters_;
   Report& report_;
+  std::optional<std::uint32_t> frame_;
   std::vector<std::string> including_;
   std::size_t total_bytes_ = 0, elements_left_ = kMaxElements;
   int includes_ = 0;
@@ -280,14 +288,15 @@ class Loader {
 }  // namespace
 
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
-                                      const std::map<std::string, std::string>& defines, Report& report) {
-  Loader loader(assets, defines, report);
+                                      const ReadOptions& options, Report& report) {
+  Loader loader(assets, options, report);
   Document document;
   if (!loader.load(std::string(file_name), std::string(text.substr(0, kMaxTextBytes + 1)), nullptr,
                    document.root))
     return std::nullopt;
   loader.warn_of_unused_defines(document.root);
   document.search_paths = std::move(loader.search_paths);
+  document.frame = options.frame;
   return document;
 }
 

@@ -33,16 +33,17 @@ struct Element {
 struct Document {
   Element root;
   std::vector<std::string> search_paths;  // of <path>, the first to be tried first
+  std::optional<std::uint32_t> frame;     // ReadOptions::frame
 };
 
 // XML text -> tree; nothing (and diagnostics) if it is malformed, not UTF-8 or beyond the limits. The only
 // door to pugixml.
 std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
 
-// The whole stage: parses, follows <include>, applies <default> and `defines`. Handles <include>, <default>
+// The whole stage: parses, follows <include>, applies <default> and the defines. Handles <include>, <default>
 // and <path>, which are gone from the result.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
-                                      const std::map<std::string, std::string>& defines, Report& report);
+                                      const ReadOptions& options, Report& report);
 
 // `name` below `folder` (either may be absolute or empty), with "." and ".." resolved where that needs no
 // disk.

@@ -1,6 +1,7 @@
 // Scene text -> Scene, or up to kMaxDiagnostics diagnostics, each with a place.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
@@ -28,6 +29,8 @@ class AssetSource {
 struct ReadOptions {
   std::map<std::string, std::string> defines;  // $name -> value; one that nothing asks for is warned about
   bool strict = false;                         // warnings become errors
+  // Of a sequence: a run of # in the name of a file stands for this number, and $frame is defined to be it.
+  std::optional<std::uint32_t> frame = std::nullopt;
 };
 
 struct ReadResult {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/frame_range.h"
 #include "common/scene/known.h"
 #include "common/scene/limits.h"
 #include "common/scene/nori.h"
@@ -169,7 +170,8 @@ const Rgb* Reader::constant(VolumeIndex volume) const {
   return c ? &c->value : nullptr;
 }
 
-std::optional<AssetIndex> Reader::asset(const std::string& name, const Span& at) {
+std::optional<AssetIndex> Reader::asset(const std::string& written, const Span& at) {
+  const std::string name = document_.frame ? numbered(written, *document_.frame) : written;
   if (const auto it = assets_by_name_.find(name); it != assets_by_name_.end()) return it->second;
   if (name.empty()) {
     report_.error(at, "the name of a file is wanted here");
@@ -192,6 +194,8 @@ std::optional<AssetIndex> Reader::asset(const std::string& name, const Span& at)
     assets_by_name_.emplace(name, index);
     return index;
   }
+  if (!document_.frame && has_frame_number(name))
+    last.message += "; if its # stand for the number of a frame, say which frames are wanted (--frames A-B)";
   report_.error(at, last.message);
   return std::nullopt;
 }
@@ -202,7 +206,7 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
                       const ReadOptions& options) {
   scene::Report report(options.strict);
   ReadResult result;
-  auto document = scene::load_document(file_name, text, assets, options.defines, report);
+  auto document = scene::load_document(file_name, text, assets, options, report);
   if (document && scene::nori::translate(*document, report)) {
     const Scene read = scene::Reader(*document, assets, report).read();
     if (!report.has_errors()) result.scene = scene::compacted(read);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,7 @@ struct JobTotals {
   std::uint64_t units = 0;          // done
   std::uint64_t units_planned = 0;  // 0: as many
   UnitHealth health;
+  double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
   bool operator==(const JobTotals&) const = default;
 };
 
@@ -65,10 +67,13 @@ class JobStore {
  public:
   virtual ~JobStore() = default;
   virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
+  // All of them, or none.
+  virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
   // In order of first put. One whose record is damaged comes as such, and keeps no other from coming.
   virtual Result<std::vector<StoredJob>> jobs() const = 0;
   // With its points and log; of an unknown one nothing is removed.
-  virtual Result<void> remove_job(const JobId& job) = 0;
+  virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
+  virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // all of them, or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;

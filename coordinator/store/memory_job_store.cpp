@@ -20,15 +20,21 @@ class MemoryJobStore final : public JobStore {
     jobs_.push_back(job);
     return {};
   }
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    for (const StoredJob& job : jobs) (void)put_job(job);
+    return {};
+  }
   Result<std::vector<StoredJob>> jobs() const override {
     const std::lock_guard lock(mutex_);
     return jobs_;
   }
-  Result<void> remove_job(const JobId& job) override {
+  Result<void> remove_jobs(std::span<const JobId> jobs) override {
     const std::lock_guard lock(mutex_);
-    std::erase_if(jobs_, [&](const StoredJob& known) { return known.id == job; });
-    points_.erase(job);
-    log_.erase(job);
+    for (const JobId& job : jobs) {
+      std::erase_if(jobs_, [&](const StoredJob& known) { return known.id == job; });
+      points_.erase(job);
+      log_.erase(job);
+    }
     return {};
   }
   Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {

@@ -99,14 +99,13 @@ std::filesystem::path PartialLog::segment_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
-  if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
   std::uint32_t count = 0;
   while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
   for (std::uint32_t i = 0; i < count; ++i)
     if (auto done = log->scan(i, i + 1 == count); !done) return tl::unexpected(done.error());
-  if (auto started = log->start_segment(count == 0 ? 0 : count - 1); !started)
-    return tl::unexpected(started.error());
+  if (count == 0) return log;
+  if (auto started = log->start_segment(count - 1); !started) return tl::unexpected(started.error());
   return log;
 }
 
@@ -158,6 +157,10 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
   if (exr.size() > ls::limits::kPartialBytes)
     return fail(Errc::invalid_argument, fmt::format("a partial of {} bytes is larger than {}", exr.size(),
                                                     ls::limits::kPartialBytes));
+  if (!current_) {
+    if (auto made = make_folder(folder_); !made) return tl::unexpected(made.error());
+    if (auto done = start_segment(0); !done) return tl::unexpected(done.error());
+  }
   if (size_ > 0 && size_ + sizeof(RawHeader) + exr.size() > limits::kMaxSegmentBytes) {
     if (auto done = flush(); !done) {
       lost_ = done.error();

@@ -44,8 +44,9 @@ class PartialLog {
     Place place;
   };
 
-  // Makes the folder, scans the segments in order. Headers are checked everywhere, EXR bytes in the last
-  // segment, where a torn tail can be; full segments were synced before the next one began.
+  // Scans the segments in order. Headers are checked everywhere, EXR bytes in the last segment, where a torn
+  // tail can be; full segments were synced before the next one began. Where there is none, the folder and the
+  // first one are made by the first append(): a job that waits costs no file.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // at open()

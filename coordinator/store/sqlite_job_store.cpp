@@ -108,13 +108,16 @@ class SqliteJobStore final : public JobStore {
 
   Result<void> put_job(const StoredJob& job) override {
     const std::lock_guard lock(mutex_);
-    return Statement(db_.get(),
-                     "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
-                     "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
-        .bind(job.id.value)
-        .bind(to_string(job.state))
-        .bind(to_json(job))
-        .run("store a job");
+    return put_locked(job);
+  }
+
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    const std::lock_guard lock(mutex_);
+    return all_or_nothing("store jobs", [&]() -> Result<void> {
+      for (const StoredJob& job : jobs)
+        if (auto done = put_locked(job); !done) return done;
+      return {};
+    });
   }
 
   Result<std::vector<StoredJob>> jobs() const override {
@@ -130,18 +133,15 @@ class SqliteJobStore final : public JobStore {
     return all;
   }
 
-  Result<void> remove_job(const JobId& job) override {
+  Result<void> remove_jobs(std::span<const JobId> jobs) override {
     const std::lock_guard lock(mutex_);
-    if (auto begun = execute(db_.get(), "BEGIN IMMEDIATE", "remove a job"); !begun) return begun;
-    for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
-                            "DELETE FROM log WHERE job = ?"})
-      if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) {
-        (void)execute(db_.get(), "ROLLBACK", "take back the removal of a job");
-        return done;
-      }
-    auto done = execute(db_.get(), "COMMIT", "remove a job");
-    if (!done) (void)execute(db_.get(), "ROLLBACK", "take back the removal of a job");
-    return done;
+    return all_or_nothing("remove a job", [&]() -> Result<void> {
+      for (const JobId& job : jobs)
+        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
+                                "DELETE FROM log WHERE job = ?"})
+          if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) return done;
+      return {};
+    });
   }
 
   Result<void> add_point(const JobId& job, const ConvergencePoint& p) override {
@@ -224,6 +224,26 @@ class SqliteJobStore final : public JobStore {
   }
 
  private:
+  Result<void> put_locked(const StoredJob& job) {
+    return Statement(db_.get(),
+                     "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
+                     "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
+        .bind(job.id.value)
+        .bind(to_string(job.state))
+        .bind(to_json(job))
+        .run("store a job");
+  }
+
+  // One transaction: what `work` did, or nothing of it.
+  template <class Work>
+  Result<void> all_or_nothing(const char* what, Work work) {
+    if (auto begun = execute(db_.get(), "BEGIN IMMEDIATE", what); !begun) return begun;
+    auto done = work();
+    if (done) done = execute(db_.get(), "COMMIT", what);
+    if (!done) (void)execute(db_.get(), "ROLLBACK", "take back what was begun");
+    return done;
+  }
+
   mutable std::mutex mutex_;
   Db db_;
   std::uint64_t log_lines_ = 0;

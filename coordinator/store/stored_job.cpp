@@ -19,7 +19,9 @@ json to_value(const JobTotals& t) {
           {"units_planned", t.units_planned},
           {"nonfinite", t.health.nonfinite},
           {"negative", t.health.negative},
-          {"majorant_violations", t.health.majorant_violations}};
+          {"majorant_violations", t.health.majorant_violations},
+          {"began_unix", t.began_unix},
+          {"ended_unix", t.ended_unix}};
 }
 
 JobTotals totals_of(const json& j) {
@@ -32,6 +34,8 @@ JobTotals totals_of(const json& j) {
   t.units = j.at("units");
   t.units_planned = j.value("units_planned", std::uint64_t{0});
   t.health = {j.at("nonfinite"), j.at("negative"), j.at("majorant_violations")};
+  t.began_unix = j.value("began_unix", 0.0);
+  t.ended_unix = j.value("ended_unix", 0.0);
   return t;
 }
 

@@ -49,6 +49,20 @@ class JobStores : public testing::TestWithParam<bool> {
 INSTANTIATE_TEST_SUITE_P(Both, JobStores, testing::Bool(),
                          [](const auto& info) { return info.param ? "Sqlite" : "Memory"; });
 
+TEST_P(JobStores, StoresAndRemovesSeveralJobsTogether) {
+  const auto store = open();
+  const std::vector jobs{sample_job("j-1-frame2"), sample_job("j-1-frame10"), sample_job("j-2")};
+  ASSERT_TRUE(store->put_jobs(jobs));
+  EXPECT_EQ(store->jobs().value(), jobs);
+  ASSERT_TRUE(store->add_log(jobs[0].id, {1, "gone with its job"}));
+
+  ASSERT_TRUE(store->remove_jobs(std::vector{jobs[0].id, jobs[1].id, JobId{"j-none"}}));
+
+  EXPECT_EQ(store->jobs().value(), std::vector{jobs[2]});
+  EXPECT_TRUE(store->log(jobs[0].id).value().empty());
+  ASSERT_TRUE(store->put_jobs({}));
+}
+
 TEST_P(JobStores, KeepsJobsInOrderOfSubmissionAndReplacesThem) {
   const auto store = open();
   ASSERT_TRUE(store->put_job(sample_job("j-2")));

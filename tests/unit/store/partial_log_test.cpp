@@ -33,6 +33,19 @@ void fill(const std::filesystem::path& dir, std::uint32_t count) {
   ASSERT_TRUE(log->sync());
 }
 
+TEST(PartialLog, CostsNoFileBeforeTheFirstRecord) {
+  TempFolder dir;
+  const auto folder = dir.path() / "job";
+  const auto log = PartialLog::open(folder).value();
+  ASSERT_TRUE(log->sync());
+  EXPECT_FALSE(std::filesystem::exists(folder));
+
+  ASSERT_TRUE(log->append(record(1), payload(1)));
+  ASSERT_TRUE(log->sync());
+
+  EXPECT_EQ(PartialLog::open(folder).value()->found().size(), 1u);
+}
+
 TEST(PartialLog, FindsEveryRecordAfterReopening) {
   TempFolder dir;
   fill(dir.path(), 10);

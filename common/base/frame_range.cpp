@@ -1,0 +1,97 @@
+#include "common/base/frame_range.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <optional>
+
+#include "common/base/plain_text.h"
+
+namespace ls {
+namespace {
+
+constexpr std::size_t kMostShown = 40;  // of a text that is no range
+
+// The number at the front of `text`, which is taken off.
+std::optional<std::uint32_t> take_number(std::string_view& text) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{}) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+bool take(std::string_view& text, char c) {
+  if (text.empty() || text.front() != c) return false;
+  text.remove_prefix(1);
+  return true;
+}
+
+std::optional<FrameRange> read(std::string_view text) {
+  const auto first = take_number(text);
+  if (!first) return std::nullopt;
+  FrameRange range{*first, *first, 1};
+  if (take(text, '-')) {
+    const auto last = take_number(text);
+    if (!last) return std::nullopt;
+    range.last = *last;
+    if (take(text, 'x')) {
+      const auto step = take_number(text);
+      if (!step) return std::nullopt;
+      range.step = *step;
+    }
+  }
+  if (!text.empty()) return std::nullopt;
+  return range;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> FrameRange::frames() const {
+  std::vector<std::uint32_t> all;
+  all.reserve(count());
+  for (std::uint32_t i = 0; i < count(); ++i) all.push_back(first + i * step);
+  return all;
+}
+
+Result<FrameRange> parse_frames(std::string_view text) {
+  const auto wrong = [&](std::string why) {
+    return fail(Errc::invalid_argument,
+                fmt::format("frames '{}': {}", plain_text(text.substr(0, kMostShown)), why));
+  };
+  const auto range = read(text);
+  if (!range)
+    return wrong("write them as FIRST-LAST, 1-10 say; 1-10x2 is every second one, 7 the seventh alone");
+  if (range->last < range->first) return wrong("the last comes before the first");
+  if (range->step == 0) return wrong("a step of 0 never arrives");
+  if (range->last > kMaxFrameNumber) return wrong(fmt::format("numbers go up to {}", kMaxFrameNumber));
+  if (range->count() > kMaxFrames)
+    return wrong(fmt::format("these are {} frames; one job may have {}: make several jobs of it",
+                             range->count(), kMaxFrames));
+  return *range;
+}
+
+std::string to_string(const FrameRange& range) {
+  std::string text = fmt::format("{}", range.first);
+  if (range.last != range.first) text += fmt::format("-{}", range.last);
+  if (range.last != range.first && range.step != 1) text += fmt::format("x{}", range.step);
+  return text;
+}
+
+std::string numbered(std::string_view name, std::uint32_t frame) {
+  std::string out;
+  for (std::size_t at = 0; at < name.size();) {
+    if (name[at] != '#') {
+      out += name[at++];
+      continue;
+    }
+    const std::size_t end = std::min(name.find_first_not_of('#', at), name.size());
+    out += fmt::format("{:0{}}", frame, end - at);
+    at = end;
+  }
+  return out;
+}
+
+bool has_frame_number(std::string_view name) { return name.find('#') != std::string_view::npos; }
+
+}  // namespace ls

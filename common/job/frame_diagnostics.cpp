@@ -1,0 +1,34 @@
+#include "common/job/frame_diagnostics.h"
+
+#include <fmt/format.h>
+
+namespace ls {
+
+void FrameDiagnostics::add(std::uint32_t frame, const std::vector<Diagnostic>& found) {
+  ++read_;
+  for (const Diagnostic& d : found) {
+    const Key key{d.severity, d.place.file, d.place.line, d.place.column, d.text};
+    const auto known = known_.find(key);
+    if (known != known_.end()) {
+      ++all_[known->second].frames;
+    } else if (!full()) {
+      known_.emplace(key, all_.size());
+      all_.push_back({d, frame, 1});
+    }
+  }
+}
+
+std::vector<Diagnostic> FrameDiagnostics::take() const {
+  std::vector<Diagnostic> out;
+  for (const Told& told : all_) {
+    Diagnostic d = told.diagnostic;
+    if (told.frames < read_ || read_ == 1)
+      d.text = told.frames == 1
+                   ? fmt::format("frame {}: {}", told.first_frame, d.text)
+                   : fmt::format("frame {} and {} more: {}", told.first_frame, told.frames - 1, d.text);
+    out.push_back(std::move(d));
+  }
+  return out;
+}
+
+}  // namespace ls

@@ -1,0 +1,115 @@
+// A sequence's figures from those of its frames.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "coordinator/sequence.h"
+
+namespace ls::coordinator {
+namespace {
+
+JobView frame(std::uint32_t number, JobState state) {
+  JobView v;
+  v.id = frame_job({"j-1"}, number);
+  v.state = state;
+  v.size = {10, 10};
+  v.units_total = 10;
+  return v;
+}
+
+std::vector<JobView> with(std::initializer_list<JobState> states) {
+  std::vector<JobView> all;
+  for (const JobState s : states) all.push_back(frame(static_cast<std::uint32_t>(all.size() + 1), s));
+  return all;
+}
+
+JobView whole(const std::vector<JobView>& frames, int threads = 0) {
+  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, threads}, frames);
+}
+
+TEST(SequenceView, HasTheStateOfItsFramesTogether) {
+  using S = JobState;
+  struct Row {
+    std::initializer_list<S> frames;
+    S expected;
+  };
+  const Row rows[] = {
+      {{S::queued, S::queued}, S::queued},     {{S::running, S::queued}, S::running},
+      {{S::done, S::queued}, S::running},      {{S::done, S::paused}, S::paused},
+      {{S::paused, S::queued}, S::queued},     {{S::running, S::paused}, S::running},
+      {{S::done, S::done}, S::done},           {{S::done, S::failed}, S::failed},
+      {{S::cancelled, S::failed}, S::failed},  {{S::done, S::cancelled}, S::cancelled},
+      {{S::failed, S::running}, S::running},   {{S::failed, S::paused}, S::paused},
+      {{S::cancelled, S::queued}, S::running},
+  };
+  for (const Row& row : rows) EXPECT_EQ(sequence_state(with(row.frames)), row.expected) << &row - rows;
+}
+
+TEST(SequenceView, PointsAtTheFrameToLookAt) {
+  using S = JobState;
+  EXPECT_EQ(whole(with({S::queued, S::queued})).frames->current, 1u);
+  EXPECT_EQ(whole(with({S::done, S::running, S::running})).frames->current, 2u);
+  auto ended = with({S::done, S::done, S::cancelled});
+  ended[0].units_done = ended[1].units_done = 10;
+  EXPECT_EQ(whole(ended).frames->current, 2u);
+}
+
+TEST(SequenceView, AddsUpAndWeighsByPixels) {
+  auto frames = with({JobState::done, JobState::running});
+  frames[0].size = {10, 30};
+  frames[0].spp_done = 16, frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 3;
+  frames[0].health.nonfinite = 2;
+  frames[1].spp_done = 8, frames[1].progress = .5, frames[1].units_done = 4, frames[1].core_seconds = 1;
+
+  const JobView v = whole(frames);
+
+  EXPECT_EQ(v.spp_done, (3 * 16 + 8) / 4.);
+  EXPECT_EQ(v.progress, (3 * 1 + .5) / 4);
+  EXPECT_EQ(v.units_done, 14u);
+  EXPECT_EQ(v.units_total, 20u);
+  EXPECT_EQ(v.core_seconds, 4);
+  EXPECT_EQ(v.health.nonfinite, 2u);
+  EXPECT_EQ(v.elapsed_seconds, 12);
+}
+
+// Two frames of one size with relMSE 2 and 4, known to 3/-1 and 4/-0: the mean is 3, and independent errors
+// of a mean of two have half the root of the sum of squares: 5/2 above, 1/2 below.
+TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
+  auto frames = with({JobState::done, JobState::done, JobState::queued});
+  frames[0].error_now = ErrorFigures{3, 2, 1, 5};
+  frames[1].error_now = ErrorFigures{4, 4, 4, 8};
+
+  const auto e = whole(frames).error_now;
+
+  ASSERT_TRUE(e);
+  EXPECT_DOUBLE_EQ(e->relmse, 3);
+  EXPECT_DOUBLE_EQ(e->relmse_hi, 5.5);
+  EXPECT_DOUBLE_EQ(e->relmse_lo, 2.5);
+  EXPECT_DOUBLE_EQ(e->rmse, std::sqrt((9 + 16) / 2.));
+  EXPECT_FALSE(whole(with({JobState::queued})).error_now);
+}
+
+TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
+  auto frames = with({JobState::done, JobState::running, JobState::queued, JobState::cancelled});
+  frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;
+  frames[1].progress = .5, frames[1].units_done = 5, frames[1].core_seconds = 20;
+  frames[1].queued_core_seconds = 7;
+
+  const JobView v = whole(frames, 4);
+
+  // 60 core seconds for 1.5 frames: 40 each. Half a frame and a whole one are left, on 4 threads.
+  EXPECT_DOUBLE_EQ(v.eta_seconds.value(), 15);
+  EXPECT_DOUBLE_EQ(v.queued_core_seconds, 47);
+  EXPECT_FALSE(whole(frames, 0).eta_seconds);
+}
+
+TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {
+  auto frames = with({JobState::queued, JobState::queued, JobState::failed});
+  frames[0].error = "no worker is connected";
+  EXPECT_EQ(whole(frames).error, "frame 1: no worker is connected");
+  frames[2].error = "unit 3 crashed";
+  EXPECT_EQ(whole(frames).error, "frame 3: unit 3 crashed");
+}
+
+}  // namespace
+}  // namespace ls::coordinator
