@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <exception>
 
 #include "common/base/log.h"
@@ -134,6 +135,18 @@ bool plausible_id(std::string_view id) {
     if (!ok) return false;
   }
   return true;
+}
+
+Result<JobId> job_of(const Request& request, const Params& params) {
+  const JobId id{params.empty() ? std::string() : params[0]};
+  if (!plausible_id(id.value)) return fail(Errc::not_found, "there is no such job");
+  const auto text = request.parameter("frame");
+  if (!text) return id;
+  std::uint32_t frame = 0;
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), frame);
+  if (error != std::errc{} || end != text->data() + text->size() || frame > kMaxFrameNumber)
+    return fail(Errc::invalid_argument, "'frame' must be the number of a frame");
+  return coordinator::frame_job(id, frame);
 }
 
 }  // namespace ls::http

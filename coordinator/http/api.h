@@ -72,4 +72,7 @@ Response guarded(std::string_view what, const std::function<Response()>& work);
 // Characters and length of an id that we could have made; anything else is no job.
 bool plausible_id(std::string_view id);
 
+// The job in a request's address; with ?frame=N that frame of the sequence. not_found: it can't be one.
+Result<JobId> job_of(const Request& request, const Params& params);
+
 }  // namespace ls::http

@@ -19,6 +19,14 @@ std::string format_event(const coordinator::StreamEvent& event) {
   return text;
 }
 
+namespace {
+bool is_frame(const std::string& job, const std::string& sequence) {
+  if (!job.starts_with(sequence)) return false;
+  const auto frame = coordinator::frame_of(JobId{job});
+  return frame && frame->sequence.value == sequence;
+}
+}  // namespace
+
 EventQueue::EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake)
     : bounds_(bounds), job_(std::move(job)), expected_(after_id + 1), wake_(std::move(wake)) {}
 
@@ -29,7 +37,7 @@ void EventQueue::push(const coordinator::StreamEvent& event) {
   if (const auto expected = std::exchange(expected_, std::nullopt); expected && event.id > *expected)
     text = fmt::format("event: reset\ndata: {{\"missed_from\":{},\"missed_to\":{}}}\n\n", *expected,
                        event.id - 1);
-  if (job_.empty() || event.job.empty() || event.job == job_) text += format_event(event);
+  if (job_.empty() || event.job.empty() || event.job == job_ || is_frame(event.job, job_)) text += format_event(event);
   if (text.empty()) return;
   const bool first = text_.empty();
   if (events_ == bounds_.events || text_.size() + text.size() > bounds_.bytes) {

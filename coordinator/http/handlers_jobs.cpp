@@ -105,7 +105,6 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
   return change;
 }
 
-Response no_such_job() { return problem(404, "there is no such job"); }
 
 Response file_response(std::string content_type, std::vector<std::byte> bytes, const std::string& name) {
   Response response;
@@ -128,70 +127,78 @@ Response post_job(Api& api, const Request& request, const Params&) {
   return submit_job(api, std::move(*submit));
 }
 
-Response get_job(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  const auto job = api.coordinator().job(JobId{params[0]});
+Response get_job(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  const auto job = api.coordinator().job(*id);
   return job ? json_response(200, coordinator::job_json(*job)) : problem(job.error());
 }
 
 Response patch_job(Api& api, const Request& request, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  const JobId id{params[0]};
-  if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
   const auto change = read_change(request.body);
   if (!change) return problem(change.error());
-  if (const auto done = api.coordinator().change(id, *change); !done) return problem(done.error());
+  if (const auto done = api.coordinator().change(*id, *change); !done) return problem(done.error());
   return get_job(api, request, params);
 }
 
-Response delete_job(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  if (const auto done = api.coordinator().remove(JobId{params[0]}); !done) return problem(done.error());
+Response delete_job(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  if (const auto done = api.coordinator().remove(*id); !done) return problem(done.error());
   Response response;
   response.status = 204;
   return response;
 }
 
-Response get_image_exr(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  auto image = api.coordinator().image_exr(JobId{params[0]});
-  return image ? file_response("image/x-exr", std::move(*image), params[0] + ".exr") : problem(image.error());
+Response get_image_exr(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto image = api.coordinator().image_exr(*id);
+  return image ? file_response("image/x-exr", std::move(*image), id->value + ".exr") : problem(image.error());
 }
 
 Response get_image_png(Api& api, const Request& request, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
   double exposure = 0;
   if (const auto text = request.parameter("exposure")) {
     const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), exposure);
     if (error != std::errc{} || end != text->data() + text->size() || !(std::abs(exposure) <= kMaxExposure))
       return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
   }
-  auto image = api.coordinator().image_png(JobId{params[0]}, exposure);
-  return image ? file_response("image/png", std::move(*image), params[0] + ".png") : problem(image.error());
+  auto image = api.coordinator().image_png(*id, exposure);
+  return image ? file_response("image/png", std::move(*image), id->value + ".png") : problem(image.error());
 }
 
-Response get_report(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  auto report = api.coordinator().report_json(JobId{params[0]});
+Response get_report(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto report = api.coordinator().report_json(*id);
   return report ? json_response(200, std::move(*report)) : problem(report.error());
 }
 
-Response get_convergence(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  const auto points = api.coordinator().convergence(JobId{params[0]});
+Response get_convergence(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  const auto points = api.coordinator().convergence(*id);
   return points ? text_response(200, "text/csv; charset=utf-8", coordinator::convergence_csv(*points))
                 : problem(points.error());
 }
 
-Response get_tiles(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  const auto tiles = api.coordinator().tiles(JobId{params[0]});
+Response get_tiles(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  const auto tiles = api.coordinator().tiles(*id);
   return tiles ? json_response(200, coordinator::tiles_json(*tiles)) : problem(tiles.error());
 }
 
-Response get_log(Api& api, const Request&, const Params& params) {
-  if (!plausible_id(params[0])) return no_such_job();
-  auto log = api.coordinator().job_log(JobId{params[0]});
+Response get_log(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto log = api.coordinator().job_log(*id);
   return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
 }
 

@@ -82,9 +82,10 @@ Response get_workers(Api& api, const Request&, const Params&) {
 Response get_events(Api&, const Request& request, const Params&) { return event_stream(request, {}); }
 
 Response get_job_events(Api& api, const Request& request, const Params& params) {
-  if (!plausible_id(params[0])) return problem(404, "there is no such job");
-  if (const auto job = api.coordinator().job(JobId{params[0]}); !job) return problem(job.error());
-  return event_stream(request, params[0]);
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
+  return event_stream(request, id->value);
 }
 
 }  // namespace ls::http
