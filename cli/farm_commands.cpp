@@ -6,9 +6,9 @@
 #include "cli/farm_api.h"
 #include "cli/farm_tables.h"
 #include "cli/farm_wait.h"
+#include "cli/fetch_results.h"
 #include "cli/job_options.h"
 #include "cli/json_fields.h"
-#include "cli/output_file.h"
 #include "cli/say.h"
 #include "common/base/plain_text.h"
 #include "common/job/limits.h"
@@ -20,7 +20,7 @@ using nlohmann::json;
 
 struct Flags {
   FarmOptions farm;
-  std::string id, spp, out, report;
+  std::string id, frame, spp, out, report;
   bool quiet = false;
 };
 using Run = int (*)(FarmApi& api, const Flags& flags);
@@ -66,27 +66,31 @@ int watch(FarmApi& api, const Flags& flags) {
 }
 
 int fetch(FarmApi& api, const Flags& flags) {
-  for (const auto& [option, file, what] :
-       {std::tuple("-o", flags.out, "/image.exr"), std::tuple("--report", flags.report, "/report")}) {
-    if (file.empty()) continue;
-    if (const auto ok = check_output(option, file); !ok) return say_error(ok.error());
-    if (const auto got = api.download(job_path(flags.id) + what, file); !got)
-      return say_rejected(got.error());
-    if (flags.farm.json) print(json{{"file", file}}.dump(-1, ' ', false, json::error_handler_t::replace));
-  }
-  return kOk;
+  return fetch_results(api, flags.id, {flags.out, flags.report, flags.farm.json, false});
+}
+
+// A frame of a sequence is a job of its own name.
+Result<void> choose_frame(Flags& flags) {
+  if (flags.frame.empty()) return {};
+  const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
+  if (!frame) return tl::unexpected(frame.error());
+  flags.id = coordinator::frame_job(JobId{flags.id}, static_cast<std::uint32_t>(*frame)).value;
+  return {};
 }
 
 CLI::App* add(CLI::App& app, Action& action, const char* name, const char* help, Run run,
               const std::shared_ptr<Flags>& flags, bool of_a_job) {
   CLI::App* command = app.add_subcommand(name, help);
   flags->farm.add_to(*command);
-  if (of_a_job)
+  if (of_a_job) {
     command->add_option("id", flags->id, "the job's id, as `submit` and `jobs` print it")
         ->required()
         ->type_name("ID");
+    command->add_option("--frame", flags->frame, "of a sequence: this frame alone")->type_name("N");
+  }
   command->callback([flags, run, &action] {
     action = [flags, run] {
+      if (const auto chosen = choose_frame(*flags); !chosen) return say_error(chosen.error());
       auto api = FarmApi::open(flags->farm);
       return api ? run(*api, *flags) : say_error(api.error());
     };
@@ -116,8 +120,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
   auto fetching = std::make_shared<Flags>();
   CLI::App* fetch_command =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
-  fetch_command->add_option("-o,--output", fetching->out, "the image")->required()->type_name("OUT.exr");
-  fetch_command->add_option("--report", fetching->report, "its report, too")->type_name("REPORT.json");
+  fetch_command->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")->required()->type_name("OUT.exr");
+  fetch_command->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")->type_name("REPORT.json");
   plain("workers", "the workers of a farm", workers, false);
 }
 

@@ -50,12 +50,38 @@ std::string table(const std::vector<Row>& rows) {
   return out;
 }
 
+constexpr std::size_t kMostFrames = 100;  // listed; of more only those that something is to be said of
+
+const json* frames_of(const json& job) {
+  const auto frames = job.find("frames");
+  return frames != job.end() && frames->is_object() ? &*frames : nullptr;
+}
+
+std::string frames_done(const json& frames) {
+  std::string out = fmt::format("{} of {} done", int_field(frames, "done", 0), int_field(frames, "total", 0));
+  for (const char* state : {"failed", "cancelled"})
+    if (const int n = int_field(frames, state, 0); n > 0) out += fmt::format(", {} {}", n, state);
+  return out;
+}
+
 std::vector<json> objects(const json& answer, const char* key) {
   std::vector<json> all;
   if (const auto list = answer.find(key); list != answer.end() && list->is_array())
     std::copy_if(list->begin(), list->end(), std::back_inserter(all),
                  [](const json& j) { return j.is_object(); });
   return all;
+}
+
+std::string frames_table(const json& frames) {
+  const std::vector<json> all = objects(frames, "list");
+  std::vector<Row> rows{{"FRAME", "STATE", "DONE", "SPP", "RELMSE", "ERROR"}};
+  for (const json& f : all) {
+    const std::string state = text(f, "state");
+    if (all.size() > kMostFrames && (state == "done" || state == "queued")) continue;
+    rows.push_back({number(f, "frame", "{:.0f}"), state, percent(f, "progress"), number(f, "spp_done", "{:.4g}"),
+                    number(f, "relmse", "{:.3g}"), text(f, "error")});
+  }
+  return rows.size() == 1 ? "" : "\n" + table(rows);
 }
 
 }  // namespace
@@ -65,7 +91,9 @@ std::string jobs_table(const json& answer) {
   for (const json& job : objects(answer, "jobs"))
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
-                    time_of(job, "eta_seconds"), text(job, "name")});
+                    time_of(job, "eta_seconds"),
+                    text(job, "name") +
+                        (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
   return rows.size() == 1 ? "no jobs" : table(rows);
 }
 
@@ -86,6 +114,8 @@ std::string job_text(const json& job) {
   if (const std::string stopped = text(job, "stopped"); !stopped.empty())
     rows.push_back({"stopped by", stopped});
   rows.push_back({"done", percent(job, "progress")});
+  if (const json* frames = frames_of(job))
+    rows.push_back({"frames", fmt::format("{}: {}", text(*frames, "range"), frames_done(*frames))});
   rows.push_back(
       {"samples per pixel", number(job, "spp_done", "{:.6g}") + " of " + number(job, "spp", "{:.0f}")});
   rows.push_back({"RMSE", number(job, "rmse", "{:.4g}")});
@@ -100,7 +130,8 @@ std::string job_text(const json& job) {
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)
       if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});
-  return table(rows);
+  const json* frames = frames_of(job);
+  return frames ? table(rows) + frames_table(*frames) : table(rows);
 }
 
 }  // namespace ls::cli

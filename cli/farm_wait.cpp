@@ -26,6 +26,11 @@ ProgressFigures figures_of(const json& job) {
   const double elapsed = number_field(job, "elapsed_seconds").value_or(0);
   if (const auto size = pair_field(job, "size"); elapsed > 0 && size)
     f.samples_per_second = f.spp_done * size->first * size->second / elapsed;
+  if (const auto frames = job.find("frames"); frames != job.end() && frames->is_object()) {
+    const int total = int_field(*frames, "total", 0);
+    f.samples_per_second *= total;  // spp_done is the mean over all frames
+    f.frames = fmt::format("{} of {} frames", int_field(*frames, "done", 0), total);
+  }
   return f;
 }
 

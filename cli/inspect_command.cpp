@@ -15,7 +15,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct Flags {
-  std::string scene;
+  std::string scene, frame;
   std::vector<std::string> defines;
   bool json = false, strict = false;
 };
@@ -71,7 +71,13 @@ int run(const Flags& flags) {
   auto defines = parse_defines(flags.defines);
   if (!defines) return say_error(defines.error());
   spec.defines = std::move(*defines);
-  const auto scene = read_local_scene(flags.scene, spec.defines, flags.strict);
+  std::optional<std::uint32_t> frame;
+  if (!flags.frame.empty()) {
+    const auto number = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
+    if (!number) return say_error(number.error());
+    frame = static_cast<std::uint32_t>(*number);
+  }
+  const auto scene = read_local_scene(flags.scene, spec.defines, flags.strict, frame);
   if (!scene) return say_rejected(scene.error());
   const auto built = build_local_world(*scene, spec, worker::usable_cpus());
   if (!built) return say_rejected(built.error());
@@ -95,6 +101,7 @@ void add_inspect(CLI::App& app, Action& action) {
   inspect->add_option("-D,--define", flags->defines, "sets the scene's $name")
       ->allow_extra_args(false)
       ->type_name("name=value");
+  inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   inspect->add_flag("--strict", flags->strict, "warnings are errors");
   inspect->add_flag("--json", flags->json, "as JSON");
   inspect->callback([flags, &action] { action = [flags] { return run(*flags); }; });

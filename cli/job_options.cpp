@@ -103,6 +103,10 @@ void JobOptions::add_to(CLI::App& app) {
   app.add_option("--time", time, "stop after this many seconds, counted from the first ray")
       ->type_name("SECONDS");
   app.add_option("--seed", seed, "default 0")->type_name("N");
+  app.add_option("--frames", frames,
+                 "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
+                 "$frame is it, too")
+      ->type_name("A-B");
   app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
   app.add_option("--integrator", integrator, "volpath, volpath_distant_mis or path instead of the scene's")
       ->type_name("NAME");
@@ -137,6 +141,13 @@ Result<JobSpec> JobOptions::parse() const {
   auto values = parse_defines(defines);
   if (!values) return tl::unexpected(values.error());
   spec.defines = std::move(*values);
+  if (!frames.empty()) {
+    const auto range = parse_frames(frames);
+    if (!range) return fail(Errc::invalid_argument, "--" + range.error().message);
+    spec.frames = *range;
+    if (spec.defines.contains("frame"))
+      return wrong("-D frame: with --frames the scene's $frame is the number of the frame");
+  }
   if (!aov.empty())
     return wrong(
         fmt::format("--aov {}: there is no such output in this version; an image has its colour, stderr.R, "

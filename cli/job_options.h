@@ -14,7 +14,7 @@ namespace ls::cli {
 
 // Numbers are kept as text until parse(), so that the messages are ours.
 struct JobOptions {
-  std::string spp, target_error, time, seed, size, integrator, priority;
+  std::string spp, target_error, time, seed, size, integrator, priority, frames;
   std::vector<std::string> aov, defines, tags;
   bool float_output = false;
   bool strict = false;

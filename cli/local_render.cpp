@@ -103,6 +103,7 @@ class LocalRender {
     auto submitted = farm_->submit(scene_, options_.spec);
     if (!submitted) return say_rejected(submitted.error());
     job_ = std::move(*submitted);
+    if (scene_.frame) job_ = coordinator::frame_job(job_, *scene_.frame);
     const auto view = farm_->coordinator().job(job_);
     if (!view) return say_error(view.error());
     for (const std::string& warning : view->warnings)

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "common/job/frame_diagnostics.h"
 #include "common/scene/folder_assets.h"
 #include "common/scene/limits.h"
 
@@ -38,8 +39,9 @@ class RecordedFolder final : public AssetSource {
     texts_ += *text;
     return text;
   }
-  std::map<std::string, LocalFile> take_files() { return std::move(files_); }
-  const std::string& included_texts() const { return texts_; }
+  // Of what was asked for since the last time.
+  std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
+  std::string take_included_texts() { return std::exchange(texts_, {}); }
 
  private:
   FolderAssets folder_;
@@ -99,19 +101,79 @@ tl::expected<std::string, coordinator::Rejected> read_text(const std::string& pa
 
 }  // namespace
 
+struct SceneReader::Impl {
+  std::string path, text;
+  std::map<std::string, std::string> defines;
+  bool strict;
+  RecordedFolder folder;
+};
+
+SceneReader::SceneReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SceneReader::SceneReader(SceneReader&&) noexcept = default;
+SceneReader::~SceneReader() = default;
+
+tl::expected<SceneReader, coordinator::Rejected> SceneReader::open(const std::string& path,
+                                                                   std::map<std::string, std::string> defines,
+                                                                   bool strict) {
+  auto text = read_text(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  return SceneReader(std::unique_ptr<Impl>(new Impl{path, std::move(*text), std::move(defines), strict,
+                                                    RecordedFolder(fs::path(path).parent_path())}));
+}
+
+tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<std::uint32_t> frame) {
+  Impl& in = *impl_;
+  ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame});
+  const std::string included = in.folder.take_included_texts();
+  auto files = in.folder.take_files();
+  if (!read.scene)
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
+  if (auto unused = unused_define(in.defines, in.text + included))
+    return refused(in.path, std::move(*unused));
+  return LocalScene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
+                    std::move(files), frame};
+}
+
+tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const FrameRange& frames) {
+  std::optional<LocalScene> first;
+  FrameDiagnostics wrong, warned;
+  for (const std::uint32_t frame : frames.frames()) {
+    auto scene = read(frame);
+    if (!scene && scene.error().diagnostics.empty()) return scene;
+    wrong.add(frame, scene ? std::vector<Diagnostic>{} : scene.error().diagnostics);
+    if (wrong.full()) break;
+    if (!scene) continue;
+    warned.add(frame, scene->warnings);
+    if (first)
+      first->files.merge(scene->files);
+    else
+      first = std::move(*scene);
+  }
+  if (!wrong.empty())
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", impl_->path)}, wrong.take()});
+  first->warnings = warned.take();
+  return std::move(*first);
+}
+
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
-    const std::string& path, const std::map<std::string, std::string>& defines, bool strict) {
+    const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
+    std::optional<std::uint32_t> frame) {
+  auto reader = SceneReader::open(path, defines, strict);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  return reader->read(frame);
+}
+
+tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict) {
   auto text = read_text(path);
   if (!text) return tl::unexpected(std::move(text.error()));
   RecordedFolder folder(fs::path(path).parent_path());
-  ReadResult read = read_scene(path, *text, folder, {defines, strict});
-  if (!read.scene)
+  NoriTestResult read = read_nori_test(path, *text, folder, {{}, strict, {}});
+  if (!read.test)
     return tl::unexpected(coordinator::Rejected{
         {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
-  if (auto unused = unused_define(defines, *text + folder.included_texts()))
-    return refused(path, std::move(*unused));
-  return LocalScene{path, std::move(*text), std::move(*read.scene), std::move(read.diagnostics),
-                    folder.take_files()};
+  return LocalTest{std::move(*read.test), std::move(read.diagnostics), folder.take_files()};
 }
 
 coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec) {

@@ -1,11 +1,15 @@
 // A scene on this machine's disk: read, checked, with every file that it names.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/scene/nori_test.h"
 #include "common/scene/read.h"
 #include "coordinator/service.h"
 
@@ -23,11 +27,41 @@ struct LocalScene {
   Scene scene;
   std::vector<Diagnostic> warnings;
   std::map<std::string, LocalFile> files;  // by the name in the scene: assets and included scene files
+  std::optional<std::uint32_t> frame;      // that it was read as
 };
 
-// File names are relative to the scene's folder. `strict`: warnings are errors.
+// File names are relative to the scene's folder. `strict`: warnings are errors. `frame`: of a sequence.
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
-    const std::string& path, const std::map<std::string, std::string>& defines, bool strict);
+    const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
+    std::optional<std::uint32_t> frame = {});
+
+// A scene that is read once per frame; its files are looked at once.
+class SceneReader {
+ public:
+  static tl::expected<SceneReader, coordinator::Rejected> open(const std::string& path,
+                                                               std::map<std::string, std::string> defines,
+                                                               bool strict);
+  SceneReader(SceneReader&&) noexcept;
+  ~SceneReader();
+
+  tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame);
+  // All frames, or what is wrong with them: every file that is missing, up to 20. The scene is the first
+  // frame's, the files are those of all frames, warnings are told once.
+  tl::expected<LocalScene, coordinator::Rejected> read_all(const FrameRange& frames);
+
+ private:
+  struct Impl;
+  explicit SceneReader(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// A file of tests, with every file that its scenes name.
+struct LocalTest {
+  NoriTest test;
+  std::vector<Diagnostic> warnings;
+  std::map<std::string, LocalFile> files;
+};
+tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict);
 
 coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec);
 

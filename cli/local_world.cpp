@@ -14,7 +14,7 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
       return tl::unexpected(coordinator::Rejected{adopted.error(), {}});
     files.emplace(file.digest, file.path);
   }
-  auto intake = coordinator::take_in(submit_request(scene, spec), blobs);
+  auto intake = coordinator::take_in(submit_request(scene, spec), blobs, scene.frame);
   if (!intake) return tl::unexpected(std::move(intake.error()));
   const auto limit = render::limit_threads(threads);
   auto world = render::build_world(scene.scene, intake->job.settings, files, threads);

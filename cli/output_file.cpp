@@ -41,6 +41,15 @@ Result<void> check_folder(const std::string& option, const fs::path& folder) {
   return {};
 }
 
+Result<void> check_numbered(const std::string& option, const std::string& name, const FrameRange& frames) {
+  if (has_frame_number(name) || frames.count() == 1) return {};
+  const fs::path path(name);
+  const fs::path better = path.parent_path() / (path.stem().string() + "_####" + path.extension().string());
+  return fail(Errc::invalid_argument,
+              fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number",
+                          option, name, frames.count(), better.string()));
+}
+
 Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);

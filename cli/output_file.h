@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/error.h"
+#include "common/base/frame_range.h"
 
 namespace ls::cli {
 
@@ -13,6 +14,8 @@ namespace ls::cli {
 // the file itself is not touched.
 Result<void> check_output(const std::string& option, const std::filesystem::path& file);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
+// The name of one frame's file. invalid_argument: several frames, and no # in the name to tell them apart.
+Result<void> check_numbered(const std::string& option, const std::string& name, const FrameRange& frames);
 Result<void> write_output(const std::filesystem::path& file, std::span<const std::byte> bytes);
 Result<void> write_output(const std::filesystem::path& file, const std::string& text);
 // Writes what must not be lost: if it cannot be written there, into the folder for temporary files. It is an

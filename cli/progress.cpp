@@ -40,6 +40,7 @@ std::string progress_line(const ProgressFigures& f, int columns) {
     line += fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' '));
   }
   if (f.state != "running") line += " " + plain_text(f.state);
+  if (!f.frames.empty()) line += " " + plain_text(f.frames);
   line += fmt::format(" {:.1f} spp", f.spp_done);
   if (f.samples_per_second > 0) line += "  " + show_rate(f.samples_per_second);
   if (f.relmse) line += fmt::format("  relMSE {:.3g}", *f.relmse);

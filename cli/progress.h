@@ -14,7 +14,8 @@ struct ProgressFigures {
   double samples_per_second = 0;
   std::optional<double> relmse;
   std::optional<double> eta_seconds;
-  std::string trouble;  // why it waits
+  std::string trouble;      // why it waits
+  std::string frames = {};  // of a sequence: "3 of 10 frames"
 };
 // " 42 % [########          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123  0:42 left"
 std::string progress_line(const ProgressFigures& figures, int columns);

@@ -8,6 +8,7 @@
 #include "cli/output_file.h"
 #include "cli/replay.h"
 #include "cli/say.h"
+#include "cli/sequence_render.h"
 #include "common/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/machine.h"
@@ -40,7 +41,8 @@ Result<LocalRenderOptions> options_of(const Flags& flags) {
   options.isolate = flags.isolate;
   options.quiet = flags.quiet;
   options.strict = flags.job.strict;
-  options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ".exr" : flags.out;
+  const char* ending = options.spec.frames ? "_####.exr" : ".exr";
+  options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ending : flags.out;
   options.report = path_of(flags.report);
   options.partial_dir = path_of(flags.partial_dir);
   options.reference = path_of(flags.reference);
@@ -61,12 +63,17 @@ int run(const Flags& flags) {
   const auto options = options_of(flags);
   if (!options) return say_error(options.error());
   const bool one_sample = !flags.pixel.empty() || !flags.sample.empty();
+  const auto& frames = options->spec.frames;
+  if (frames && !one_sample) return render_sequence(flags.scene, *frames, *options);
+  if (frames && frames->count() > 1)
+    return usage_error("--pixel and --sample are of one frame: name it, --frames 7 say");
   if (!one_sample) {
     if (const auto ok = check_output("-o", options->out); !ok) return say_error(ok.error());
     if (options->report)
       if (const auto ok = check_output("--report", *options->report); !ok) return say_error(ok.error());
   }
-  const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict);
+  const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict,
+                                      frames ? std::optional(frames->first) : std::nullopt);
   if (!scene) return say_rejected(scene.error());
   return one_sample ? replay(flags, *scene, *options) : render_locally(*scene, *options);
 }
@@ -79,7 +86,8 @@ void add_render(CLI::App& app, Action& action) {
   render->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
   render
       ->add_option("-o,--output", flags->out,
-                   "the image; default: the scene's name, with .exr, in this folder")
+                   "the image; default: the scene's name, with .exr, in this folder. Of a sequence: with # "
+                   "for the frame's number, out_####.exr say")
       ->type_name("OUT.exr");
   flags->job.add_to(*render);
   render->add_option("--threads", flags->threads, "default: all")->type_name("N");

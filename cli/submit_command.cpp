@@ -6,10 +6,10 @@
 #include "cli/commands.h"
 #include "cli/farm_api.h"
 #include "cli/farm_wait.h"
+#include "cli/fetch_results.h"
 #include "cli/job_options.h"
 #include "cli/json_fields.h"
 #include "cli/output_file.h"
-#include "cli/patience.h"
 #include "cli/say.h"
 #include "common/base/plain_text.h"
 
@@ -23,23 +23,13 @@ struct Flags {
   bool wait = false, quiet = false;
 };
 
-int fetch_results(FarmApi& api, const std::string& id, const Flags& flags) {
-  if (!flags.out.empty())
-    if (const auto got = patiently([&] { return api.download(job_path(id) + "/image.exr", flags.out); });
-        !got)
-      return say_rejected(got.error());
-  if (!flags.report.empty())
-    if (const auto got = patiently([&] { return api.download(job_path(id) + "/report", flags.report); });
-        !got)
-      return say_rejected(got.error());
-  return kOk;
-}
-
 using Job = FarmApi::Answer<FarmApi::Json>;
 
 // Here first: what is wrong with the scene is told before anything is sent.
 Job submit_scene(const Flags& flags, const JobSpec& spec) {
-  const auto scene = read_local_scene(flags.scene, spec.defines, flags.job.strict);
+  auto reader = SceneReader::open(flags.scene, spec.defines, flags.job.strict);
+  if (!reader) return tl::unexpected(reader.error());
+  const auto scene = spec.frames ? reader->read_all(*spec.frames) : reader->read({});
   if (!scene) return tl::unexpected(scene.error());
   say_diagnostics(scene->warnings);
   auto api = FarmApi::open(flags.farm);
@@ -73,7 +63,7 @@ int wait_and_fetch(const std::string& id, const Flags& flags) {
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return say_rejected(end.error());
   if (const int code = say_end(*end); code != kOk) return code;
-  return fetch_results(*api, id, flags);
+  return fetch_results(*api, id, {flags.out, flags.report, false, true});
 }
 
 int run(const Flags& flags) {
@@ -81,7 +71,7 @@ int run(const Flags& flags) {
   if (!spec) return say_error(spec.error());
   for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report)})
     if (!file.empty())
-      if (const auto ok = check_output(option, file); !ok) return say_error(ok.error());
+      if (const auto ok = check_outputs(option, file, spec->frames); !ok) return say_error(ok.error());
   const auto type = bundle_type(flags.scene);
   const Job job = type ? submit_bundle(flags, *spec, *type) : submit_scene(flags, *spec);
   if (!job) return say_rejected(job.error());
@@ -111,8 +101,8 @@ void add_submit(CLI::App& app, Action& action) {
       ->allow_extra_args(false)
       ->type_name("A,B");
   submit->add_flag("--wait", flags->wait, "until the job is done");
-  submit->add_option("-o,--output", flags->out, "wait, then fetch the image")->type_name("OUT.exr");
-  submit->add_option("--report", flags->report, "wait, then fetch the report")->type_name("REPORT.json");
+  submit->add_option("-o,--output", flags->out, "wait, then fetch the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
+  submit->add_option("--report", flags->report, "wait, then fetch the report; with # in its name, every frame's")->type_name("REPORT.json");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
   submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
