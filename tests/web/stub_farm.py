@@ -49,6 +49,7 @@ class StubFarm:
         self.tiles = []
         self.report = {"convergence": []}
         self.image = png(64, 48, (200, 120, 40))
+        self.images = {}  # by job, before `image`
         self.blobs = {}
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
@@ -177,7 +178,7 @@ def _handler(farm):
             if what == "report":
                 return self._send(200, farm.report)
             if what == "image.png":
-                return self._send(200, farm.image, "image/png")
+                return self._send(200, farm.images.get(parts[0], farm.image), "image/png")
             return self._problem(404, "nothing here")
 
         def _patch_jobs(self, parts, body):

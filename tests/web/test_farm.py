@@ -148,3 +148,26 @@ def test_names_from_outside_are_shown_as_text(real_farm, page):
     page.wait(f"document.querySelector('.tag')?.innerText === {json.dumps(markup)}", timeout=30)
 
     assert page.count("main img") == 0 and "stolen" not in page.evaluate("document.title")
+
+
+def test_a_sequence_shows_its_frames_and_each_ones_image(real_farm, page):
+    job = real_farm.submit(SCENE, spp=16, frames="5-8", name="turn.xml")
+    page.wait("document.querySelector('[data-job]')?.innerText.includes('0 of 4 frames')", timeout=30)
+    page.evaluate(f"void (location.hash = '#/jobs/{job}')")
+    page.wait("document.querySelectorAll('.frame').length === 4", timeout=30)
+    assert page.text(".frame[aria-current]") == "5"
+
+    real_farm.add_workers(2, *SLOW)
+
+    page.wait("document.querySelector('live-image')?.dataset.painted", timeout=60)
+    page.wait("document.querySelectorAll('.frame.is-done').length === 4", timeout=120)
+    page.wait("document.querySelector('.job .pill').innerText === 'done'", timeout=30)
+    page.click("[data-frame='6']")
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '6'")
+    page.wait("""(() => {
+      const canvas = document.querySelector('live-image canvas');
+      const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+      return canvas.width === 96 && new Set(data).size > 16;
+    })()""")
+    page.wait("document.querySelectorAll('.plot-point').length >= 3", timeout=60)
+    assert "16 of 16" in page.text(".figures")

@@ -9,6 +9,7 @@ FACTS = {
     "jobs-confirm": ["Really cancel", "Keep"],
     "jobs-lost": ["connection lost", "The coordinator does not answer."],
     "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.001", "clean", "tile 104", "lab-03", "EXR"],
+    "job-sequence": ["smoke.xml", "Frame 5", "4 of 10 done, 1 failed", "following what is rendered", "smoke.0009.vdb has no grid", "0.00390 – 0.00448"],
     "job-queued": ["Waiting for a worker", "The first point appears"],
     "job-done": ["Done after 7 min: the target error is reached."],
     "job-failed": ["The job failed", "SIGSEGV on 3 workers", "lightshaft render forge-v12.xml --pixel 412,96 --sample 11"],

@@ -31,6 +31,19 @@ export const unhealthy = job("j-7f3a91c2", "steam-bath.xml", "running", {
   warnings: ["steam-bath.xml:31:9: warning: 'strict_normals' means nothing here and is ignored", "steam-bath.xml:52:5: warning: 37 voxels of \"steam\" were negative and became 0"],
 });
 
+// A sequence, and the one of its frames that is shown.
+const kSequence = "j-3d90be12";
+const frameState = (frame) => (frame < 5 ? "done" : frame === 5 ? "running" : frame === 9 ? "failed" : "queued");
+const frameList = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10].map((frame) => ({
+  frame, id: `${kSequence}-frame${frame}`, state: frameState(frame), progress: frame < 5 ? 1 : frame === 5 ? 0.43 : 0,
+  spp_done: frame < 5 ? 512 : 0, relmse: null, error: frame === 9 ? "smoke.0009.vdb has no grid \"density\"" : null,
+}));
+export const sequence = job(kSequence, "smoke.xml", "running", {
+  ...half, progress: 0.44, eta_seconds: 2040, submitted_unix: kNow - 1900, error: "frame 9: smoke.0009.vdb has no grid \"density\"",
+  frames: { range: "1-10", total: 10, done: 4, running: 1, failed: 1, cancelled: 0, current: 5, list: frameList },
+});
+export const frame = job(`${kSequence}-frame5`, "smoke.xml", "running", { ...half, sequence: kSequence, frame: 5 });
+
 const tileRect = (tile) => {
   const [x, y] = [(tile % 20) * 32, Math.floor(tile / 20) * 32];
   return [x, y, x + 32, Math.min(y + 32, 360)];

@@ -26,7 +26,7 @@ function show(state) {
 
 const images = new Map();
 function imageOf(state) {
-  const job = state.jobs?.get(state.route.id);
+  const job = state.jobs?.get(state.open?.shown ?? state.route.id);
   if (!job) return null;
   if (!images.has(job.id)) {
     images.set(job.id, async (exposure) => {

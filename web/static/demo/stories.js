@@ -2,11 +2,11 @@
 import * as data from "./data.js";
 import { initialState, openJob, withEvent, withJobs, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
 
-const signedIn = (route = { view: "jobs", id: null }) => ({ ...initialState(), session: "in", link: "live", route });
+const signedIn = (route = { view: "jobs", id: null, frame: null }) => ({ ...initialState(), session: "in", link: "live", route });
 const farm = (route) => withWorkers(withJobs(signedIn(route), data.jobs), data.workers);
 
 function jobPage(id, more = {}, jobs = data.jobs) {
-  const state = withWorkers(withJobs(signedIn({ view: "job", id }), jobs), data.workers);
+  const state = withWorkers(withJobs(signedIn({ view: "job", id, frame: null }), jobs), data.workers);
   return withOpen({ ...state, open: openJob(id) }, { report: data.report, ...more });
 }
 
@@ -39,6 +39,7 @@ export const stories = {
   "jobs-confirm": () => withUi(farm(), { confirming: "j-7f3a91c2" }),
   "jobs-lost": () => withUi({ ...farm(), link: "lost" }, { notice: "The coordinator does not answer. Is it still running, and is this machine on its network?" }),
   job: rendering,
+  "job-sequence": () => jobPage(data.sequence.id, { shown: data.frame.id }, [data.sequence, data.frame]),
   "job-queued": () => jobPage("j-5be0d7aa", { report: null }),
   "job-done": () => jobPage("j-91d2c3f4"),
   "job-failed": () => jobPage("j-c6e8b510", { report: null }),

@@ -106,9 +106,27 @@ class Survey {
     for (const name of this.#strings) if (name) this.#resolve(name, []);
   }
 
+  /** A name with # stands for one file per frame: all that fit are taken along; the coordinator says which frames lack one. */
+  #resolveNumbered(name, first) {
+    const places = [...first, ...this.#paths.map((path) => joined(path, name)), joined("", name)];
+    let any = null;
+    for (const place of places) {
+      for (const entry of this.#files) {
+        const path = relative(entry.path, this.#main);
+        if (fits(place, path)) this.found.set((any ??= path, path), entry);
+      }
+      if (any !== null) return any;
+    }
+    const alike = this.#files.filter(({ path }) => fits(baseOf(name), baseOf(path)));
+    for (const entry of alike) this.found.set(joined(`${places.at(-1)}/..`, baseOf(entry.path)), entry);
+    if (alike.length === 0) this.missing.add(name);
+    return null;
+  }
+
   #resolve(name, first) {
     const places = [...first, ...this.#paths.map((path) => joined(path, name)), joined("", name)];
     const exact = places.map((place) => [place, this.#files.find(({ path }) => relative(path, this.#main) === place)]).find(([, entry]) => entry);
+    if (!exact && name.includes("#")) return this.#resolveNumbered(name, first);
     const [place, entry] = exact ?? [places.at(-1), only(this.#files, name)];
     if (!entry) {
       this.missing.add(name);
@@ -117,6 +135,12 @@ class Survey {
     this.found.set(place, entry);
     return place;
   }
+}
+
+/** "fog.0007.vdb" fits "fog.####.vdb": a number of at least as many digits as there are #. */
+export function fits(pattern, path) {
+  const source = pattern.split(/(#+)/).map((part) => (part.startsWith("#") ? `\\d{${part.length},}` : part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")));
+  return new RegExp(`^${source.join("")}$`).test(path);
 }
 
 /** The one file of this base name. */

@@ -14,7 +14,7 @@ export function makeJobActions({ get, set, attempt, api }) {
     setState: change,
     cancel: (id) => change(id, "cancelled"),
     confirm: (id) => set(withUi(get(), { confirming: id })),
-    image: (exposure, signal) => api.image(get().open.id, exposure, signal),
+    image: (exposure, signal) => api.image(get().open.shown, exposure, signal),
     onExposure: (event) => set(withOpen(get(), { exposure: Number(event.currentTarget.value) })),
     resetExposure: () => set(withOpen(get(), { exposure: 0 })),
     toggleTiles: () => set(withOpen(get(), { showTiles: !get().open.showTiles })),

@@ -7,7 +7,7 @@ import { routeOf, takeToken } from "./route.js";
 import { makeJobActions } from "./job_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
 import { jobName } from "./format.js";
-import { initialState, openJob, withEvent, withJob, withJobs, withOpen, withTiles, withUi, withWorkers } from "./state.js";
+import { initialState, openJob, shownOf, withEvent, withJob, withJobs, withOpen, withTiles, withUi, withWorkers } from "./state.js";
 import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
@@ -124,33 +124,59 @@ function onLost(closed) {
 function onEvent(type, data) {
   for (const events of recordings) events.push([type, data]);
   set(withEvent(state, type, data));
-  if (type === "job" && data.id === state.open?.id && !reportTimer) {
+  if (type === "job" && data.id === state.open?.id) showFrame();
+  if (type === "job" && data.id === state.open?.shown && !reportTimer) {
     reportTimer = setTimeout(refreshReport, kReportPauseMs);
   }
 }
 
 async function refreshReport() {
   reportTimer = 0;
-  const id = state.open?.id;
-  if (!id) return;
+  const id = state.open?.shown;
+  if (!id || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
   const report = await api.report(id).catch(() => null); // none before the first checkpoint
-  if (report && state.open?.id === id) set(withOpen(state, { report }));
+  if (report && state.open?.shown === id) set(withOpen(state, { report }));
 }
 
 async function refreshOpen() {
   const id = state.open?.id;
   if (!id) return;
   try {
-    await snapshot(() => Promise.all([api.job(id), api.tiles(id)]), (now, [job, tiles]) => {
-      if (now.open?.id !== id) return now;
-      const next = withTiles(withJob(now, job), tiles);
-      return withOpen(next, { folds: next.open.folds + 1, problem: null });
-    });
-    await refreshReport();
+    await snapshot(() => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
+    if (state.open?.id !== id) return;
+    set(withOpen(state, { problem: null }));
+    if (!showFrame()) await refreshShown();
   } catch (error) {
-    if (error.status === 401) signedOut();
-    else set(withOpen(state, { problem: error.message }));
+    openFailed(error);
   }
+}
+
+function openFailed(error) {
+  if (error.status === 401) signedOut();
+  else set(withOpen(state, { problem: error.message }));
+}
+
+/** The image, tiles and figures of the frame that the page is to show. True if that is another one than before. */
+function showFrame() {
+  const { open, route } = state;
+  const shown = open && shownOf(state, open.id, route.frame);
+  if (!open || open.shown === shown) return false;
+  const { exposure, showTiles } = open;
+  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles } });
+  refreshShown().catch(openFailed);
+  return true;
+}
+
+async function refreshShown() {
+  const { id, shown } = state.open;
+  const job = state.jobs?.get(shown);
+  const fetch = () => Promise.all([job && shown === id ? job : api.job(shown), api.tiles(shown)]);
+  await snapshot(fetch, (now, [fresh, tiles]) => {
+    if (now.open?.shown !== shown) return now;
+    const next = withTiles(withJob(now, fresh), tiles);
+    return withOpen(next, { folds: next.open.folds + 1, problem: null });
+  });
+  await refreshReport();
 }
 
 // ---- routes ----
@@ -158,11 +184,13 @@ async function refreshOpen() {
 function showRoute() {
   const route = routeOf(window.location.hash);
   const moved = route.view !== state.route.view || route.id !== state.route.id;
+  const turned = !moved && route.frame !== state.route.frame;
   const open = route.view !== "job" ? null : state.open?.id === route.id ? state.open : openJob(route.id);
   const fresh = open && open !== state.open;
   set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null } : {}));
   if (moved) window.scrollTo(0, 0);
   if (fresh && state.session === "in") refreshOpen();
+  else if (turned) showFrame();
 }
 window.addEventListener("hashchange", () => {
   const token = takeToken(window.location, window.history);

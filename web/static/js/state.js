@@ -7,8 +7,8 @@ export function initialState() {
   return {
     session: "unknown", // "in", "out"
     link: "connecting", // "live", "lost"
-    route: { view: "jobs", id: null },
-    jobs: null, // Map id -> job JSON; null: not known yet
+    route: { view: "jobs", id: null, frame: null },
+    jobs: null, // Map id -> job JSON, of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // what belongs to the one job that is shown, see openJob()
@@ -25,11 +25,12 @@ export const emptySubmission = () => ({
   progress: 0,
   step: "",
   error: null, // {message, diagnostics}
-  settings: { spp: "", target_error: "", time: "", width: "", height: "" },
+  settings: { spp: "", target_error: "", time: "", width: "", height: "", frames: "" },
 });
 
-export const openJob = (id) => ({
+export const openJob = (id, shown = id) => ({
   id,
+  shown, // the job whose image and figures are on the page: itself, or of a sequence one of its frames
   report: null,
   tiles: new Map(), // tile -> {rect, spp, workers} of the tiles in flight
   flashes: [], // {key, rect, worker} of tiles folded lately
@@ -44,9 +45,15 @@ export const withUi = (state, ui) => ({ ...state, ui: { ...state.ui, ...ui } });
 export const withOpen = (state, open) => (state.open ? { ...state, open: { ...state.open, ...open } } : state);
 export const withSubmit = (state, submit) => ({ ...state, submit: { ...state.submit, ...submit } });
 
+/** A list has no frames, nor which frames a sequence has: what the open page knows of them stays. */
 export function withJobs(state, jobs) {
-  return { ...state, jobs: new Map(jobs.map((job) => [job.id, job])) };
+  const next = new Map(jobs.map((job) => [job.id, withList(job, state.jobs?.get(job.id))]));
+  const shown = state.open && state.jobs?.get(state.open.shown);
+  if (shown && next.has(state.open.id)) next.set(shown.id, next.get(shown.id) ?? shown);
+  return { ...state, jobs: next };
 }
+
+const withList = (job, before) => (job.frames && !job.frames.list && before?.frames?.list ? { ...job, frames: { ...job.frames, list: before.frames.list } } : job);
 
 export function withWorkers(state, workers) {
   const names = workers.map((worker) => worker.name).sort();
@@ -72,16 +79,30 @@ function coloured(colours, names) {
 export function withEvent(state, type, data) {
   if (type === "job") return withJob(state, data);
   if (type === "worker") return withWorker(state, data);
-  if (type === "tile" && state.open?.id === data.job) return withTile(state, data);
+  if (type === "tile" && state.open?.shown === data.job) return withTile(state, data);
   return state;
 }
 
 export function withJob(state, job) {
   const jobs = new Map(state.jobs ?? []);
-  jobs.set(job.id, job);
+  const sequence = job.sequence ? jobs.get(job.sequence) : null;
+  if (sequence?.frames?.list) {
+    const list = sequence.frames.list.map((frame) => (frame.id === job.id ? { ...frame, ...sharedFigures(job) } : frame));
+    jobs.set(sequence.id, { ...sequence, frames: { ...sequence.frames, list } });
+  }
+  if (!job.sequence || state.open?.shown === job.id) jobs.set(job.id, withList(job, jobs.get(job.id)));
   const next = { ...state, jobs };
-  const over = state.open?.id === job.id && isOver(job);
+  const over = state.open?.shown === job.id && isOver(job);
   return over ? withOpen(next, { tiles: new Map(), folds: state.open.folds + 1 }) : next;
+}
+
+const sharedFigures = ({ state, progress, spp_done, relmse, error }) => ({ state, progress, spp_done, relmse, error });
+
+/** The id of the job that the page of `id` shows: of a sequence the frame that was chosen, or that is being rendered. */
+export function shownOf(state, id, frame) {
+  const frames = state.jobs?.get(id)?.frames;
+  const wanted = frame ?? frames?.current;
+  return frames?.list?.find((one) => one.frame === wanted)?.id ?? id;
 }
 
 function withWorker(state, worker) {
@@ -117,7 +138,7 @@ export const colourOf = (state, worker) => state.colours.get(worker) ?? 0;
 /** Running first, then waiting, then what is over; the newest first within each. */
 export function jobsInOrder(state) {
   const rank = { running: 0, paused: 1, queued: 2 };
-  return [...(state.jobs?.values() ?? [])].sort(
+  return [...(state.jobs?.values() ?? [])].filter((job) => !job.sequence).sort(
     (a, b) => (rank[a.state] ?? 3) - (rank[b.state] ?? 3) || b.submitted_unix - a.submitted_unix || (a.id < b.id ? -1 : 1));
 }
 

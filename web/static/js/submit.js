@@ -2,14 +2,20 @@
 import { sha256 } from "./sha256.js";
 
 /** The `spec` of the contract from the form's texts; empty fields are left to the scene. Throws with a message for people. */
-export function specOf({ spp, target_error, time, width, height }) {
+export function specOf({ spp, target_error, time, width, height, frames = "" }) {
   const spec = {};
   if (spp) spec.spp = positive(spp, "Samples per pixel", true);
   if (target_error) spec.target_error = positive(target_error, "Target error", false);
   if (time) spec.time = positive(time, "Time limit", false);
   if (Boolean(width) !== Boolean(height)) throw new Error("Give both width and height, or neither.");
   if (width) spec.size = [positive(width, "Width", true), positive(height, "Height", true)];
+  if (frames.trim()) spec.frames = range(frames.trim());
   return spec;
+}
+
+function range(text) {
+  if (/^\d+(-\d+(x\d+)?)?$/.test(text)) return text;
+  throw new Error(`Frames must be first-last, 1-10 say, or 1-10x2 for every second one, not “${text}”.`);
 }
 
 function positive(text, what, whole) {

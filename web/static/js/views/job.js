@@ -6,6 +6,7 @@ import { downloads } from "../api.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
 import { figures, inFlight } from "./job_figures.js";
+import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
 
 const kStopped = { spp: "all its samples are in", error: "the target error is reached", time: "its time was up", user: "someone stopped it" };
@@ -17,13 +18,23 @@ export function jobView(state, actions) {
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),
     alerts(job),
-    h("div", { class: "columns" },
+    framesStrip(state, job),
+    shownJob(state, state.jobs.get(state.open.shown), actions));
+}
+
+/** Image and figures: of the job itself, or of the frame that was chosen. */
+function shownJob(state, job, actions) {
+  if (!job || job.frames) return h("p", { class: "waiting", key: "frame" }, "Fetching the frame …");
+  return [
+    job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, h("pre", null, job.error))) : null,
+    h("div", { key: "columns", class: "columns" },
       h("div", { class: "picture" }, imagePanel(state, job, actions), downloadLinks(job)),
       h("div", { class: "facts" },
         figures(job, state.open.report),
         h("section", { class: "panel" }, h("h2", null, "Error against time"),
           errorPlot({ convergence: state.open.report?.convergence, target: job.target_error ?? state.open.report?.target_error ?? null, picked: state.open.picked, onPick: actions.pick })),
-        inFlight(state, job))));
+        inFlight(state, job))),
+  ];
 }
 
 function heading(state, job, actions) {
@@ -54,7 +65,7 @@ function alerts(job) {
 
 function downloadLinks(job) {
   const link = (href, label, hint, name) => h("a", { key: label, class: "button", href, download: name }, label, h("small", null, hint));
-  const stem = jobName(job).replace(/\.xml$/i, "");
+  const stem = jobName(job).replace(/\.xml$/i, "") + (job.sequence ? `.${job.frame}` : "");
   const now = isOver(job) ? "" : " so far";
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
     link(downloads.exr(job.id), "EXR", `image${now}`, `${stem}.exr`),

@@ -25,7 +25,7 @@ function row(state, job, actions) {
   return h("tr", { key: job.id, class: `is-${safeClass(job.state)}`, "data-job": job.id },
     h("td", { class: "name" },
       h("a", { href: `#/jobs/${encodeURIComponent(job.id)}` }, jobName(job)),
-      h("small", null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
+      h("small", null, job.frames ? `${count(job.frames.done)} of ${count(job.frames.total)} frames · ` : null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),

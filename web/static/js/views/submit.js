@@ -63,6 +63,7 @@ function settingsForm(submit, actions, busy) {
     field("time", "Stop after seconds", "no limit"),
     field("width", "Width", "the scene’s"),
     field("height", "Height", "the scene’s"),
+    field("frames", "Frames", "one image; or 1-10", { inputmode: "text" }),
     h("button", { key: "go", type: "submit", class: "primary", disabled: !ready }, "Render"));
 }
 

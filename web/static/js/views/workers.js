@@ -2,6 +2,7 @@
 import { h } from "../dom.js";
 import { colourOf } from "../state.js";
 import { bytes, count, duration, jobName, plural } from "../format.js";
+import { frameOf, jobHref } from "../route.js";
 import { safeClass, workerMark } from "./pieces.js";
 
 export function workersView(state) {
@@ -26,10 +27,12 @@ function classesApart(workers) {
 }
 
 function card(state, worker) {
-  const job = state.jobs?.get(worker.job);
+  const frame = frameOf(worker.job);
+  const job = state.jobs?.get(frame ? frame.sequence : worker.job);
+  const name = job ? jobName(job) + (frame ? `, frame ${frame.frame}` : "") : worker.job;
   return h("li", { key: worker.id, class: `panel worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
     h("h2", null, workerMark(colourOf(state, worker.name), worker.name), worker.state === "connected" ? null : h("span", { class: "pill" }, worker.state)),
-    h("p", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", job || worker.job ? [" · ", h("a", { key: "job", href: `#/jobs/${encodeURIComponent(worker.job)}` }, job ? jobName(job) : worker.job)] : null),
+    h("p", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
     h("dl", null,
       pair("Threads", count(worker.threads)),
       pair("Units done", count(worker.units_done)),

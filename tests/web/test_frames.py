@@ -1,0 +1,122 @@
+"""A sequence on the dashboard: its frames, the one that is shown, and what events say of them."""
+from stub_farm import job, png
+
+SEQUENCE = "j-5e9"
+
+
+def frame_id(frame):
+    return f"{SEQUENCE}-frame{frame}"
+
+
+def frame_job(frame, state="queued", **more):
+    return job(frame_id(frame), "smoke.xml", state, sequence=SEQUENCE, frame=frame, **more)
+
+
+def sequence(farm, states, current):
+    """A sequence whose frames are jobs of the stub, too; `states` by frame."""
+    listed = []
+    for frame, state in states.items():
+        one = frame_job(frame, state, progress=1 if state == "done" else 0.25)
+        farm.jobs[frame_id(frame)] = one
+        listed.append({key: one[key] for key in ("frame", "id", "state", "progress", "spp_done", "relmse", "error")})
+    done = sum(state == "done" for state in states.values())
+    frames = {"range": "1-4", "total": len(states), "done": done, "running": 1, "failed": 0, "cancelled": 0, "current": current}
+    farm.jobs[SEQUENCE] = job(SEQUENCE, "smoke.xml", frames={**frames, "list": listed})
+    return frames
+
+
+def pixel(page):
+    return page.evaluate("[...document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]")[:3]
+
+
+def shown(page):
+    return page.evaluate("document.querySelector('.frame[aria-current]')?.dataset.frame")
+
+
+def test_a_sequence_is_one_job_in_the_list(farm, dashboard):
+    sequence(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2)
+    for frame in range(1, 5):
+        listed = farm.jobs.pop(frame_id(frame))  # as the coordinator's list, which has no frames
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+
+    farm.emit("job", listed)  # of a frame
+    farm.change(SEQUENCE, progress=0.5)
+
+    page.wait("document.querySelector('[data-job]').innerText.includes('50 %')")
+    assert page.count("[data-job]") == 1
+    assert "1 of 4 frames" in page.text("[data-job]")
+
+
+def test_frames_are_chosen_and_each_has_its_own_image(farm, dashboard):
+    farm.images = {frame_id(1): png(64, 48, (200, 10, 10)), frame_id(2): png(64, 48, (10, 200, 10))}
+    sequence(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2)
+    page = dashboard(f"#/jobs/{SEQUENCE}")
+    page.wait("document.querySelector('live-image')?.dataset.painted")
+    assert shown(page) == "2" and pixel(page) == [10, 200, 10]
+    assert [page.evaluate(f"document.querySelector('[data-frame=\"{n}\"]').className") for n in (1, 3)] == ["frame is-done", "frame is-queued"]
+
+    page.click("[data-frame='1']")
+
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '1'")
+    page.wait("document.querySelector('live-image').dataset.painted")
+    page.wait("document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data[0] === 200")
+    assert page.evaluate("location.hash") == f"#/jobs/{SEQUENCE}/1"
+    assert page.evaluate("document.querySelector('.downloads a').getAttribute('href')").endswith(f"/jobs/{frame_id(1)}/image.exr")
+    page.click("[aria-label='The next frame']")
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '2'")
+
+
+def test_events_move_the_frames_and_the_page_follows_what_is_rendered(farm, dashboard):
+    frames = sequence(farm, {1: "running", 2: "queued", 3: "queued", 4: "queued"}, current=1)
+    page = dashboard(f"#/jobs/{SEQUENCE}")
+    page.wait("document.querySelector('.frame[aria-current]')?.dataset.frame === '1'")
+
+    farm.change(frame_id(1), state="done", progress=1)
+    farm.change(frame_id(2), state="running")
+    whole = {key: value for key, value in farm.jobs[SEQUENCE].items() if key != "frames"}
+    farm.emit("job", {**whole, "frames": {**frames, "done": 1, "current": 2}})  # events have no list
+
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '2'")
+    page.wait("document.querySelector('[data-frame=\"1\"]').className === 'frame is-done'")
+    assert "1 of 4 done" in page.text(".frames-head")
+
+    page.click("[data-frame='1']")
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '1'")
+    farm.emit("job", {**whole, "frames": {**frames, "done": 1, "current": 3}})
+    farm.change(frame_id(3), state="running")
+    page.wait("document.querySelector('[data-frame=\"3\"]').className === 'frame is-running'")
+    assert shown(page) == "1", "a frame that was chosen stays"
+    page.click(".follow")
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '3'")
+
+
+def test_a_frame_has_a_page_of_its_own_address(farm, dashboard):
+    sequence(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2)
+
+    page = dashboard(f"#/jobs/{SEQUENCE}/1")
+
+    page.wait("document.querySelector('.frame[aria-current]')?.dataset.frame === '1'")
+
+
+def test_the_files_of_all_frames_are_taken_along_and_the_range_is_sent(farm, dashboard, tmp_path):
+    scene = '<scene version="3.0.0"><volume><string name="filename" value="smoke/fog.####.vdb"/></volume></scene>'
+    files = {"smoke.xml": scene, "fog.0001.vdb": "1", "fog.0002.vdb": "2", "fog.12.vdb": "no frame", "other.vdb": "none"}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    page = dashboard("#/submit")
+    page.wait("document.getElementById('files')")
+    page.set_files("#files", [tmp_path / name for name in files])
+    page.wait("document.querySelector('.bundle h2')")
+    page.click("#set-frames")
+    page.type("1-two")
+    page.click(".settings button")
+    assert "Frames must be first-last" in page.text(".notice")
+
+    page.evaluate("document.getElementById('set-frames').select()")
+    page.type("1-2")
+    page.click(".settings button")
+
+    page.wait("location.hash === '#/jobs/j-new'")
+    assert sorted(farm.submitted[0]["assets"]) == ["smoke/fog.0001.vdb", "smoke/fog.0002.vdb"]
+    assert farm.submitted[0]["spec"] == {"frames": "1-2"}
