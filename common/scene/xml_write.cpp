@@ -279,7 +279,8 @@ class Writer {
     const Sensor& sensor;
     template <class T>
     void field(const Field& f, const T& x) {
-      const bool lens = f.name == "aperture_radius" || f.name == "focus_distance" || f.name == "aperture_scale";
+      const bool lens =
+          f.name == "aperture_radius" || f.name == "focus_distance" || f.name == "aperture_scale";
       const bool clip = f.name.ends_with("_clip"), always = f.name == "to_world" || f.name == "medium";
       if (always || (clip && sensor.projection == Projection::orthographic) ||
           (sensor.projection == Projection::perspective && !(lens && is_pinhole(sensor))))
