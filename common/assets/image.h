@@ -1,4 +1,4 @@
-// PNG, JPEG, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels is
+// PNG, JPEG, BMP, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels is
 // refused (resource_exhausted) before memory is spent on it.
 #pragma once
 
@@ -23,6 +23,9 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
 // grey or colour, 8 bits
 Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file,
                               std::uint64_t max_pixels = kMaxImagePixels);
+// 24 and 32 bits, alpha left out
+Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
 // R G B A, or Y; half and float
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
