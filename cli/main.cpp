@@ -44,6 +44,7 @@ int main(int argc, char** argv) {
   add_submit(app, action);
   add_farm_commands(app, action);
   add_merge(app, action);
+  add_validate(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -146,7 +146,7 @@ NoriTestResult read_nori_test(std::string_view file_name, std::string_view text,
                               const ReadOptions& options) {
   scene::Report report(options.strict);
   NoriTestResult result;
-  if (auto document = scene::load_document(file_name, text, assets, options.defines, report)) {
+  if (auto document = scene::load_document(file_name, text, assets, options, report)) {
     if (document->root.tag == "test")
       result.test = scene::TestReader(*document, assets, report).read();
     else

@@ -76,3 +76,27 @@ def test_a_farm_and_its_partials(fog, tmp_path):
         env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
         job = lightshaft("submit", fog, *few, env=env).stdout.split()[0]
         assert {alone, merged} == {finished(farm, job)}
+
+
+def test_the_settings_of_an_integrator_travel_in_the_scene(fog, farm, tmp_path):
+    few = ("--spp", 10)
+
+    def variant(name, settings):
+        path = fog.with_name(f"{name}.xml")
+        text = fog.read_text()
+        assert text.count('<integrator type="volpath"/>') == 1
+        path.write_text(text.replace('<integrator type="volpath"/>', f'<integrator type="volpath_distant_mis">{settings}</integrator>'))
+        return path
+
+    def alone(scene, *flags):
+        return digest(lightshaft("render", scene, "-o", tmp_path / "a.exr", *few, *flags))
+
+    near = variant("near", '<string name="distance" value="equiangular"/>')
+    both = variant("both", "")
+    assert len({alone(fog), alone(near), alone(both)}) == 3
+    assert alone(fog, "--integrator", "volpath_distant_mis") == alone(both)
+    farm.add_workers(2, fake=False)
+    env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+    for scene in (near, both):
+        job = lightshaft("submit", scene, *few, env=env).stdout.split()[0]
+        assert finished(farm, job) == alone(scene)

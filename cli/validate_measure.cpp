@@ -1,0 +1,105 @@
+#include "cli/validate_measure.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "worker/render/thread_limit.h"
+
+namespace ls::cli {
+namespace {
+
+constexpr double kEnoughPixels = 1024;
+constexpr double kLuminance[3] = {.212671, .715160, .072169};
+
+FrameSize enough(FrameSize size) {
+  const double pixels = static_cast<double>(size.width) * size.height;
+  const int factor = std::max(1, static_cast<int>(std::ceil(std::sqrt(kEnoughPixels / pixels))));
+  return {size.width * factor, size.height * factor};
+}
+
+// One row of pixels is one task.
+std::vector<render::TileResult> render_rows(const render::World& world, FrameSize size, SampleRange samples,
+                                            int threads) {
+  std::vector<render::TileResult> rows(static_cast<std::size_t>(size.height));
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t y; (y = next++) < rows.size();) {
+      const int top = static_cast<int>(y);
+      rows[y] = render::render_tile(world, {0, top, size.width, top + 1}, samples, nullptr, nullptr);
+    }
+  };
+  {
+    std::vector<std::jthread> pool;
+    for (int i = 0; i < threads; ++i) pool.emplace_back(work);
+  }
+  return rows;
+}
+
+// Sums over pixels of the mean, the squared error's estimate, and its square.
+struct Sums {
+  double mean = 0, square = 0, fourth = 0;
+  void add(double a, double b) {
+    const double v = (a - b) * (a - b) / 4;
+    mean += (a + b) / 2;
+    square += v;
+    fourth += v * v;
+  }
+};
+
+void collect(const std::vector<render::TileResult>& rows, FrameSize size, double per_half, Measured& m) {
+  const auto width = static_cast<std::size_t>(size.width);
+  std::array<Sums, 4> sums;
+  for (const auto& row : rows) {
+    m.nonfinite += row.health.nonfinite;
+    for (std::size_t x = 0; x < width; ++x) {
+      double bright[2] = {0, 0};
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double a = row.sums[c * width + x] / per_half, b = row.sums[(3 + c) * width + x] / per_half;
+        sums[c].add(a, b);
+        bright[0] += kLuminance[c] * a;
+        bright[1] += kLuminance[c] * b;
+      }
+      sums[Measured::luminance].add(bright[0], bright[1]);
+    }
+  }
+  const double pixels = static_cast<double>(width) * size.height;
+  for (std::size_t k = 0; k < 4; ++k) {
+    m.mean[k] = sums[k].mean / pixels;
+    m.standard_error[k] = std::sqrt(sums[k].square) / pixels;
+    m.freedom[k] = sums[k].fourth > 0 ? 3 * sums[k].square * sums[k].square / sums[k].fourth : pixels;
+  }
+}
+
+}  // namespace
+
+Result<Measured> measure(const Scene& given, const render::AssetFiles& files, std::uint64_t paths,
+                         std::uint64_t seed, int threads) {
+  const SystemClock clock;
+  const TimePoint start = clock.now();
+  Scene scene = given;
+  scene.film.size = enough(given.film.size);
+  scene.film.filter = BoxFilter{};
+  const FrameSize size = scene.film.size;
+  RenderSettings settings;
+  settings.size = size;
+  settings.seed = seed;
+  settings.integrator = scene.integrator.name;
+  settings.max_depth = scene.integrator.max_depth;
+  settings.rr_depth = scene.integrator.rr_depth;
+  const auto limit = render::limit_threads(threads);
+  const auto world = render::build_world(scene, settings, files, threads);
+  if (!world) return tl::unexpected(world.error());
+  const auto pixels = static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
+  const std::uint64_t per_half = std::max<std::uint64_t>(1, (paths + 2 * pixels - 1) / (2 * pixels));
+  Measured m;
+  m.paths = 2 * per_half * pixels;
+  collect(render_rows(**world, size, {0, 2 * per_half}, threads), size, static_cast<double>(per_half), m);
+  m.seconds = seconds(clock.now() - start);
+  return m;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,119 @@
+// The figures behind `lightshaft validate`: probabilities against tables, verdicts, and that a file of tests
+// fails for the right reason.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/validate_chi2.h"
+#include "cli/validate_file.h"
+#include "cli/validate_stats.h"
+#include "tests/support/scene_kit.h"
+
+namespace ls::cli {
+namespace {
+
+// Critical values of Student's t and of chi-square, to the digits of the usual tables.
+TEST(ValidateStats, TailsAreThoseOfTheTables) {
+  EXPECT_NEAR(student_tails(1, 1), .5, 1e-12);
+  EXPECT_NEAR(student_tails(2.228139, 10), .05, 1e-6);
+  EXPECT_NEAR(student_tails(-3.169273, 10), .01, 1e-6);
+  EXPECT_NEAR(student_tails(1.959964, 1e7), .05, 1e-6);
+  EXPECT_NEAR(student_tails(0, 3), 1, 1e-12);
+  EXPECT_NEAR(chi2_tail(3.841459, 1), .05, 1e-6);
+  EXPECT_NEAR(chi2_tail(18.307038, 10), .05, 1e-6);
+  EXPECT_NEAR(chi2_tail(124.342113, 100), .05, 1e-6);
+  EXPECT_NEAR(chi2_tail(70.064895, 100), .99, 1e-6);
+  EXPECT_NEAR(chi2_tail(2, 2), std::exp(-1.), 1e-12);
+}
+
+// The levels that Nori prints for .01 and 4, 3 and 2 references.
+TEST(ValidateStats, SidakIsNoris) {
+  EXPECT_NEAR(sidak(.01, 4), .00250943, 1e-8);
+  EXPECT_NEAR(sidak(.01, 3), .00334451, 1e-8);
+  EXPECT_NEAR(sidak(.01, 2), .00501256, 1e-8);
+  EXPECT_DOUBLE_EQ(sidak(.01, 1), .01);
+}
+
+ValidateCase judged(double expected, double got, double error, double rounding = 0, std::uint64_t bad = 0) {
+  ValidateCase c;
+  c.expected = expected;
+  c.got = got;
+  c.standard_error = error;
+  c.level = .01;
+  c.nonfinite = bad;
+  judge(c, 1000, rounding);
+  return c;
+}
+
+TEST(ValidateTable, AVerdictIsByProbability) {
+  EXPECT_TRUE(judged(1, 1.02, .01).passed());
+  EXPECT_FALSE(judged(1, 1.03, .01).passed());
+  EXPECT_NEAR(judged(1, 1.03, .01).z, 3, 1e-9);
+  // Exact answers: only what float32 may do is allowed.
+  EXPECT_TRUE(judged(1, 1 + 1e-6, 0, 2e-6).passed());
+  EXPECT_FALSE(judged(1, 1 + 1e-6, 0, 5e-7).passed());
+  EXPECT_FALSE(judged(1, 1, .01, 0, 3).passed()) << "samples that went wrong";
+  EXPECT_FALSE(judged(1, std::nan(""), .01).passed());
+  EXPECT_FALSE(judged(1, 1, std::nan("")).passed());
+}
+
+TEST(ValidateTable, JsonHasEveryCaseAndTheCounts) {
+  const auto j = table_json({judged(1, 1, .01), judged(1, 2, .01)});
+  EXPECT_EQ(j["passed"], 1);
+  EXPECT_EQ(j["failed"], 1);
+  EXPECT_EQ(j["cases"][0]["verdict"], "pass");
+  EXPECT_EQ(j["cases"][1]["verdict"], "fail");
+  EXPECT_TRUE(j["cases"][1].contains("why"));
+}
+
+TEST(ValidateFile, ABsdfIsSeenFromTheAngleThatIsAsked) {
+  // What a smooth boundary of index 1.5 reflects, by Fresnel's formulas at 0 and 60 degrees, as a metal that
+  // absorbs nothing.
+  test::SceneKit kit;
+  kit.shape(RectangleShape{}, {},
+            kit.bsdf(ConductorBsdf{{1.5, 1.5, 1.5}, {0, 0, 0}, kit.texture({1, 1, 1})}));
+  NoriTest t;
+  t.bsdfs.push_back(kit.scene);
+  t.angles = {0, 60};
+  const double c = std::cos(test::kPi / 3), ct = std::sqrt(1 - .75 / 2.25);
+  const double rs = (c - 1.5 * ct) / (c + 1.5 * ct), rp = (ct - 1.5 * c) / (ct + 1.5 * c);
+  t.references = {.04, (rs * rs + rp * rp) / 2};
+  const auto cases = validate_test(t, {}, {.threads = 1});
+  ASSERT_TRUE(cases) << cases.error().message;
+  ASSERT_EQ(cases->size(), 2u);
+  for (const ValidateCase& one : *cases) EXPECT_TRUE(one.passed()) << one.name << ": " << one.why;
+}
+
+TEST(ValidateFile, DeltaLobesHaveNoDensityToTest) {
+  test::SceneKit kit;
+  kit.shape(RectangleShape{}, {}, kit.mirror());
+  NoriTest t;
+  t.kind = NoriTestKind::chi2_test;
+  t.bsdfs.push_back(kit.scene);
+  const auto cases = validate_test(t, {}, {.threads = 1});
+  ASSERT_FALSE(cases);
+  EXPECT_EQ(cases.error().code, Errc::invalid_argument);
+}
+
+TEST(ValidateChi2, FollowsItsDegreesOfFreedomForARightSampler) {
+  // A diffuse surface's samples against its own density pass; the statistic is that of its degrees of
+  // freedom.
+  test::SceneKit kit;
+  kit.shape(RectangleShape{}, {}, kit.diffuse(.5));
+  NoriTest t;
+  t.kind = NoriTestKind::chi2_test;
+  t.bsdfs.push_back(kit.scene);
+  t.sample_count = 200'000;
+  const auto c = chi2_case(t, 0, {}, 1);
+  ASSERT_TRUE(c) << c.error().message;
+  EXPECT_TRUE(c->why.empty()) << c->why;
+  EXPECT_GT(c->p, 1e-4);
+  // 100 cells of the upper half; below there is nothing and joins the last.
+  EXPECT_GT(c->expected, 90);
+  EXPECT_LT(c->expected, 110);
+}
+
+}  // namespace
+}  // namespace ls::cli
