@@ -4,28 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "worker/render/fov.h"
+
 namespace ls::render {
-namespace {
-
-// Tangent of half the horizontal field of view.
-double tan_half_x(const Sensor& s, double aspect) {
-  const double t = std::tan(s.fov * (3.14159265358979323846 / 360));
-  switch (s.fov_axis) {
-    case FovAxis::x:
-      return t;
-    case FovAxis::y:
-      return t * aspect;
-    case FovAxis::smaller:
-      return aspect > 1 ? t * aspect : t;
-    case FovAxis::larger:
-      return aspect > 1 ? t : t * aspect;
-    case FovAxis::diagonal:
-      return t * aspect / std::sqrt(1 + aspect * aspect);
-  }
-  return t;
-}
-
-}  // namespace
 
 Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const TextureTable* textures)
     : projection_(s.projection), per_pixel_x_(1. / size.width), per_pixel_y_(1. / size.height) {
@@ -35,7 +16,8 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   axis_z_ = V3d(m[2], m[6], m[10]);
   origin_ = V3((V3d(m[3], m[7], m[11]) - center) * scale);
   const double aspect = static_cast<double>(size.width) / size.height;
-  const double tx = projection_ == Projection::perspective ? tan_half_x(s, aspect) : 1, ty = tx / aspect;
+  const double tx = projection_ == Projection::perspective ? tan_half_fov_x(s.fov, s.fov_axis, aspect) : 1,
+               ty = tx / aspect;
   // Film position (fx, fy) in pixels -> ndc in [0,1] -> camera space, x to the left and y up. The camera
   // looks as if from positions further to the right and down by fractions of the film.
   const double ox = s.principal_point_offset[0], oy = s.principal_point_offset[1];
