@@ -24,6 +24,11 @@ What Nori means otherwise than Mitsuba:
 
 )";
 
+constexpr std::string_view kIntegratorParameters = R"(
+Those without a max_depth take `maxDepth` (-1: no limit), those with media `inmedium` (the camera is in the medium of the mesh around
+it), `volpath_distant_mis` its `distance` and `heuristic` as in Mitsuba's language.
+)";
+
 }  // namespace
 
 std::string markdown() {
@@ -41,6 +46,7 @@ std::string markdown() {
     out += fmt::format("| `{}` | `{}`{}{} |\n", row.name, row.ours,
                        row.max_depth ? fmt::format(" with max_depth {}", *row.max_depth) : "",
                        row.but.empty() ? "" : fmt::format(", with a warning: {}", row.but));
+  out += kIntegratorParameters;
   out += "\nRefused by name:\n\n| object | why |\n|---|---|\n";
   for (const Refused& r : refused_plugins())
     out += fmt::format("| {} `{}` | {} |\n", r.tag, r.type, r.because);
