@@ -3,6 +3,7 @@
 The files are written here with OpenVDB's own Python module (Debian: python3-openvdb).
 """
 
+import math
 import subprocess
 
 import pytest
@@ -134,3 +135,27 @@ def test_a_scene_without_a_vdb_never_maps_openvdb(tmp_path):
                             capture_output=True, text=True, check=True).stderr
 
     assert "libopenvdb" not in mapped and "libembree" in mapped
+
+
+def test_a_flame_is_two_grids_of_one_file(tmp_path):
+    ones = numpy.ones((16, 16, 16), dtype=numpy.float32)
+    vdb.write(str(tmp_path / "flame.vdb"), grids=[grid(ones, "density", .1), grid(ones * 1500, "temperature", .1)])
+    volume = '<volume type="gridvolume" name="{}"><string name="filename" value="flame.vdb"/><string name="grid_name" value="{}"/></volume>'
+    scene = tmp_path / "flame.xml"
+    # One unit of absorption .8, within the grids; they begin at -.95.
+    scene.write_text(f"""<scene version="3.0.0"><integrator type="volpath"/>
+      <medium type="heterogeneous" id="m">{volume.format("sigma_t", "density")}{volume.format("temperature", "temperature")}
+        <float name="albedo" value="0"/><float name="scale" value="0.8"/></medium>
+      <shape type="cube"><transform name="to_world"><scale value="0.5"/><translate value="-0.2 -0.2 -0.2"/></transform>
+        <bsdf type="null"/><ref name="interior" id="m"/></shape>
+      <sensor type="perspective"><float name="fov" value="0.01"/>
+        <transform name="to_world"><lookat origin="-0.2 -0.2 -5" target="-0.2 -0.2 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor></scene>""")
+
+    said = lightshaft("render", scene, "--pixel", "3,4", "--sample", 0).stdout
+
+    red, green, blue = (float(x) for x in said.split(":")[1].split()[:3])
+    absorbed = 1 - math.exp(-.8)
+    assert red == pytest.approx(.346325 * absorbed, rel=1e-4)  # of a black body of 1500 K in linear sRGB
+    assert green == pytest.approx(.0460885 * absorbed, rel=1e-4)
+    assert blue == 0
