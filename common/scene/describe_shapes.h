@@ -20,7 +20,9 @@ void describe(V& v, T& s) {
 }
 template <class V, Of<MeshShape> T>
 void describe(V& v, T& s) {
-  v.field({.name = "filename", .doc = "Wavefront OBJ, Stanford PLY or Mitsuba's `.serialized`", .required = true}, s.file);
+  v.field(
+      {.name = "filename", .doc = "Wavefront OBJ, Stanford PLY or Mitsuba's `.serialized`", .required = true},
+      s.file);
   v.field({.name = "format", .doc = "of the file: the plugin's name", .derived = true}, s.format);
   v.field({.name = "face_normals", .doc = "flat shading: the file's vertex normals are left out"},
           s.face_normals);
@@ -104,12 +106,13 @@ void describe_clips(V& v, T& s) {
 template <class V, Of<Sensor> T>
 void describe_perspective(V& v, T& s) {
   describe_clips(v, s);
-  v.field({.name = "fov",
-           .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given); this and "
-                  "all that follows of `perspective` and `thinlens` only",
-           .unit = "degrees",
-           .range = {0, 180, true, true}},
-          s.fov);
+  v.field(
+      {.name = "fov",
+       .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given); this and "
+              "all that follows of `perspective` and `thinlens` only",
+       .unit = "degrees",
+       .range = {0, 180, true, true}},
+      s.fov);
   v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
   v.field({.name = "principal_point_offset_x",
            .doc = "how far right of its place the camera looks",
