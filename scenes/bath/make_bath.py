@@ -20,7 +20,7 @@ from mesh import Mesh
 # detail: scale of the textures; voxel: edge in metres of the steam's grid; cells_high: of the grid that it is simulated on.
 SETTINGS = {
     "sketch": {"detail": 0.125, "voxel": 0.2, "cells_high": 12, "width": 160, "height": 120, "spp": 16},
-    "small": {"detail": 0.5, "voxel": 0.06, "cells_high": 30, "width": 480, "height": 360, "spp": 128},
+    "small": {"detail": 0.5, "voxel": 0.06, "cells_high": 32, "width": 480, "height": 360, "spp": 64},
     "full": {"detail": 1.0, "voxel": 0.03, "cells_high": 56, "width": 1280, "height": 960, "spp": 1024},
 }
 

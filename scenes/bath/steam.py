@@ -99,7 +99,8 @@ def confinement(v, h):
     strength = norm(vorticity)
     towards = np.stack([np.roll(strength, -1, a) - np.roll(strength, 1, a) for a in range(3)], -1)
     towards /= norm(towards)[..., None] + np.float32(1e-4)
-    return np.cross(towards, vorticity)
+    (ax, ay, az), (bx, by, bz) = (np.moveaxis(a, -1, 0) for a in (towards, vorticity))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
 
 
 def sample(field, at):
