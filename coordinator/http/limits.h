@@ -9,7 +9,7 @@ namespace ls::http {
 
 // ---- bodies, per route ----
 inline constexpr std::uint64_t kMaxSceneXml = 32u << 20;  // POST /jobs with application/xml
-inline constexpr std::uint64_t kMaxJobJson = 16u << 20;  // POST /jobs with application/json: names and digests
+inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
 inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
 inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
 inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session

@@ -57,6 +57,7 @@ def test_a_farm_that_is_full_is_not_the_users_mistake(stub):
 
 
 def test_fetch_writes_into_a_pipe_and_leaves_it_one(stub, tmp_path):
+    stub.answers[("GET", "/api/v1/jobs/j-1")] = [(200, {"id": "j-1"})]
     stub.answers[("GET", "/api/v1/jobs/j-1/image.exr")] = [(200, b"the image")]
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
