@@ -8,7 +8,7 @@
 namespace ls::render {
 namespace {
 
-// Fewer lights than this with a place are left to the table (docs/decisions/0007-many-lights.md).
+// Fewer lights than this with a place are left to the table (docs/decisions/0008-many-lights.md).
 constexpr std::ptrdiff_t kTreeFrom = 32;
 // Every so manieth word of the table stays the table's: no light that matters somewhere is rarer for the tree
 // than 1/16 of what it was.
