@@ -99,6 +99,8 @@ std::filesystem::path PartialLog::segment_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
+  if (std::error_code error; std::filesystem::exists(folder, error) || error)  // as something else, perhaps
+    if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
   std::uint32_t count = 0;
   while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
