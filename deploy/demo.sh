@@ -56,10 +56,7 @@ built=$SECONDS
 stop_farm
 [ "$detach" = 1 ] || trap stop_farm EXIT
 
-spp=64 width=480 height=320 voxel=0.05
-if [ "$setting" = full ]; then spp=512 width=1280 height=848 voxel=0.025; fi
-python3 scenes/steam_room/make_steam.py "$home/steam.vol" --voxel "$voxel"
-python3 scenes/steam_room/make_scene.py "$home/steam_room.xml"
+python3 scenes/bath/make_bath.py "$home/bath" --setting "$setting"
 
 launch() {  # name, command...
   local name="$1"; shift
@@ -86,15 +83,14 @@ done
 
 token=$(cat "$home/data/token")
 echo "dashboard: $url/#token=$token"
-LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/steam_room.xml" --wait -o "$home/steam_room.exr" \
-  -D spp="$spp" -D width="$width" -D height="$height" | tee "$home/job"
+LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" --wait -o "$home/bath.exr" | tee "$home/job"
 job=$(head -n 1 "$home/job")
-curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=-1" -o "$home/steam_room.png"
+curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=0.8" -o "$home/bath.png"
 
 cat <<EOF
 
 done: $((built - started)) s to install and build, $((SECONDS - built)) s to start the farm and render
-image:      build/demo/steam_room.exr   (picture: build/demo/steam_room.png)
+image:      build/demo/bath.exr   (picture: build/demo/bath.png)
 dashboard:  $url/#token=$token
 EOF
 if [ "$detach" = 1 ]; then

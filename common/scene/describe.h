@@ -68,7 +68,7 @@ inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
 LS_TYPE(ConstantTexture, "texture", "constant", "uniform, srgb",
         "one colour; also written as a plain `<rgb>`, `<float>` or `<spectrum>`")
 LS_TYPE(BitmapTexture, "texture", "bitmap", "",
-        "an image: PNG, JPEG, EXR or HDR; (u, v) = (0, 0) is its upper left corner")
+        "an image: PNG, JPEG, BMP, EXR or HDR; (u, v) = (0, 0) is its upper left corner")
 LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")
 LS_TYPE(PeakTexture, "texture", "peak", "",
         "the largest channel of another texture, or its colour divided by that; not in Mitsuba: Nori's "
