@@ -46,7 +46,25 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
-void append_mesh(Geometry& g, const LocalMesh& mesh, std::uint32_t surface, const Space& space) {
+// Normals that a file gives decide which side of a triangle shines and is lit, even against its winding;
+// between media the winding decides. So the winding is made to follow the normals, and the media change sides
+// with it; where a mesh between media has both kinds of triangles, it stays.
+void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::uint32_t>& indices) {
+  const auto opposes = [&](std::size_t i) {
+    const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
+    const V3d winding = (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
+    return winding.dot(mesh.normals[a] + mesh.normals[b] + mesh.normals[c]) < 0;
+  };
+  std::vector<std::size_t> against;
+  for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
+    if (opposes(i)) against.push_back(i);
+  }
+  if (info.transition && against.size() != indices.size() / 3) return;
+  for (const std::size_t i : against) std::swap(indices[i + 1], indices[i + 2]);
+  if (!against.empty()) std::swap(info.interior, info.exterior);
+}
+
+void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t surface, const Space& space) {
   const auto base = static_cast<std::uint32_t>(g.positions.size());
   SurfaceInfo& info = g.surfaces[surface];
   for (const V3d& v : mesh.positions) g.positions.push_back(V3(space(v)));
@@ -54,6 +72,7 @@ void append_mesh(Geometry& g, const LocalMesh& mesh, std::uint32_t surface, cons
     info.normals = true;
     g.normals.resize(base);
     for (const V3d& n : mesh.normals) g.normals.push_back(V3(n));
+    if (normals_given) follow_normals(mesh, info, mesh.indices);
   }
   if (!mesh.uvs.empty()) {
     info.uvs = true;
@@ -74,7 +93,7 @@ void append_mesh(Geometry& g, const LocalMesh& mesh, std::uint32_t surface, cons
 }
 
 void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& space) {
-  append_mesh(g, p.mesh, surface, space);
+  append_mesh(g, p.mesh, p.normals_given, surface, space);
   if (p.sphere) {
     Sphere s = *p.sphere;
     s.center = space(s.center);

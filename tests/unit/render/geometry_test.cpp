@@ -189,10 +189,10 @@ TEST(Shapes, ShineToTheSideThatMitsubaSays) {
   }
 }
 
-// A square in z = 0 by an OBJ file with or without vertex normals along +z.
-SurfaceHit square_hit(bool normals, bool mirror) {
+// A square in z = 0 by an OBJ file with or without vertex normals along +z or -z.
+SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
   static const test::ScratchFolder folder;
-  std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 1\n";
+  std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 " + std::to_string(z) + "\n";
   text += normals ? "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n" : "f 1 2 3\nf 1 3 4\n";
   SceneKit kit;
   const Asset asset{"square.obj", sha256(text), text.size()};
@@ -211,6 +211,47 @@ TEST(Meshes, FollowTheirNormalsAndElseTheirWinding) {
   EXPECT_EQ(square_hit(true, true).ng.z, 1.f);
   EXPECT_EQ(square_hit(false, false).ng.z, 1.f);
   EXPECT_EQ(square_hit(false, true).ng.z, -1.f);
+}
+
+TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
+  for (const bool mirror : {false, true}) {
+    EXPECT_EQ(square_hit(true, mirror, -1).shading.n.z, -1.f);
+    EXPECT_EQ(square_hit(true, mirror, -1).ng.z, -1.f);
+  }
+}
+
+// Light in a closed room whose normals point inwards, against its winding; the medium lies where the winding
+// has the inside.
+TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
+  static const test::ScratchFolder folder;
+  std::string text =
+      "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
+  text += "f 1//1 4//4 2//2\nf 1//1 3//3 4//4\nf 1//1 2//2 3//3\nf 2//2 4//4 3//3\n";
+  for (const bool filled : {false, true}) {
+    SceneKit kit;
+    const Asset asset{"room.obj", sha256(text), text.size()};
+    kit.files[asset.digest] = folder.path() / asset.digest.hex();
+    std::ofstream(kit.files[asset.digest], std::ios::binary) << text;
+    MeshShape mesh;
+    mesh.file = SceneKit::push<AssetTag>(kit.scene.assets, asset);
+    const MediumIndex dark = kit.homogeneous({3, 3, 3}, {0, 0, 0});
+    const TextureIndex light = kit.texture({1, 1, 1});
+    Shape& room = kit.shape(mesh, {}, kit.diffuse(0));
+    room.emitter = AreaEmitter{light};
+    if (filled) {
+      room.interior = dark;
+      room.is_medium_transition = true;
+      kit.scene.sensor.medium = dark;
+    }
+    kit.look({0, 0, 0}, {.3, .3, .3});
+    const auto e = test::estimate(kit, 1);
+    if (filled) {
+      EXPECT_GT(e.mean[0], 0);
+      EXPECT_LT(e.mean[0], std::exp(-3 * .5));  // the nearest wall is farther than .5
+    } else {
+      EXPECT_EQ(e.mean[0], 1);
+    }
+  }
 }
 
 TEST(Meshes, WithoutNormalsAreSmooth) {
