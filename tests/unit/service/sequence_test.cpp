@@ -144,7 +144,8 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
     const JobId id = submit(*coordinator, frames(1, 3));
     const auto states = [&] {
       std::set<JobState> all;
-      for (const auto& f : coordinator->job(id)->frames->all) all.insert(f.state);
+      const auto job = coordinator->job(id);
+      for (const auto& f : job->frames->all) all.insert(f.state);
       return all;
     };
     ASSERT_TRUE(coordinator->pause(id));
