@@ -122,6 +122,33 @@ def test_a_slow_list_does_not_undo_what_an_event_said_meanwhile(farm, dashboard)
     assert page.text("[data-job] .pill") == "done"
 
 
+def test_of_two_lists_the_one_asked_for_later_holds(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+    page.evaluate("""void (() => {
+      const real = fetch;
+      let lists = 0;
+      window.released = new Promise((resolve) => { window.release = resolve; });
+      window.fetch = async (...request) => {
+        const list = request[0].endsWith("/jobs") && ++lists;
+        const response = await real(...request);
+        if (list === 1) { window.held = true; await window.released; }
+        return response;
+      };
+    })()""")
+
+    farm.emit("reset", {"missed_from": 1, "missed_to": 2})
+    page.wait("window.held")
+    farm.jobs["j-1"] = job(progress=0.75)
+    farm.emit("reset", {"missed_from": 3, "missed_to": 4})
+    page.wait("document.querySelector('[data-job]').innerText.includes('75 %')")
+    page.evaluate("window.released.then(() => new Promise(requestAnimationFrame)), window.release()")
+    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+
+    assert "75 %" in page.text("[data-job]")
+
+
 def test_events_that_are_kept_no_longer_lead_to_fresh_lists(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()

@@ -95,14 +95,22 @@ function signedOut(message = null) {
 // ---- events ----
 
 const recordings = new Set();
+const newest = new Map(); // what was asked for -> number of the latest request whose answer is shown
+let asked = 0;
 
-/** Puts a fetched list under the events that came meanwhile: its answer may be older than they are. */
-async function snapshot(fetch, apply) {
+/**
+ * Puts a fetched list under the events that came meanwhile: its answer may be older than they are. Of two requests for
+ * the same, the later one holds: answers overtake each other on their way.
+ */
+async function snapshot(what, fetch, apply) {
+  const number = ++asked;
   const events = [];
   recordings.add(events);
   try {
     const answer = await fetch();
-    if (answer !== undefined) set(events.reduce((next, [type, data]) => withEvent(next, type, data), apply(state, answer)));
+    if (answer === undefined || number < (newest.get(what) ?? 0)) return;
+    newest.set(what, number);
+    set(events.reduce((next, [type, data]) => withEvent(next, type, data), apply(state, answer)));
   } finally {
     recordings.delete(events);
   }
@@ -111,8 +119,8 @@ async function snapshot(fetch, apply) {
 async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
-    snapshot(() => attempt(api.jobs), withJobs),
-    snapshot(() => attempt(api.workers), withWorkers)]);
+    snapshot("jobs", () => attempt(api.jobs), withJobs),
+    snapshot("workers", () => attempt(api.workers), withWorkers)]);
   await refreshOpen();
 }
 
@@ -142,7 +150,7 @@ async function refreshOpen() {
   const id = state.open?.id;
   if (!id) return;
   try {
-    await snapshot(() => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
+    await snapshot("job", () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
     if (state.open?.id !== id) return;
     set(withOpen(state, { problem: null }));
     if (!showFrame()) await refreshShown();
@@ -171,7 +179,7 @@ async function refreshShown() {
   const { id, shown } = state.open;
   const job = state.jobs?.get(shown);
   const fetch = () => Promise.all([job && shown === id ? job : api.job(shown), api.tiles(shown)]);
-  await snapshot(fetch, (now, [fresh, tiles]) => {
+  await snapshot("shown", fetch, (now, [fresh, tiles]) => {
     if (now.open?.shown !== shown) return now;
     const next = withTiles(withJob(now, fresh), tiles);
     return withOpen(next, { folds: next.open.folds + 1, problem: null });
