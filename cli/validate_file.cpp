@@ -65,7 +65,7 @@ class Runner {
       c.got = m->mean[q];
       c.standard_error = m->standard_error[q];
       c.level = level_;
-      c.nonfinite = m->nonfinite;
+      c.nonfinite = m->unhealthy();
       c.seconds = m->seconds / static_cast<double>(names.size());
       judge(c, m->freedom[q], kRounding * std::abs(c.expected));
       add(std::move(c));

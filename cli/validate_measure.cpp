@@ -13,30 +13,13 @@ namespace ls::cli {
 namespace {
 
 constexpr double kEnoughPixels = 1024;
+constexpr std::size_t kPlanes = 6;  // of sums, as render_tile() gives them
 constexpr double kLuminance[3] = {.212671, .715160, .072169};
 
 FrameSize enough(FrameSize size) {
   const double pixels = static_cast<double>(size.width) * size.height;
   const int factor = std::max(1, static_cast<int>(std::ceil(std::sqrt(kEnoughPixels / pixels))));
   return {size.width * factor, size.height * factor};
-}
-
-// One row of pixels is one task.
-std::vector<render::TileResult> render_rows(const render::World& world, FrameSize size, SampleRange samples,
-                                            int threads) {
-  std::vector<render::TileResult> rows(static_cast<std::size_t>(size.height));
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t y; (y = next++) < rows.size();) {
-      const int top = static_cast<int>(y);
-      rows[y] = render::render_tile(world, {0, top, size.width, top + 1}, samples, nullptr, nullptr);
-    }
-  };
-  {
-    std::vector<std::jthread> pool;
-    for (int i = 0; i < threads; ++i) pool.emplace_back(work);
-  }
-  return rows;
 }
 
 // Sums over pixels of the mean, the squared error's estimate, and its square.
@@ -50,23 +33,20 @@ struct Sums {
   }
 };
 
-void collect(const std::vector<render::TileResult>& rows, FrameSize size, double per_half, Measured& m) {
-  const auto width = static_cast<std::size_t>(size.width);
+void collect(const render::TileResult& frame, std::size_t count, double per_half, Measured& m) {
   std::array<Sums, 4> sums;
-  for (const auto& row : rows) {
-    m.nonfinite += row.health.nonfinite;
-    for (std::size_t x = 0; x < width; ++x) {
-      double bright[2] = {0, 0};
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double a = row.sums[c * width + x] / per_half, b = row.sums[(3 + c) * width + x] / per_half;
-        sums[c].add(a, b);
-        bright[0] += kLuminance[c] * a;
-        bright[1] += kLuminance[c] * b;
-      }
-      sums[Measured::luminance].add(bright[0], bright[1]);
+  m.health = frame.health;
+  for (std::size_t i = 0; i < count; ++i) {
+    double bright[2] = {0, 0};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double a = frame.sums[c * count + i] / per_half, b = frame.sums[(3 + c) * count + i] / per_half;
+      sums[c].add(a, b);
+      bright[0] += kLuminance[c] * a;
+      bright[1] += kLuminance[c] * b;
     }
+    sums[Measured::luminance].add(bright[0], bright[1]);
   }
-  const double pixels = static_cast<double>(width) * size.height;
+  const auto pixels = static_cast<double>(count);
   for (std::size_t k = 0; k < 4; ++k) {
     m.mean[k] = sums[k].mean / pixels;
     m.standard_error[k] = std::sqrt(sums[k].square) / pixels;
@@ -76,6 +56,53 @@ void collect(const std::vector<render::TileResult>& rows, FrameSize size, double
 
 }  // namespace
 
+std::uint64_t samples_gone_wrong(const render::Health& health) {
+  return health.nonfinite + health.negative + health.majorant_violations;
+}
+
+void add(render::Health& sum, const render::Health& h) {
+  sum.nonfinite += h.nonfinite;
+  sum.negative += h.negative;
+  sum.majorant_violations += h.majorant_violations;
+}
+
+render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples,
+                                int threads) {
+  const auto width = static_cast<std::size_t>(size.width),
+             count = width * static_cast<std::size_t>(size.height);
+  std::vector<render::TileResult> rows(static_cast<std::size_t>(size.height));
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t y; (y = next++) < rows.size();) {
+      const int top = static_cast<int>(y);
+      rows[y] = render::render_tile(world, {0, top, size.width, top + 1}, samples, nullptr, nullptr);
+    }
+  };
+  {
+    std::vector<std::jthread> pool;
+    for (int i = 0; i < threads; ++i) pool.emplace_back(work);
+  }
+  render::TileResult frame;
+  frame.sums.resize(kPlanes * count);
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    add(frame.health, rows[y].health);
+    for (std::size_t plane = 0; plane < kPlanes; ++plane)
+      std::copy_n(rows[y].sums.begin() + static_cast<std::ptrdiff_t>(plane * width), width,
+                  frame.sums.begin() + static_cast<std::ptrdiff_t>(plane * count + y * width));
+  }
+  return frame;
+}
+
+RenderSettings settings_of(const Scene& scene, std::uint64_t seed) {
+  RenderSettings settings;
+  settings.size = scene.film.image_size();
+  settings.seed = seed;
+  settings.integrator = scene.integrator.name;
+  settings.max_depth = scene.integrator.max_depth;
+  settings.rr_depth = scene.integrator.rr_depth;
+  return settings;
+}
+
 Result<Measured> measure(const Scene& given, const render::AssetFiles& files, std::uint64_t paths,
                          std::uint64_t seed, int threads) {
   const SystemClock clock;
@@ -84,12 +111,7 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
   scene.film.size = enough(given.film.size);
   scene.film.filter = BoxFilter{};
   const FrameSize size = scene.film.size;
-  RenderSettings settings;
-  settings.size = size;
-  settings.seed = seed;
-  settings.integrator = scene.integrator.name;
-  settings.max_depth = scene.integrator.max_depth;
-  settings.rr_depth = scene.integrator.rr_depth;
+  const RenderSettings settings = settings_of(scene, seed);
   const auto limit = render::limit_threads(threads);
   const auto world = render::build_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
@@ -97,7 +119,7 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
   const std::uint64_t per_half = std::max<std::uint64_t>(1, (paths + 2 * pixels - 1) / (2 * pixels));
   Measured m;
   m.paths = 2 * per_half * pixels;
-  collect(render_rows(**world, size, {0, 2 * per_half}, threads), size, static_cast<double>(per_half), m);
+  collect(render_frame(**world, size, {0, 2 * per_half}, threads), pixels, static_cast<double>(per_half), m);
   m.seconds = seconds(clock.now() - start);
   return m;
 }

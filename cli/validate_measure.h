@@ -10,12 +10,24 @@
 
 namespace ls::cli {
 
+// Of every cause.
+std::uint64_t samples_gone_wrong(const render::Health& health);
+void add(render::Health& sum, const render::Health& h);
+
+// Every pixel of `size` of a world, one row a task; the sums' planes are those of the whole frame.
+render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples, int threads);
+
+// What a scene asks for, and this seed.
+RenderSettings settings_of(const Scene& scene, std::uint64_t seed);
+
 struct Measured {
   enum Quantity { red, green, blue, luminance };  // Nori's weights: .212671, .715160, .072169
   std::array<double, 4> mean{}, standard_error{};
   std::array<double, 4> freedom{};  // of the standard error (Satterthwaite)
-  std::uint64_t nonfinite = 0, paths = 0;
+  render::Health health;
+  std::uint64_t paths = 0;
   double seconds = 0;
+  std::uint64_t unhealthy() const { return samples_gone_wrong(health); }
 };
 
 // At least `paths` samples, spread evenly over the frame whatever its filter. A frame of few pixels is given

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kTiny = 1e-300;  // stands for a 0 that would be divided by
 constexpr double kPrecision = 1e-15;
+constexpr double kFarOut = 1e12;  // no quantile is looked for beyond
 constexpr int kMostTerms = 100'000;
 
 // 1 / (b0 + a1 / (b1 + a2 / (b2 + ...))) by the method of Lentz; step(i) gives {a_i, b_i}, b0 = b(0).
@@ -71,6 +72,16 @@ double student_tails(double t, double freedom) {
   if (std::isnan(t)) return 0;
   if (std::isinf(t)) return 0;
   return beta_ratio(freedom / 2, .5, freedom / (freedom + t * t));
+}
+
+double student_quantile(double p, double freedom) {
+  double lo = 0, hi = 1;
+  while (student_tails(hi, freedom) > p && hi < kFarOut) hi *= 2;
+  for (int i = 0; i < 100; ++i) {
+    const double mid = (lo + hi) / 2;
+    (student_tails(mid, freedom) > p ? lo : hi) = mid;
+  }
+  return lo;
 }
 
 double chi2_tail(double x, double freedom) {

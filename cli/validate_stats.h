@@ -12,6 +12,9 @@ double sidak(double level, std::size_t n);
 // P(|T| > |t|) for Student's t of `freedom` degrees, which need not be whole.
 double student_tails(double t, double freedom);
 
+// x with P(|T| > x) = p, for p in (0, 1).
+double student_quantile(double p, double freedom);
+
 // P(X > x) for chi-square of `freedom` degrees.
 double chi2_tail(double x, double freedom);
 

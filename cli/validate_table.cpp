@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-
-#include "cli/validate_stats.h"
 
 namespace ls::cli {
 namespace {
@@ -18,27 +15,15 @@ ordered_json number(double x) { return std::isfinite(x) ? ordered_json(x) : orde
 
 }  // namespace
 
-void judge(ValidateCase& c, double freedom, double rounding) {
-  const double off = c.got - c.expected, beyond = std::max(0., std::abs(off) - rounding);
-  c.z = c.standard_error > 0 ? off / c.standard_error : 0;
-  c.p = c.standard_error > 0 ? student_tails(beyond / c.standard_error, freedom) : beyond > 0 ? 0. : 1.;
-  if (c.nonfinite > 0)
-    c.why = fmt::format("{} samples were not finite", c.nonfinite);
-  else if (!std::isfinite(c.got) || !std::isfinite(c.standard_error))
-    c.why = "the figure or its error is not finite";
-  else if (!(c.p > c.level))
-    c.why = fmt::format("p = {:.2g} is below {:.2g}", c.p, c.level);
-}
-
 std::string table_heading() {
-  return fmt::format("{:<40} {:>14} {:>14} {:>10} {:>7} {:>7} {:>8}", "case", "expected", "got", "stderr",
-                     "z", "verdict", "seconds");
+  return fmt::format("{:<60} {:>14} {:>14} {:>10} {:>7} {:>7} {:>9} {:>8}", "case", "expected", "got",
+                     "stderr", "z", "verdict", "nonfinite", "seconds");
 }
 
 std::string table_line(const ValidateCase& c) {
-  return fmt::format("{:<40} {:>14.8g} {:>14.8g} {:>10.2e} {:>7.2f} {:>7} {:>8.2f}{}", c.name, c.expected,
-                     c.got, c.standard_error, c.z, c.passed() ? "pass" : "FAIL", c.seconds,
-                     c.passed() ? "" : "  " + c.why);
+  return fmt::format("{:<60} {:>14.8g} {:>14.8g} {:>10.2e} {:>7.2f} {:>7} {:>9} {:>8.2f}{}", c.name,
+                     c.expected, c.got, c.standard_error, c.z, c.passed() ? "pass" : "FAIL", c.nonfinite,
+                     c.seconds, c.passed() ? "" : "  " + c.why);
 }
 
 ordered_json table_json(const std::vector<ValidateCase>& cases) {
@@ -56,7 +41,15 @@ ordered_json table_json(const std::vector<ValidateCase>& cases) {
                     {"verdict", c.passed() ? "pass" : "fail"},
                     {"nonfinite", c.nonfinite},
                     {"seconds", c.seconds}});
-    if (!c.passed()) list.back()["why"] = c.why;
+    ordered_json& line = list.back();
+    if (!c.kind.empty()) {
+      line["rows"] = c.rows;
+      line["about"] = c.about;
+      line["kind"] = c.kind;
+      line[c.kind == "exact" ? "tolerance" : "band"] = c.band;
+      line["paths"] = c.paths;
+    }
+    if (!c.passed()) line["why"] = c.why;
   }
   return {{"cases", std::move(list)}, {"passed", cases.size() - failed}, {"failed", failed}};
 }

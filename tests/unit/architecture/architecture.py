@@ -32,7 +32,9 @@ AREAS = {
     "coordinator": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble"],
     "coordinator/main.cpp": ["common", "coordinator/*"],
     # `lightshaft render` is coordinator and worker in one process.
-    "cli": ["common", "worker/*", "coordinator/*"],
+    "cli": ["common", "worker/*", "coordinator/*", "cli/cases"],
+    # The validation cases see no more than the renderer's public face and what measures and judges them.
+    "cli/cases": ["common", "worker/render", "cli/validate_measure.h", "cli/validate_stats.h", "cli/validate_case.h"],
 }
 # Made by the build.
 GENERATED = re.compile(r"^proto/\w+(\.grpc)?\.pb\.h$")

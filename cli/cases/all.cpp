@@ -1,0 +1,38 @@
+#include <utility>
+
+#include "cli/cases/case.h"
+
+namespace ls::cases {
+
+void Table::mean(std::string id, std::string rows, std::string about, Maker scene, const Channels& expected,
+                 MeanOptions options) {
+  options.channels = options.channels || expected[0] != expected[1] || expected[1] != expected[2];
+  cases_.push_back(
+      {std::move(id), std::move(rows), std::move(about), options, Mean{std::move(scene), expected}});
+}
+
+void Table::same(std::string id, std::string rows, std::string about, Maker scene, Maker other,
+                 MeanOptions options) {
+  cases_.push_back(
+      {std::move(id), std::move(rows), std::move(about), options, Same{std::move(scene), std::move(other)}});
+}
+
+void Table::exact(std::string id, std::string rows, std::string about,
+                  std::function<Figure(const Bench&)> check, bool slow) {
+  MeanOptions options;
+  options.slow = slow;
+  cases_.push_back({std::move(id), std::move(rows), std::move(about), options, Exact{std::move(check)}});
+}
+
+Table all_cases() {
+  Table t;
+  add_depths(t);
+  return t;
+}
+
+const std::vector<Elsewhere>& answered_elsewhere() {
+  static const std::vector<Elsewhere> rows;
+  return rows;
+}
+
+}  // namespace ls::cases

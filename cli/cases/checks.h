@@ -1,0 +1,35 @@
+// Exact checks: of single values, of bits, and of what is refused.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cli/cases/case.h"
+#include "worker/render/render.h"
+
+namespace ls::cases {
+
+// The frame as it stands, rendered with `spp` samples a pixel.
+struct Picture {
+  FrameSize size;
+  std::uint64_t spp = 0;
+  std::vector<float> sums;  // six planes, of the two halves
+  render::Health health;
+  std::uint64_t clamped_inputs = 0;
+  // Of a pixel and channel, over both halves.
+  double mean(std::size_t pixel, std::size_t channel) const;
+};
+Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed, int threads);
+
+// Of every pixel and channel the value that is farthest from the answer (as a share of it, where it is not
+// 0).
+Figure every_value(const Bench& bench, const SceneKit& kit, std::uint64_t spp, const Channels& expected,
+                   double tolerance);
+
+// How many of the sums of two scenes differ in a bit: 0.
+Figure same_bits(const Bench& bench, const SceneKit& a, const SceneKit& b, std::uint64_t spp);
+
+// 1 if the scene is refused with a message that has all of these in it.
+Figure refused(const Bench& bench, const SceneKit& kit, const std::vector<std::string>& words);
+
+}  // namespace ls::cases

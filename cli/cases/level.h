@@ -1,0 +1,25 @@
+// The one place where the table says how sure it is.
+#pragma once
+
+namespace ls::cases {
+
+// A right renderer fails any case of the whole table by chance with this probability at most, and a renderer
+// that is off by more than the band passes a case with no more: shared by all intervals of the table (Sidak),
+// whichever of them are run.
+inline constexpr double kWrongVerdicts = 1e-3;
+
+// Radiance is float32: a path of n vertices multiplies about 10 n numbers, each rounded by 2^-24, and errors
+// of many samples partly share their sign. Holds for paths of 25 vertices in the worst case.
+inline constexpr double kRounding = 0x1p-16;
+
+// Of the standard error: with fewer, a few pixels rule it and it is not believed. Not asked where the error
+// is below what float32 is allowed.
+inline constexpr double kLeastFreedom = 40;
+
+// The quick table asks the same questions with bands wider by this factor: a tenth of the paths.
+inline constexpr double kQuickWidening = 10. / 3;
+
+// A case that would need more paths than this fails.
+inline constexpr double kMostPaths = 1 << 27, kMostQuickPaths = 1 << 24;
+
+}  // namespace ls::cases

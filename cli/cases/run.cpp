@@ -1,0 +1,230 @@
+#include "cli/cases/run.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/cases/level.h"
+#include "cli/validate_measure.h"
+#include "cli/validate_stats.h"
+#include "common/base/clock.h"
+#include "common/base/overloaded.h"
+
+namespace ls::cases {
+namespace {
+
+using cli::Measured;
+using cli::ValidateCase;
+
+// Of the first run, which finds how many paths the answer takes.
+constexpr std::uint64_t kPilotPaths = 1 << 13;
+// Bands are reached with this to spare, since the first run's variance is itself an estimate; where that was
+// far off, the case is run again with so many times the paths, twice at most.
+constexpr double kSpare = 1.15, kAgain = 4;
+constexpr int kAttempts = 3;
+
+// FNV-1a: a case keeps its numbers whatever stands beside it in the table.
+std::uint64_t seed_of(const std::string& id, std::uint64_t seed, std::uint64_t attempt) {
+  std::uint64_t h = 0xcbf29ce484222325ull;
+  const auto eat = [&h](std::uint64_t byte) { h = (h ^ byte) * 0x100000001b3ull; };
+  for (const char c : id) eat(static_cast<unsigned char>(c));
+  for (int i = 0; i < 8; ++i) eat((seed >> (8 * i)) & 255);
+  eat(attempt);
+  return h;
+}
+
+std::size_t lines_of(const Case& c) { return c.options.channels ? 3 : 1; }
+
+class Runner {
+ public:
+  Runner(const RunOptions& options, double level) : options_(options), level_(level) {}
+
+  void run(const Case& c) {
+    case_ = &c;
+    std::visit(overloaded{[&](const Exact& e) { exact(e); },
+                          [&](const Mean& m) {
+                            measured([&](std::uint64_t paths, std::uint64_t seed) {
+                              return with_expected(m, paths, seed);
+                            });
+                          },
+                          [&](const Same& s) {
+                            measured([&](std::uint64_t paths, std::uint64_t seed) {
+                              return difference(s, paths, seed);
+                            });
+                          }},
+               c.question);
+  }
+  std::vector<ValidateCase> take() { return std::move(lines_); }
+
+ private:
+  // A mean, what it should be, and in which error.
+  struct Sight {
+    Channels expected, got, error, freedom;
+    std::uint64_t unhealthy = 0, paths = 0;
+    double seconds = 0;
+  };
+
+  Result<Measured> look(const Maker& make, std::uint64_t paths, std::uint64_t seed) const {
+    const SceneKit kit = make();
+    return cli::measure(kit.scene, kit.files, paths, seed, options_.threads);
+  }
+
+  Result<Sight> with_expected(const Mean& mean, std::uint64_t paths, std::uint64_t seed) const {
+    const auto m = look(mean.scene, paths, seed);
+    if (!m) return tl::unexpected(m.error());
+    Sight s{mean.expected, {}, {}, {}, m->unhealthy(), m->paths, m->seconds};
+    for (std::size_t k = 0; k < 3; ++k) {
+      s.got[k] = case_->options.complement ? 1 - m->mean[k] : m->mean[k];
+      s.error[k] = m->standard_error[k];
+      s.freedom[k] = m->freedom[k];
+    }
+    return s;
+  }
+
+  Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
+    const auto a = look(same.scene, paths, seed), b = look(same.other, paths, ~seed);
+    if (!a) return tl::unexpected(a.error());
+    if (!b) return tl::unexpected(b.error());
+    Sight s{{}, {}, {}, {}, a->unhealthy() + b->unhealthy(), a->paths + b->paths, a->seconds + b->seconds};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double va = a->standard_error[k] * a->standard_error[k],
+                   vb = b->standard_error[k] * b->standard_error[k];
+      s.got[k] = a->mean[k];
+      s.expected[k] = b->mean[k];
+      s.error[k] = std::sqrt(va + vb);
+      // Welch and Satterthwaite.
+      const double spread = va * va / a->freedom[k] + vb * vb / b->freedom[k];
+      s.freedom[k] = spread > 0 ? (va + vb) * (va + vb) / spread : a->freedom[k];
+    }
+    return s;
+  }
+
+  double band() const { return case_->options.band * (options_.quick ? kQuickWidening : 1); }
+  // What does not depend on chance, of an interval's half width.
+  double unknown(double expected) const { return (kRounding + case_->options.slack) * std::abs(expected); }
+
+  // How many times the paths it takes for intervals of half the band.
+  double growth(const Sight& s) const {
+    double worst = 0;
+    for (std::size_t k = 0; k < lines_of(*case_); ++k) {
+      const std::size_t c = channel(k);
+      const double room = band() * std::abs(s.expected[c]) - unknown(s.expected[c]);
+      const double wanted = room / (2 * kSpare * cli::student_quantile(level_, 1e3));
+      const double ratio = s.error[c] / wanted;
+      worst = std::max(worst, room > 0 ? ratio * ratio : kMostPaths);
+    }
+    return worst;
+  }
+
+  template <class Look>
+  void measured(Look look) {
+    const std::string& id = case_->id;
+    const double most = options_.quick ? kMostQuickPaths : kMostPaths;
+    auto s = look(kPilotPaths, seed_of(id, options_.seed, 0));
+    if (!s) return failed(s.error().message);
+    double paths = std::clamp(static_cast<double>(s->paths) * growth(*s), double{kPilotPaths}, most);
+    for (int attempt = 1;; ++attempt) {
+      s = look(static_cast<std::uint64_t>(paths),
+               seed_of(id, options_.seed, static_cast<std::uint64_t>(attempt)));
+      if (!s) return failed(s.error().message);
+      std::vector<ValidateCase> lines;
+      bool wide = false;
+      for (std::size_t k = 0; k < lines_of(*case_); ++k) lines.push_back(judged(*s, k, wide));
+      if (wide && attempt < kAttempts && paths < most) {
+        paths = std::min(most, kAgain * paths);
+        continue;
+      }
+      for (ValidateCase& line : lines) add(std::move(line));
+      return;
+    }
+  }
+
+  std::size_t channel(std::size_t line) const { return case_->options.channels ? line : 1; }
+
+  ValidateCase judged(const Sight& s, std::size_t line, bool& wide) const {
+    static const char* const kNames[] = {"/red", "/green", "/blue"};
+    const std::size_t k = channel(line);
+    ValidateCase c = blank(case_->options.channels ? kNames[line] : "");
+    c.kind = "statistical";
+    c.expected = s.expected[k];
+    c.got = s.got[k];
+    c.standard_error = s.error[k];
+    c.band = band();
+    c.level = level_;
+    c.nonfinite = s.unhealthy;
+    c.paths = s.paths;
+    c.seconds = s.seconds / static_cast<double>(lines_of(*case_));
+    cli::judge_equivalence(c, s.freedom[k], unknown(c.expected), kRounding * std::abs(c.expected),
+                           kLeastFreedom);
+    wide = wide || c.too_wide;
+    return c;
+  }
+
+  void exact(const Exact& e) {
+    const SystemClock clock;
+    const TimePoint start = clock.now();
+    const Figure f = e.check({seed_of(case_->id, options_.seed, 0), options_.threads});
+    ValidateCase c = blank("");
+    c.kind = "exact";
+    c.expected = f.expected;
+    c.got = f.got;
+    c.band = f.tolerance;
+    c.nonfinite = f.unhealthy;
+    c.seconds = seconds(clock.now() - start);
+    c.why = f.why;
+    if (c.why.empty() && f.unhealthy > 0) c.why = fmt::format("{} samples went wrong", f.unhealthy);
+    if (c.why.empty() && !(std::abs(f.got - f.expected) <= f.tolerance))
+      c.why = fmt::format("off by {:.3g}, allowed is {:.3g}", std::abs(f.got - f.expected), f.tolerance);
+    add(std::move(c));
+  }
+
+  void failed(const std::string& why) {
+    ValidateCase c = blank("");
+    c.kind = "statistical";
+    c.why = why;
+    add(std::move(c));
+  }
+
+  ValidateCase blank(const char* suffix) const {
+    ValidateCase c;
+    c.name = case_->id + suffix;
+    c.rows = case_->rows;
+    c.about = case_->about;
+    return c;
+  }
+  void add(ValidateCase c) {
+    if (options_.done) options_.done(c);
+    lines_.push_back(std::move(c));
+  }
+
+  const RunOptions& options_;
+  double level_;
+  const Case* case_ = nullptr;
+  std::vector<ValidateCase> lines_;
+};
+
+}  // namespace
+
+double level_of(const Table& table) {
+  std::size_t intervals = 0;
+  for (const Case& c : table.cases())
+    intervals += std::holds_alternative<Exact>(c.question) ? 0 : lines_of(c);
+  return cli::sidak(kWrongVerdicts, intervals);
+}
+
+bool asked_for(const std::string& id, const std::string& only) {
+  return id.starts_with(only) || ::fnmatch(only.c_str(), id.c_str(), 0) == 0;
+}
+
+std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& options) {
+  Runner runner(options, level_of(table));
+  for (const Case& c : table.cases()) {
+    if (!asked_for(c.id, options.only) || (options.quick && c.options.slow)) continue;
+    runner.run(c);
+  }
+  return runner.take();
+}
+
+}  // namespace ls::cases

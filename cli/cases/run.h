@@ -1,0 +1,31 @@
+// Runs cases: measures, and judges by equivalence.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cli/cases/case.h"
+#include "cli/validate_case.h"
+
+namespace ls::cases {
+
+struct RunOptions {
+  int threads = 1;
+  std::uint64_t seed = 0;
+  bool quick = false;
+  std::string only;                                         // prefix or glob of ids; empty: all
+  std::function<void(const cli::ValidateCase&)> done = {};  // after each line of the table
+};
+
+// The lines of the report; a case whose channels differ has one for each. A scene that can't be built is a
+// failed line.
+std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& options);
+
+// What each interval of the table may be wrong by, either way.
+double level_of(const Table& table);
+
+bool asked_for(const std::string& id, const std::string& only);
+
+}  // namespace ls::cases

@@ -1,0 +1,104 @@
+// How the table's cases are judged: a renderer that is off by the band fails, and so do too few samples.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "cli/cases/run.h"
+#include "cli/cases/ways.h"
+#include "cli/validate_stats.h"
+
+namespace ls::cases {
+namespace {
+
+cli::ValidateCase judged(double got, double error, double band, double freedom = 1000, double unknown = 0) {
+  cli::ValidateCase c;
+  c.expected = 2;
+  c.got = got;
+  c.standard_error = error;
+  c.band = band;
+  c.level = .01;  // +- 2.58 standard errors
+  judge_equivalence(c, freedom, unknown, 1e-9, 40);
+  return c;
+}
+
+TEST(Equivalence, PassesOnlyIfTheIntervalLiesInTheBandAndCoversTheAnswer) {
+  EXPECT_TRUE(judged(2, .001, .003).passed());
+  EXPECT_TRUE(judged(2.002, .001, .003).passed());
+  EXPECT_FALSE(judged(2.004, .001, .003).passed()) << "inside the band, but far off by its own error";
+  EXPECT_FALSE(judged(2, .003, .003).passed()) << "nobody knows";
+  EXPECT_TRUE(judged(2, .003, .003).too_wide);
+  EXPECT_FALSE(judged(2.004, .001, .003).too_wide);
+  EXPECT_FALSE(judged(2, .001, .003, 20).passed()) << "a few pixels rule";
+  EXPECT_TRUE(judged(2.0001, 0, .003, 1000, .0002).passed());
+  EXPECT_FALSE(judged(2.0003, 0, .003, 1000, .0002).passed());
+  EXPECT_FALSE(judged(std::nan(""), 0, .003).passed());
+}
+
+TEST(Equivalence, QuantilesAreThoseOfTheTables) {
+  EXPECT_NEAR(cli::student_quantile(.05, 10), 2.228139, 1e-6);
+  EXPECT_NEAR(cli::student_quantile(.01, 1e9), 2.575829, 1e-5);
+}
+
+// White light through half a mean free path.
+Table one_case(double expected, double band) {
+  Table t;
+  t.mean("one", "N0", "",
+         [] {
+           SceneKit kit;
+           kit.container(CubeShape{}, {}, kit.null(), kit.homogeneous(rgb(.25), rgb(.5)));
+           kit.environment();
+           kit.scene.integrator.max_depth = 1;
+           kit.look({-3, .5, .5}, {.5, .5, .5});
+           return kit;
+         },
+         grey(expected), {.band = band});
+  return t;
+}
+
+TEST(Cases, ARightAnswerPassesAndOneThatIsOffByTheBandFails) {
+  const double right = std::exp(-.5);
+  EXPECT_TRUE(run_cases(one_case(right, .01), {}).at(0).passed());
+  EXPECT_FALSE(run_cases(one_case(right * 1.01, .01), {}).at(0).passed());
+  EXPECT_FALSE(run_cases(one_case(right * .99, .01), {}).at(0).passed());
+}
+
+TEST(Cases, TakeThePathsThatTheirBandAsksFor) {
+  const auto wide = run_cases(one_case(std::exp(-.5), .02), {}).at(0),
+             narrow = run_cases(one_case(std::exp(-.5), .002), {}).at(0);
+  EXPECT_GT(narrow.paths, 5 * wide.paths);
+  EXPECT_TRUE(narrow.passed()) << narrow.why;
+}
+
+TEST(Cases, ASceneThatIsRefusedFails) {
+  Table t;
+  t.mean(
+      "bad", "N0", "",
+      [] {
+        SceneKit kit;
+        kit.container(CubeShape{}, {}, kit.null(), kit.homogeneous(rgb(1e38), rgb(0)));
+        return kit;
+      },
+      grey(1));
+  const auto line = run_cases(t, {}).at(0);
+  EXPECT_NE(line.why.find("extinction"), std::string::npos) << line.why;
+}
+
+TEST(Cases, AreAskedForByPrefixOrGlob) {
+  EXPECT_TRUE(asked_for("N03-slab/grid/volpath", ""));
+  EXPECT_TRUE(asked_for("N03-slab/grid/volpath", "N03"));
+  EXPECT_TRUE(asked_for("N03-slab/grid/volpath", "*grid*"));
+  EXPECT_FALSE(asked_for("N03-slab/grid/volpath", "grid"));
+}
+
+TEST(Cases, HaveIdsAndRowsOfTheirOwn) {
+  std::set<std::string> ids;
+  const Table table = all_cases();
+  for (const Case& c : table.cases()) {
+    EXPECT_TRUE(ids.insert(c.id).second) << c.id << " is there twice";
+    EXPECT_FALSE(c.rows.empty() || c.about.empty()) << c.id;
+  }
+}
+
+}  // namespace
+}  // namespace ls::cases
