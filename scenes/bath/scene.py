@@ -8,9 +8,9 @@ CAMERA, TARGET, FOV = (0.45, 1.32, 3.45), (0.08, 1.30, -1.0), 63
 
 # name: (reflectance as rgb or image, roughness) of what is diffuse under a glossy coat
 COATED = {
-    "enamel": ("0.80, 0.79, 0.75", .05),
+    "enamel": ("0.80, 0.79, 0.75", .13),
     "clay": ("0.33, 0.115, 0.06", .22),
-    "amber": ("0.20, 0.075, 0.012", .05),
+    "amber": ("0.20, 0.075, 0.012", .13),
     "leaf": ("0.045, 0.115, 0.028", .22),
 }
 
@@ -49,16 +49,16 @@ def materials():
     boards = image("diffuse_reflectance", "floor.png")
     out += ('  <bsdf type="normalmap" id="floor">' + image("normalmap", "floor_normal.png", raw=True)
             + '<bsdf type="blendbsdf">' + image("weight", "puddles.png", raw=True)
-            + coated(boards, .24) + coated(boards, .045) + '</bsdf></bsdf>\n')
+            + coated(boards, .24) + coated(boards, .11) + '</bsdf></bsdf>\n')
     out += ('  <bsdf type="normalmap" id="tiles">' + image("normalmap", "tiles_normal.png", raw=True)
-            + coated(image("diffuse_reflectance", "tiles.png"), .06) + '</bsdf>\n')
+            + coated(image("diffuse_reflectance", "tiles.png"), .14) + '</bsdf>\n')
     lime = image("reflectance", "plaster.png", '<scale x="0.4" y="0.4"/>')
     out += f'  <bsdf type="twosided" id="plaster"><bsdf type="diffuse">{lime}</bsdf></bsdf>\n'
     oak = image("diffuse_reflectance", "wood.png", '<scale x="2" y="0.5"/>', mirror=True)
     out += f'  <bsdf type="twosided" id="wood">{coated(oak, .25)}</bsdf>\n'
     out += f'  <bsdf type="twosided" id="towel"><bsdf type="diffuse">{image("reflectance", "towel.png")}</bsdf></bsdf>\n'
     out += ('  <bsdf type="twosided" id="brass"><bsdf type="roughconductor"><string name="distribution" value="ggx"/>'
-            '<float name="alpha" value="0.12"/><rgb name="eta" value="0.444, 0.527, 1.094"/>'
+            '<float name="alpha" value="0.2"/><rgb name="eta" value="0.444, 0.527, 1.094"/>'
             '<rgb name="k" value="3.695, 2.765, 1.829"/></bsdf></bsdf>\n')
     out += '  <bsdf type="twosided" id="mirror"><bsdf type="conductor"><string name="material" value="Ag"/></bsdf></bsdf>\n'
     out += '  <bsdf type="thindielectric" id="water"><float name="int_ior" value="1.33"/></bsdf>\n'
