@@ -24,6 +24,17 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   return LocalWorld{std::move(intake->job), std::move(*world)};
 }
 
+tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
+    const LocalScene& scene, const RenderSettings& settings, int threads) {
+  render::AssetFiles files;
+  for (const auto& [name, file] : scene.files) files.emplace(file.digest, file.path);
+  auto world = render::build_world(scene.scene, settings, files, threads);
+  if (world) return std::move(*world);
+  if (world.error().code == Errc::invalid_argument)
+    return tl::unexpected(scene_fault(scene, world.error().message));
+  return tl::unexpected(coordinator::Rejected{world.error(), {}});
+}
+
 coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text) {
   Diagnostic d;
   d.place.file = scene.name;

@@ -18,6 +18,10 @@ struct LocalWorld {
 tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
                                                                   const JobSpec& spec, int threads);
 
+// The world of settings that an image was rendered with: nothing of them is left to the scene.
+tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
+    const LocalScene& scene, const RenderSettings& settings, int threads);
+
 // What is wrong with one of the scene's files, as a diagnostic of the scene as a whole.
 coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text);
 

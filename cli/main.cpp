@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   add_farm_commands(app, action);
   add_merge(app, action);
   add_validate(app, action);
+  add_verify(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

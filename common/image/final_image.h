@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,20 @@ struct FinalImage {
 };
 // Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp. Works on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+
+// A final EXR of somebody's, read back: the layers that every one has, and all its header strings. Sizes are
+// bounded.
+inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
+struct FinalPicture {
+  FrameSize size;
+  std::vector<float> rgb;          // interleaved, row by row, as stored
+  std::vector<std::uint32_t> spp;  // samples of each pixel
+  bool half = false;               // colours are stored as halves
+  std::map<std::string, std::string> strings;
+};
+// invalid_argument: what is missing or wrong.
+Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name);
+float as_half(float value);  // rounded to a half, as stored in one
 
 // 8-bit sRGB (IEC 61966-2-1, rounded to nearest) of a linear pixel times `scale`; magenta if a channel is
 // NaN.

@@ -1,0 +1,180 @@
+// lightshaft verify: is this image what its scene gives?
+#include <fmt/format.h>
+
+#include <atomic>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/job_options.h"
+#include "cli/local_scene.h"
+#include "cli/local_world.h"
+#include "cli/say.h"
+#include "cli/verify_image.h"
+#include "common/base/plain_text.h"
+#include "common/scene/serialize.h"
+#include "coordinator/store/files.h"
+#include "worker/machine.h"
+#include "worker/render/thread_limit.h"
+
+namespace ls::cli {
+namespace {
+
+constexpr std::uint64_t kDefaultTiles = 4;
+
+struct Flags {
+  std::string image, scene, frame, tiles, seed;
+  std::vector<std::string> defines;
+  int threads = 0;
+  bool json = false;
+};
+
+Result<SealedImage> open_image(const std::string& path) {
+  const auto bytes = coordinator::read_file(path, kMaxFinalBytes);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return read_sealed_image(*bytes, path);
+}
+
+// What must be equal before anything can be: the scene and the arithmetic.
+Result<void> check_same(const SealedImage& image, const LocalScene& scene, const Flags& flags) {
+  if (const Digest mine = digest_of(scene.scene); mine != image.scene)
+    return fail(
+        Errc::invalid_argument,
+        fmt::format(
+            "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D "
+            "and --frame",
+            flags.image, image.scene.hex(), flags.scene, mine.hex()));
+  if (render::numeric_class() != image.numeric_class)
+    return fail(
+        Errc::failed_precondition,
+        fmt::format(
+            "{} was rendered in numeric class {} (build \"{}\"), and this machine and build are of class {}: "
+            "bits can only be compared within one class. Run verify with that build, on such a machine",
+            flags.image, image.numeric_class.hex().substr(0, 12), plain_text(image.build),
+            render::numeric_class().hex().substr(0, 12)));
+  return {};
+}
+
+nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, std::uint64_t seed) {
+  nlohmann::ordered_json j{{"seed", seed}, {"tiles", nlohmann::ordered_json::array()}};
+  std::size_t wrong = 0;
+  for (const VerifiedTile& t : tiles) {
+    wrong += t.problem.empty() ? 0 : 1;
+    j["tiles"].push_back({{"tile", t.tile},
+                          {"rect", {t.rect.x0, t.rect.y0, t.rect.x1, t.rect.y1}},
+                          {"spp", t.spp},
+                          {"verdict", t.problem.empty() ? "pass" : "fail"},
+                          {"problem", t.problem}});
+  }
+  j["verdict"] = wrong == 0 ? "pass" : "fail";
+  return j;
+}
+
+std::string line_of(const VerifiedTile& t) {
+  return fmt::format("tile {} [{},{} to {},{}), {} samples: {}", t.tile, t.rect.x0, t.rect.y0, t.rect.x1,
+                     t.rect.y1, t.spp, t.problem.empty() ? "as sealed" : t.problem);
+}
+
+// One tile per thread at a time.
+std::vector<VerifiedTile> verify_all(const render::World& world, const SealedImage& image,
+                                     const std::vector<TileIndex>& tiles, int threads, bool quiet,
+                                     const std::atomic<bool>& stop) {
+  std::vector<VerifiedTile> out(tiles.size());
+  std::atomic<std::size_t> next{0};
+  std::mutex printing;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < tiles.size(); i = next++) {
+      out[i] = verify_tile(world, image, tiles[i], stop);
+      const std::lock_guard lock(printing);
+      if (!quiet) print(line_of(out[i]));
+    }
+  };
+  std::vector<std::jthread> team;
+  for (int k = 1; k < std::min<int>(threads, static_cast<int>(tiles.size())); ++k) team.emplace_back(work);
+  work();
+  team.clear();
+  return out;
+}
+
+struct Numbers {
+  std::uint64_t tiles = kDefaultTiles, seed = 0;
+  std::optional<std::uint32_t> frame;
+};
+Result<Numbers> numbers_of(const Flags& flags) {
+  Numbers n;
+  n.seed = std::random_device{}();
+  const auto read = [](const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
+                       std::uint64_t& to) -> Result<void> {
+    if (text.empty()) return {};
+    const auto number = parse_whole(name, text, least, most);
+    if (!number) return tl::unexpected(number.error());
+    to = *number;
+    return {};
+  };
+  std::uint64_t frame = 0;
+  if (const auto ok = read("--tiles", flags.tiles, 1, UINT32_MAX, n.tiles); !ok)
+    return tl::unexpected(ok.error());
+  if (const auto ok = read("--seed", flags.seed, 0, UINT64_MAX, n.seed); !ok)
+    return tl::unexpected(ok.error());
+  if (const auto ok = read("--frame", flags.frame, 0, kMaxFrameNumber, frame); !ok)
+    return tl::unexpected(ok.error());
+  if (!flags.frame.empty()) n.frame = static_cast<std::uint32_t>(frame);
+  return n;
+}
+
+int run(const Flags& flags) {
+  Interrupt interrupt;
+  const auto numbers = numbers_of(flags);
+  if (!numbers) return say_error(numbers.error());
+  const auto defines = parse_defines(flags.defines);
+  if (!defines) return say_error(defines.error());
+  const auto image = open_image(flags.image);
+  if (!image) return say_error(image.error());
+  const auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame);
+  if (!scene) return say_rejected(scene.error());
+  if (const auto same = check_same(*image, *scene, flags); !same) return say_error(same.error());
+  const int threads = flags.threads > 0 ? flags.threads : worker::usable_cpus();
+  const auto limit = render::limit_threads(threads);
+  const auto world = build_world_again(*scene, image->settings, threads);
+  if (!world) return say_rejected(world.error());
+  std::atomic<bool> stop{false};
+  interrupt.on_signal([&] { stop = true; });
+  const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
+  const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
+  if (flags.json) print(to_json(verified, numbers->seed).dump(2));
+  const auto wrong =
+      std::count_if(verified.begin(), verified.end(), [](const auto& t) { return !t.problem.empty(); });
+  if (!flags.json)
+    print(fmt::format("{} of {} tiles are as sealed ({} in the image; the same choice again: --seed {})",
+                      verified.size() - static_cast<std::size_t>(wrong), verified.size(),
+                      image->grid().count(), numbers->seed));
+  return wrong > 0 ? kFailed : kOk;
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* verify = app.add_subcommand(
+      "verify",
+      "render random tiles of a finished image again and compare them with the digests sealed in it");
+  verify->add_option("image", flags->image, "a finished EXR")->required()->type_name("OUT.exr");
+  verify->add_option("--scene", flags->scene, "the scene it was rendered from")
+      ->required()
+      ->type_name("SCENE");
+  verify->add_option("--tiles", flags->tiles, fmt::format("how many (default {})", kDefaultTiles))
+      ->type_name("K");
+  verify->add_option("--seed", flags->seed, "chooses the tiles; default: anew each time")->type_name("N");
+  verify->add_option("-D,--define", flags->defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  verify->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  verify->add_option("--threads", flags->threads, "default: all")->type_name("N")->check(CLI::Range(1, 1024));
+  verify->add_flag("--json", flags->json, "as JSON");
+  verify->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

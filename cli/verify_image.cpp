@@ -1,0 +1,61 @@
+#include "cli/verify_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+#include "common/image/film.h"
+#include "common/image/rounds.h"
+
+namespace ls::cli {
+
+std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed) {
+  std::vector<TileIndex> tiles(all);
+  std::iota(tiles.begin(), tiles.end(), TileIndex{0});
+  if (count >= all) return tiles;
+  std::mt19937_64 random(seed);
+  std::vector<TileIndex> chosen;
+  std::sample(tiles.begin(), tiles.end(), std::back_inserter(chosen), static_cast<std::ptrdiff_t>(count),
+              random);
+  return chosen;
+}
+
+VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
+                         const std::atomic<bool>& stop) {
+  VerifiedTile out{tile, image.grid().rect(tile), 0, {}};
+  const auto spp = tile_samples(image, tile);
+  if (!spp) {
+    out.problem = spp.error().message;
+    return out;
+  }
+  out.spp = *spp;
+  Film film(image.grid());
+  const Digest settings = digest_of(image.settings);
+  for (RoundIndex k = 0; *spp > 0 && k < round_count(*spp); ++k) {
+    const SampleRange samples = cut_range(k, *spp);
+    render::TileResult rendered = render::render_tile(world, out.rect, samples, &stop, nullptr);
+    if (rendered.stopped) {
+      out.problem = "told to stop before it was rendered";
+      return out;
+    }
+    const Partial partial{{image.scene, settings, image.numeric_class, out.rect, samples},
+                          std::move(rendered.sums)};
+    if (const auto folded = film.fold(tile, k, partial); !folded) {
+      out.problem = folded.error().message;
+      return out;
+    }
+  }
+  if (film.tile_digest(tile) != image.tiles[tile])
+    out.problem = fmt::format("rendered again it is {}, the image seals {}", film.tile_digest(tile).hex(),
+                              image.tiles[tile].hex());
+  else if (const auto pixel = first_difference(image, film.pixels(tile)))
+    out.problem = fmt::format(
+        "its seal is right, but pixel {},{} has another colour than its samples give: the "
+        "image was changed afterwards",
+        pixel->first, pixel->second);
+  return out;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,32 @@
+// `lightshaft verify`: tiles of a finished image, rendered again and compared with what the image says of
+// them.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/job/sealed_image.h"
+#include "worker/render/render.h"
+
+namespace ls::cli {
+
+struct VerifiedTile {
+  TileIndex tile = 0;
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  std::string problem;  // empty: digest and pixels are what they should be
+};
+
+// `count` different tiles out of all, or all if there are no more; a function of the seed, in order of
+// number.
+std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed);
+
+// Renders all rounds of the tile and compares: the chain over its units' digests with the one sealed in the
+// image, and its pixels with those in the image. The world is that of the image's scene and settings.
+VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
+                         const std::atomic<bool>& stop);
+
+}  // namespace ls::cli

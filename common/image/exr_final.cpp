@@ -1,0 +1,84 @@
+// Reads a final EXR back. One of the exr_* files: OpenEXR's door.
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfPartType.h>
+#include <ImfStringAttribute.h>
+#include <half.h>
+
+#include "common/image/exr_headers.h"
+#include "common/image/exr_memory.h"
+#include "common/image/final_image.h"
+#include "common/image/render_limits.h"
+
+namespace ls {
+namespace {
+
+constexpr const char* kColours[3] = {"R", "G", "B"};
+
+tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
+  return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
+}
+
+Result<void> check_layers(const Imf::Header& header, const std::string& name, FinalPicture& image) {
+  for (const char* colour : kColours) {
+    const Imf::Channel* channel = header.channels().findChannel(colour);
+    if (!channel || channel->type == Imf::UINT || channel->xSampling != 1 || channel->ySampling != 1)
+      return bad(name, fmt::format("it has no layer {} of half or float", colour));
+    image.half = channel->type == Imf::HALF;
+  }
+  const Imf::Channel* spp = header.channels().findChannel("spp");
+  if (!spp || spp->type != Imf::UINT || spp->xSampling != 1 || spp->ySampling != 1)
+    return bad(name, "it has no layer spp of integers");
+  return {};
+}
+
+void read_pixels(Imf::InputFile& file, FinalPicture& image) {
+  const auto width = static_cast<std::size_t>(image.size.width),
+             pixels = width * static_cast<std::size_t>(image.size.height);
+  image.rgb.resize(3 * pixels);
+  image.spp.resize(pixels);
+  Imf::FrameBuffer buffer;
+  for (std::size_t c = 0; c < 3; ++c)
+    buffer.insert(kColours[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&image.rgb[c]),
+                                          3 * sizeof(float), 3 * sizeof(float) * width));
+  buffer.insert("spp", Imf::Slice(Imf::UINT, reinterpret_cast<char*>(image.spp.data()), sizeof(std::uint32_t),
+                                  sizeof(std::uint32_t) * width));
+  file.setFrameBuffer(buffer);
+  file.readPixels(0, image.size.height - 1);
+}
+
+Result<FinalPicture> read(std::span<const std::byte> exr, const std::string& name) {
+  const ExrLimits limits{.max_bytes = kMaxFinalBytes,
+                         .max_pixels = static_cast<std::uint64_t>(kMaxFramePixels),
+                         .max_side = kMaxFrameSide};
+  if (exr.size() > limits.max_bytes) return bad(name, "the file is larger than any image of ours");
+  if (const auto ok = exr::check_headers(exr, name, limits); !ok) return tl::unexpected(ok.error());
+  exr::MemoryReader in(exr, name);
+  Imf::InputFile file(in, /*numThreads=*/0);
+  const Imf::Header& header = file.header();
+  const Imath::Box2i data = header.dataWindow();
+  if ((header.hasType() && header.type() != Imf::SCANLINEIMAGE) || data != header.displayWindow() ||
+      data.min != Imath::V2i(0, 0))
+    return bad(name, "it is no scanline image whose windows begin at 0, 0");
+  FinalPicture image;
+  image.size = {data.max.x + 1, data.max.y + 1};
+  if (const auto ok = check_layers(header, name, image); !ok) return tl::unexpected(ok.error());
+  for (auto at = header.begin(); at != header.end(); ++at)
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute()))
+      image.strings.emplace(at.name(), text->value());
+  read_pixels(file, image);
+  return image;
+}
+
+}  // namespace
+
+float as_half(float value) { return half(value); }
+
+Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name) {
+  return exr::guarded(Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name),
+                      [&] { return read(exr, name); });
+}
+
+}  // namespace ls
