@@ -14,7 +14,7 @@ namespace {
 using test::make_film;
 using ::testing::HasSubstr;
 
-const TileGrid kGrid{{20, 13}, 8};
+const TileGrid kGrid{{25, 13}, 8};
 
 RenderSettings settings() {
   RenderSettings s;
@@ -69,11 +69,11 @@ TEST(SealedImage, GivesBackWhatTheFinalImageHolds) {
 TEST(SealedImage, FindsTheFirstPixelThatIsNotOfItsSamples) {
   const Film film = make_film(kGrid, 6);
   auto image = read_sealed_image(sealed(film, false), "image.exr").value();
-  const int x = 11, y = 9;  // of tile 4, which begins at 8, 8
-  float& green = image.rgb[3 * (y * 20 + x) + 1];
+  const int x = 11, y = 9;  // of tile 5, which begins at 8, 8
+  float& green = image.rgb[3 * (y * 25 + x) + 1];
   green = std::nextafter(green, 1e9f);
 
-  EXPECT_EQ(first_difference(image, film.pixels(4)), std::pair(x, y));
+  EXPECT_EQ(first_difference(image, film.pixels(5)), std::pair(x, y));
   EXPECT_FALSE(first_difference(image, film.pixels(3)));
 }
 
@@ -87,7 +87,7 @@ TEST(SealedImage, ATileHasOneCountOfSamples) {
   EXPECT_FALSE(tile_samples(image, 1));
   EXPECT_TRUE(tile_samples(image, 2));
   for (int y = 0; y < 8; ++y)
-    for (int x = 8; x < 16; ++x) image.spp[y * 20 + x] = 7;
+    for (int x = 8; x < 16; ++x) image.spp[y * 25 + x] = 7;
   EXPECT_THAT(tile_samples(image, 1).error().message, HasSubstr("has 7 samples"));
 }
 
@@ -101,9 +101,9 @@ TEST(SealedImage, NamesTheHeaderThatIsWrong) {
   EXPECT_THAT(refusal(changed(good, scene, std::string(64, 'x'))),
               HasSubstr("\"lightshaft:scene\" is no SHA-256"));
   EXPECT_THAT(refusal(changed(good, tile, std::string(64, 'x'))), HasSubstr("tile 3 of its header"));
-  EXPECT_THAT(refusal(changed(good, "\"tile\":8", "\"tile\":4")), HasSubstr("does not name 20 tiles"));
-  EXPECT_THAT(refusal(changed(good, "[20,13]", "[21,13]")),
-              HasSubstr("20 x 13 pixels, its settings say 21 x 13"));
+  EXPECT_THAT(refusal(changed(good, "\"tile\":8", "\"tile\":9")), HasSubstr("does not name 6 tiles"));
+  EXPECT_THAT(refusal(changed(good, "[25,13]", "[26,13]")),
+              HasSubstr("25 x 13 pixels, its settings say 26 x 13"));
 }
 
 TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
