@@ -1,0 +1,190 @@
+#include "common/image/convergence.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "common/image/rounds.h"
+
+namespace ls {
+namespace {
+
+constexpr double kNormal95 = 1.959964;
+constexpr double kLeastSpp = 8;  // below, halves of one or two samples say little of their variance
+constexpr double kPriorSpread = .15;
+constexpr double kSlow = .85, kFast = 1.1;  // slopes within are called as expected
+constexpr std::size_t kMostPoints = 32;     // doublings
+
+struct Log {
+  double time = 0, error = 0, spp = 0;
+  double sigma = 0;  // standard deviation of `error`
+};
+
+bool usable(const ErrorPoint& p) {
+  return p.spp >= kLeastSpp && p.core_seconds > 0 && p.relmse > 0 && p.relmse_lo > 0 &&
+         p.relmse_hi > p.relmse_lo && std::isfinite(p.relmse_hi) && std::isfinite(p.core_seconds);
+}
+
+Log log_of(const ErrorPoint& p) {
+  const double interval = std::log(p.relmse_hi / p.relmse_lo) / (2 * kNormal95);
+  return {std::log(p.core_seconds), std::log(p.relmse), p.spp, interval * std::sqrt(.5)};
+}
+
+// From the last point back, each with at most half the samples of the one after it; in order of samples.
+std::vector<Log> doublings(std::span<const ErrorPoint> points) {
+  std::vector<Log> out;
+  for (std::size_t i = points.size(); i-- > 0 && out.size() < kMostPoints;) {
+    if (!usable(points[i])) continue;
+    if (out.empty() || 2 * points[i].spp <= out.back().spp) out.push_back(log_of(points[i]));
+  }
+  std::reverse(out.begin(), out.end());
+  return out;
+}
+
+double covariance(const Log& a, const Log& b) {
+  return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
+}
+
+// The lower Cholesky factor of the covariance; empty if it is not positive definite.
+using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
+std::optional<Matrix> factor(const std::vector<Log>& y) {
+  Matrix l{};
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = covariance(y[i], y[j]);
+      for (std::size_t k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
+      if (i == j && !(sum > 0)) return std::nullopt;
+      l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
+    }
+  }
+  return l;
+}
+
+// L^-1 times the column that `value` gives: what makes the points independent, of variance 1.
+template <class Value>
+std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
+  std::vector<double> out(y.size());
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    double sum = value(y[i]);
+    for (std::size_t k = 0; k < i; ++k) sum -= l[i][k] * out[k];
+    out[i] = sum / l[i][i];
+  }
+  return out;
+}
+
+double product(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// The line error = a - slope time through the points, fitted with their covariance; with a prior of the slope
+// if asked for. Times are told from the last point's on: there a and slope are nearly independent.
+class Line {
+ public:
+  Line(const std::vector<Log>& points, const Matrix& l, double prior_weight)
+      : y_(points),
+        l_(l),
+        one_(whitened(l, y_, [](const Log&) { return 1.; })),
+        time_(whitened(l, y_, [&](const Log& p) { return y_.back().time - p.time; })),
+        error_(whitened(l, y_, [](const Log& p) { return p.error; })) {
+    const double m11 = product(one_, one_), m12 = product(one_, time_),
+                 m22 = product(time_, time_) + prior_weight;
+    determinant_ = m11 * m22 - m12 * m12;
+    v11_ = m22 / determinant_, v12_ = -m12 / determinant_, v22_ = m11 / determinant_;
+    const double r1 = product(one_, error_),
+                 r2 = product(time_, error_) + prior_weight;  // the prior's slope is 1
+    level_ = v11_ * r1 + v12_ * r2;
+    slope_ = v12_ * r1 + v22_ * r2;
+  }
+  bool sound() const { return determinant_ > 0 && std::isfinite(v22_) && v22_ > 0; }
+  double slope() const { return slope_; }
+  double slope_sigma() const { return std::sqrt(v22_); }
+
+  struct Value {
+    double mean = 0, sigma = 0;
+  };
+  // What the estimate will be at exp(later) times the samples of the last point: the line, and what of the
+  // points' deviation from it lasts, for the samples are shared (Rasmussen and Williams 2006, section 2.7).
+  Value at(double later) const {
+    const Log then{0, 0, y_.back().spp * std::exp(later), y_.back().sigma};
+    const auto shared = whitened(l_, y_, [&](const Log& p) { return covariance(p, then); });
+    const double f1 = 1 - product(one_, shared), f2 = -later - product(time_, shared);
+    const double mean = level_ - slope_ * later + product(shared, error_) - level_ * product(one_, shared) -
+                        slope_ * product(time_, shared);
+    const double variance = then.sigma * then.sigma - product(shared, shared) + f1 * f1 * v11_ +
+                            2 * f1 * f2 * v12_ + f2 * f2 * v22_;
+    return {mean, std::sqrt(std::max(0., variance))};
+  }
+
+ private:
+  const std::vector<Log>& y_;
+  const Matrix& l_;
+  std::vector<double> one_, time_, error_;
+  double determinant_ = 0, v11_ = 0, v12_ = 0, v22_ = 0, level_ = 0, slope_ = 0;
+};
+
+std::string words(double lo, double hi) {
+  if (hi < kSlow)
+    return "slower than 1/N: rare bright samples are still being found, so the error is larger than it looks";
+  return lo > kFast ? "faster than 1/N" : "converging as expected";
+}
+
+// The least time from the last point on, as a logarithm, at which `value` is down to `wanted`.
+template <class Curve>
+double when(const Curve& value, double wanted) {
+  constexpr double kMost = 60;  // e^60 times as long is never
+  double lo = 0, hi = 1;
+  while (hi < kMost && value(hi) > wanted) lo = hi, hi *= 2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (lo + hi) / 2;
+    (value(middle) > wanted ? lo : hi) = middle;
+  }
+  return hi;
+}
+
+// The end of the round that `spp` falls into.
+double end_of_round(double spp) {
+  if (!(spp < 0x1p52)) return spp;
+  const auto samples = static_cast<std::uint64_t>(std::ceil(spp));
+  return static_cast<double>(round_range(round_count(samples) - 1).s1);
+}
+
+}  // namespace
+
+std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
+  const std::vector<Log> y = doublings(points);
+  if (y.size() < 3) return std::nullopt;
+  const auto l = factor(y);
+  if (!l) return std::nullopt;
+  const Line line(y, *l, 0);
+  if (!line.sound()) return std::nullopt;
+  const double half = kNormal95 * line.slope_sigma(), lo = line.slope() - half, hi = line.slope() + half;
+  return Trend{static_cast<int>(y.size()), line.slope(), lo, hi, words(lo, hi)};
+}
+
+std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target) {
+  if (points.empty() || !(target > 0) || !usable(points.back())) return std::nullopt;
+  const ErrorPoint& now = points.back();
+  if (now.relmse <= target) return Forecast{now.spp, 0, 0, 0};
+  const std::vector<Log> y = doublings(points);
+  const auto l = factor(y);
+  if (!l) return std::nullopt;
+  const Line line(y, *l, 1 / (kPriorSpread * kPriorSpread));
+  if (!line.sound()) return std::nullopt;
+  const auto reached = [&](double sigmas) {
+    return std::exp(when(
+        [&](double later) {
+          const Line::Value v = line.at(later);
+          return v.mean + sigmas * v.sigma;
+        },
+        std::log(target)));
+  };
+  const auto spp = [&](double times) { return end_of_round(now.spp * times); };
+  const auto left = [&](double samples) { return now.core_seconds * (samples / now.spp - 1); };
+  const double best = spp(reached(0));
+  return Forecast{best, left(best), left(now.spp * reached(-kNormal95)), left(spp(reached(kNormal95)))};
+}
+
+}  // namespace ls

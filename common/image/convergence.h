@@ -1,0 +1,43 @@
+// How an image's error falls with time, and when it will have fallen far enough: a line through log error
+// over log time, and its continuation.
+//
+// Checkpoints share samples: the one at n samples is part of the one at m > n. With independent samples the
+// half difference D at m is the n-th part's, weighted n/m, and more that is independent, so corr(D_n, D_m) =
+// sqrt(n/m), and for Gaussian D the estimates, sums of D^2, have the correlation n/m. Their logarithms are
+// fitted by generalised least squares (Aitken 1936) with that covariance; leaving it out would make the
+// interval of the slope far too narrow. The variance of one estimate is half of that of its interval: an
+// interval for the realised error adds the variance of what was realised, which is as large
+// (error_estimate.h). Checkpoints are taken at doubling samples only: those between them add hardly anything.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+namespace ls {
+
+struct ErrorPoint {
+  double spp = 0;
+  double core_seconds = 0;  // spent on rendering up to here
+  double relmse = 0, relmse_lo = 0, relmse_hi = 0;
+};
+
+// relMSE ~ time^-slope; 1 for independent samples of finite variance.
+struct Trend {
+  int points = 0;                                // checkpoints it is drawn from
+  double slope = 0, slope_lo = 0, slope_hi = 0;  // with a 95 % interval
+  std::string verdict;                           // in words
+};
+// Points in order of samples. Nothing: fewer than three of them can be used.
+std::optional<Trend> trend_of(std::span<const ErrorPoint> points);
+
+struct Forecast {
+  double spp = 0;                                                     // at the target
+  double core_seconds = 0, core_seconds_lo = 0, core_seconds_hi = 0;  // still to spend; 95 % interval
+};
+// Until the estimated relMSE is down to `target`, at the end of a round. Zeros: it is already. Nothing: there
+// is no point with a positive error and time. The slope is the fitted one, drawn to 1 as far as the points
+// leave it open (a Gaussian prior of standard deviation .15).
+std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target);
+
+}  // namespace ls

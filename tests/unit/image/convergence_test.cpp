@@ -1,0 +1,177 @@
+#include "common/image/convergence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "common/image/rounds.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A job of `pixels` grey pixels whose halves are Gaussian: its checkpoints, as the estimator would give them.
+// Time goes with samples. `slope` other than 1: the variance of a mean of n samples is n^-slope.
+class Job {
+ public:
+  Job(int pixels, std::uint64_t seed, double slope = 1)
+      : slope_(slope), sums_(static_cast<std::size_t>(pixels)), random_(seed) {}
+
+  ErrorPoint next(std::uint64_t spp) {
+    std::normal_distribution<double> normal;
+    const double more = std::sqrt(variance_of_sum(spp) - variance_of_sum(spp_));
+    double squares = 0, fourth = 0;
+    for (double& s : sums_) {
+      s += more * normal(random_);
+      const double d = s / static_cast<double>(spp);
+      squares += d * d;
+      fourth += d * d * d * d;
+    }
+    spp_ = spp;
+    const auto n = static_cast<double>(sums_.size());
+    // 4/3 sum D^4: the variance of the realised error (error_estimate.h, grey noise); an interval of
+    // logarithms.
+    const double half = 1.959964 * std::sqrt(4 * fourth / 3) / squares;
+    return {static_cast<double>(spp), 3. * static_cast<double>(spp), squares / n,
+            squares / n * std::exp(-half), squares / n * std::exp(half)};
+  }
+
+ private:
+  double variance_of_sum(std::uint64_t n) const {
+    return n == 0 ? 0 : std::pow(static_cast<double>(n), 2 - slope_);
+  }
+  double slope_;
+  std::vector<double> sums_;
+  std::uint64_t spp_ = 0;
+  std::mt19937_64 random_;
+};
+
+std::vector<ErrorPoint> checkpoints(Job& job, RoundIndex rounds) {
+  std::vector<ErrorPoint> points;
+  for (RoundIndex k = 0; k < rounds; ++k) points.push_back(job.next(round_range(k).s1));
+  return points;
+}
+
+TEST(Trend, OfThePowerLawIsItsExponent) {
+  for (const double slope : {.5, 1., 1.5}) {
+    std::vector<ErrorPoint> points;
+    for (double spp = 8; spp <= 1024; spp *= 2) {
+      const double e = std::pow(spp, -slope);
+      points.push_back({spp, 5 * spp, e, .9 * e, 1.1 * e});
+    }
+    const auto trend = trend_of(points);
+    ASSERT_TRUE(trend);
+    EXPECT_NEAR(trend->slope, slope, 1e-9);  // exact but for rounding
+    EXPECT_EQ(trend->points, 8);
+    EXPECT_LT(trend->slope_lo, slope);
+    EXPECT_GT(trend->slope_hi, slope);
+  }
+}
+
+TEST(Trend, NeedsThreeDoublings) {
+  Job job(100, 1);
+  EXPECT_FALSE(trend_of(checkpoints(job, 4)));  // 2, 4, 8, 16 samples: two of 8 or more
+  Job another(100, 1);
+  EXPECT_TRUE(trend_of(checkpoints(another, 5)));
+  EXPECT_FALSE(trend_of({}));
+}
+
+TEST(Trend, UsesDoublingsOfALongJobOnly) {
+  Job job(50, 3);
+  const auto trend = trend_of(checkpoints(job, 5 + 32));  // to 2048 samples
+  ASSERT_TRUE(trend);
+  EXPECT_EQ(trend->points, 9);  // 2048, 1024, ..., 8
+}
+
+TEST(Trend, IgnoresPointsThatAreNoFigures) {
+  Job job(100, 1);
+  auto points = checkpoints(job, 7);
+  const auto before = trend_of(points)->slope;
+  points.insert(points.begin(), {{8, 0, 1, .9, 1.1},
+                                 {8, 1, std::nan(""), .9, 1.1},
+                                 {8, 1, 1, 0, 1},
+                                 {8, 1, 0, 0, 0},
+                                 {8, 1, 1, .9, INFINITY}});
+  EXPECT_EQ(trend_of(points)->slope, before);
+}
+
+// Of n fair trials that succeed with probability .95, all but one in 1e4 runs of this test have a share
+// within 3.9 standard deviations, sqrt(.95 .05 / n).
+double spread(int n) { return 3.9 * std::sqrt(.95 * .05 / n); }
+
+TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
+  constexpr int kJobs = 1000;
+  int covered = 0;
+  for (int i = 0; i < kJobs; ++i) {
+    Job job(400, 100 + static_cast<std::uint64_t>(i));
+    const auto trend = trend_of(checkpoints(job, 9));
+    covered += trend->slope_lo <= 1 && 1 <= trend->slope_hi;
+  }
+  // Besides chance, .01 for an interval that is itself estimated from 400 pixels.
+  EXPECT_NEAR(covered / double{kJobs}, .95, spread(kJobs) + .01);
+}
+
+TEST(Trend, SaysInWordsHowItGoes) {
+  Job slow(4000, 1, .6), fair(4000, 2, 1), fast(4000, 3, 1.5);
+  EXPECT_THAT(trend_of(checkpoints(slow, 9))->verdict, HasSubstr("slower than 1/N"));
+  EXPECT_EQ(trend_of(checkpoints(fair, 9))->verdict, "converging as expected");
+  EXPECT_EQ(trend_of(checkpoints(fast, 9))->verdict, "faster than 1/N");
+}
+
+TEST(Forecast, OfAJobThatIsThereIsZero) {
+  Job job(100, 1);
+  const auto points = checkpoints(job, 6);
+  const auto forecast = forecast_of(points, 2 * points.back().relmse);
+  ASSERT_TRUE(forecast);
+  EXPECT_EQ(forecast->core_seconds, 0);
+  EXPECT_EQ(forecast->core_seconds_hi, 0);
+}
+
+TEST(Forecast, IsTheEndOfTheRoundThatReachesTheTarget) {
+  const std::vector<ErrorPoint> now{{64, 10, .02, .0199, .0201}};
+  const auto forecast = forecast_of(now, .01);  // twice the samples, and these end a round
+  ASSERT_TRUE(forecast);
+  EXPECT_EQ(forecast->spp, 128);
+  EXPECT_NEAR(forecast->core_seconds, 10, 1e-9);
+  EXPECT_EQ(forecast_of(now, .0099)->spp, 192);
+  EXPECT_FALSE(forecast_of({}, .01));
+  EXPECT_FALSE(forecast_of(now, 0));
+}
+
+// Jobs that are followed until their estimate is down to the target, as the farm does: from each of their
+// checkpoints on, how often was the time they took within the interval?
+double share_within(double slope, int jobs, int pixels) {
+  int within = 0, all = 0;
+  for (int i = 0; i < jobs; ++i) {
+    Job job(pixels, 5000 + static_cast<std::uint64_t>(i), slope);
+    std::vector<ErrorPoint> points = checkpoints(job, 6);
+    const double target = points.back().relmse / 10;
+    std::vector<std::pair<double, Forecast>> said;
+    while (points.back().relmse > target) {
+      said.emplace_back(points.back().core_seconds, *forecast_of(points, target));
+      points.push_back(job.next(round_range(static_cast<RoundIndex>(points.size())).s1));
+    }
+    for (const auto& [at, f] : said) {
+      const double took = points.back().core_seconds - at;
+      within +=
+          f.core_seconds_lo <= took && took <= f.core_seconds_hi * (1 + 1e-9);  // both may end the same round
+      ++all;
+    }
+  }
+  return within / double(all);
+}
+
+TEST(Forecast, HoldsInNineOfTenCases) {
+  // Forecasts of one job are not independent, so this is a bound and no test of .95: fewer than .9 is what
+  // the user was promised not to see.
+  EXPECT_GE(share_within(1, 100, 400), .9);
+  EXPECT_GE(share_within(1.15, 100, 400), .9);
+  EXPECT_GE(share_within(.9, 100, 400), .9);
+}
+
+}  // namespace
+}  // namespace ls
