@@ -38,7 +38,8 @@ void describe(V& v, T& t) {
 template <class V, Of<PeakTexture> T>
 void describe(V& v, T& t) {
   v.field({.name = "texture", .doc = "the texture", .range = kNonNegative}, t.texture);
-  v.field({.name = "hue", .doc = "the colour divided by its largest channel, white where it is black"}, t.hue);
+  v.field({.name = "hue", .doc = "the colour divided by its largest channel, white where it is black"},
+          t.hue);
 }
 
 // ---- volumes and media
@@ -50,11 +51,13 @@ void describe(V& v, T& s) {
 }
 template <class V, Of<GridVolume> T>
 void describe(V& v, T& s) {
-  v.field({.name = "filename", .doc = "Mitsuba `.vol`, OpenVDB `.vdb`, NanoVDB `.nvdb` or raw `.bin`", .required = true},
+  v.field({.name = "filename",
+           .doc = "Mitsuba `.vol`, OpenVDB `.vdb`, NanoVDB `.nvdb` or raw `.bin`",
+           .required = true},
           s.file);
-  v.field({.name = "grid_name",
-           .doc = "which grid of a `.vdb` or `.nvdb`; empty: the only one, or \"density\""},
-          s.grid_name);
+  v.field(
+      {.name = "grid_name", .doc = "which grid of a `.vdb` or `.nvdb`; empty: the only one, or \"density\""},
+      s.grid_name);
   v.field({.name = "filter_type", .doc = "between voxels"}, s.filter);
   v.field(
       {.name = "wrap_mode",
@@ -79,6 +82,16 @@ void describe(V&, T&) {}
 template <class V, Of<HgPhase> T>
 void describe(V& v, T& p) {
   v.field({.name = "g", .doc = "mean cosine; positive: forwards", .range = {-1, 1, true, true}}, p.g);
+}
+template <class V>
+void describe_priority(V& v, auto& priority) {
+  v.field(
+      {.name = "priority",
+       .doc = "where media overlap, those of the highest priority are there and the others are not; equal "
+              "ones add up. Not in Mitsuba",
+       .range = {-1000000, 1000000},
+       .unwritten = 0},
+      priority);
 }
 template <class V, Of<HomogeneousMedium> T>
 void describe(V& v, T& m) {
@@ -113,6 +126,7 @@ void describe(V& v, T& m) {
            .constvolume = true,
            .unwritten = 0},
           m.source_radiance);
+  describe_priority(v, m.priority);
 }
 template <class V, Of<HeterogeneousMedium> T>
 void describe(V& v, T& m) {
@@ -145,19 +159,20 @@ void describe(V& v, T& m) {
            .unit = "K",
            .range = kNonNegative},
           m.temperature);
-  v.field({.name = "emission_scale", .doc = "factor on the light given off", .range = kNonNegative, .unwritten = 1},
+  v.field({.name = "emission_scale",
+           .doc = "factor on the light given off",
+           .range = kNonNegative,
+           .unwritten = 1},
           m.emission_scale);
   v.field({.name = "temperature_scale",
            .doc = "kelvin per unit of `temperature`",
            .range = kNonNegative,
            .unwritten = 1},
           m.temperature_scale);
-  v.field({.name = "temperature_offset",
-           .doc = "added to it",
-           .unit = "K",
-           .range = {-1e6, 1e6},
-           .unwritten = 0},
-          m.temperature_offset);
+  v.field(
+      {.name = "temperature_offset", .doc = "added to it", .unit = "K", .range = {-1e6, 1e6}, .unwritten = 0},
+      m.temperature_offset);
+  describe_priority(v, m.priority);
 }
 
 // ---- emitters

@@ -235,6 +235,24 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
   the scene's units. Colours outside of sRGB are cut off at 0. Such light counts like that of an emitter that a path meets:
   `max_depth` 1 shows it, `hide_emitters` hides it where the camera looks straight at it. It lights the scene where paths come by:
   next-event estimation does not look for it.
+
+## Boundaries of media
+
+- Where boundaries neither touch nor hold each other the rule is Mitsuba's: light that leaves a boundary is in the medium of the
+  side that it leaves to.
+- Elsewhere, what is at a point is what the background has, plus the `interior` and less the `exterior` of every boundary around the
+  point. So a ball that names the fog around it as its exterior displaces the fog, and one that names none has both. Of the media
+  that come out, those of the highest `priority` are there, the others not: ice in a drink needs the higher one. Equal ones add up,
+  also one medium twice. A medium without extinction and a high priority is a hole.
+- Such boundaries should be closed: cubes, spheres, closed meshes, or several sheets that name the same media and close a body
+  together.
+- Surfaces that lie on each other are all crossed at once; of these, one that scatters light comes first. Fog may stand on the very
+  plane of a floor.
+- The camera is in the medium that the sensor names; where media overlap, in those of the closed boundaries around it as well (at the
+  middle of the lens). A sensor that names none begins in none, also inside of a boundary, as in Mitsuba; a cube or sphere around it
+  is warned of.
+- A mirrored cube, sphere or mesh keeps its interior inside, also where its normals turn inwards. (In Mitsuba 3.9 the medium is then
+  outside.) `flip_normals` does turn inside and outside.
 )";
 
 std::string old_files_section() {

@@ -199,6 +199,7 @@ struct HomogeneousMedium {
   PhaseIndex phase;
   Rgb emission{0, 0, 0};         // radiance per scene unit, whatever the extinction
   Rgb source_radiance{0, 0, 0};  // what an infinite depth of it, not scattering, shows
+  int priority = 0;              // where media overlap those of the highest count, together
   bool operator==(const HomogeneousMedium&) const = default;
 };
 // At most one of the three sources of light.
@@ -213,6 +214,7 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on what is emitted
   double temperature_scale = 1, temperature_offset = 0;
+  int priority = 0;  // as of a homogeneous one
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;

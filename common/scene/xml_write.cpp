@@ -323,6 +323,7 @@ class Writer {
   void property(const Field& f, int x) {
     // No crop, or the only mesh of a file.
     if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
+    if (x == f.unwritten) return;
     value("integer", f.name, std::to_string(x));
   }
   void property(const Field& f, std::uint64_t x) { value("integer", f.name, std::to_string(x)); }

@@ -36,6 +36,7 @@ const std::vector<Case>& table() {
     add_materials(c);
     add_distant(c);
     add_emission(c);
+    add_overlaps(c);
     return c;
   }();
   return cases;

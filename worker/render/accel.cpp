@@ -3,6 +3,8 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cstddef>
@@ -10,6 +12,9 @@
 #include <deque>
 #include <limits>
 #include <optional>
+#include <tuple>
+
+#include "worker/render/shape_boxes.h"
 
 namespace ls::render {
 namespace {
@@ -21,29 +26,6 @@ template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
 };
-
-struct Box {
-  V3d lo, hi;
-};
-Box box_of(const Sphere& s) { return {s.center - V3d(s.radius), s.center + V3d(s.radius)}; }
-V3d reach(const V3d& u, const V3d& v) {  // of the ellipse u cos a + v sin a
-  V3d r;
-  for (int k = 0; k < 3; ++k) r[k] = std::sqrt(u[k] * u[k] + v[k] * v[k]);
-  return r;
-}
-Box box_of(const Disk& s) {
-  const V3d r = reach(s.u, s.v);
-  return {s.center - r, s.center + r};
-}
-Box box_of(const Cylinder& s) {
-  const V3d r = reach(s.u, s.v) * s.radius, end = s.p0 + s.axis * s.length;
-  Box b;
-  for (int k = 0; k < 3; ++k) {
-    b.lo[k] = std::min(s.p0[k], end[k]) - r[k];
-    b.hi[k] = std::max(s.p0[k], end[k]) + r[k];
-  }
-  return b;
-}
 
 template <class Shape>
 void bounds_callback(const RTCBoundsFunctionArguments* args) {
@@ -62,6 +44,28 @@ double shape_distance(const void* user, unsigned prim, const RTCRay& ray) {
                    ray.tfar);
 }
 
+// A trace that stops nowhere and keeps all it meets: its context is this one, and has a filter.
+struct Collecting {
+  RTCIntersectContext context;
+  struct Met {
+    unsigned geometry, primitive, instance;
+  };
+  std::array<Met, Together::kMost> met;
+  std::size_t count = 0;
+
+  static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
+    static_assert(offsetof(Collecting, context) == 0);
+    auto& c = *reinterpret_cast<Collecting*>(context);
+    if (c.count < c.met.size()) c.met[c.count++] = {geometry, primitive, instance};
+  }
+};
+void collect_callback(const RTCFilterFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+  Collecting::keep(args->context, hit->geomID, hit->primID, hit->instID[0]);
+  args->valid[0] = 0;  // and go on
+}
+
 template <class Shape>
 void intersect_callback(const RTCIntersectFunctionNArguments* args) {
   if (!args->valid[0]) return;
@@ -69,6 +73,8 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
   const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, rh->ray);
   const auto tf = static_cast<float>(t);
   if (!(tf < rh->ray.tfar)) return;
+  if (args->context->filter)
+    return Collecting::keep(args->context, args->geomID, args->primID, args->context->instID[0]);
   rh->ray.tfar = tf;
   rh->hit.primID = args->primID;
   rh->hit.geomID = args->geomID;
@@ -138,6 +144,7 @@ struct Accel::State {
   std::deque<Scenes> groups;
   std::vector<std::uint32_t> group_of;  // by instance
   std::atomic<std::int64_t> bytes{0};
+  bool coincident = false;
 
   ~State() {
     own.reset();
@@ -173,9 +180,11 @@ RTCGeometry shape_geometry(RTCDevice device, ShapeSet<Shape>& set) {
   return geom;
 }
 
-RTCScene new_scene(RTCDevice device) {
+RTCScene new_scene(RTCDevice device, bool coincident) {
   RTCScene s = rtcNewScene(device);
-  rtcSetSceneFlags(s, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(s, coincident ? static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |
+                                                              RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION)
+                                 : RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
   return s;
 }
@@ -210,14 +219,16 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
 }
 
 // Of the primitives alone, not committed.
-void fill(RTCDevice device, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
-  to.opaque = new_scene(device);
+void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
+  const RTCDevice device = st.device;
+  // Only where both kinds are will all that lies in a place be asked for.
+  to.opaque = new_scene(device, st.coincident && !boundaries);
   if (!boundaries) {
     to.all = to.opaque;
     return attach(device, g, set, to, 0, {to.opaque});
   }
-  to.all = new_scene(device);
-  to.boundary = new_scene(device);
+  to.all = new_scene(device, st.coincident);
+  to.boundary = new_scene(device, false);
   attach(device, g, set, to, 0, {to.opaque, to.all});
   attach(device, g, set, to, 1, {to.boundary, to.all});
 }
@@ -265,6 +276,18 @@ void attach_instances(const Geometry& g, Accel::State& st) {
   }
 }
 
+PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned primitive,
+                         unsigned instance_id) {
+  const unsigned side = geometry / kKinds, kind = geometry % kKinds;
+  const Scenes* in = &*st.own;
+  std::uint32_t instance = kNone;
+  if (instance_id != RTC_INVALID_GEOMETRY_ID) {
+    instance = instance_id - kFirstInstance;
+    in = &st.groups[st.group_of[instance]];
+  }
+  return {static_cast<PrimitiveId::Kind>(kind), in->base[side][kind] + primitive, instance};
+}
+
 std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V3& o, const V3& d,
                                  float t_max) {
   if (!traceable(o, d)) return std::nullopt;
@@ -275,14 +298,7 @@ std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene, &context, &rh);
   if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const unsigned side = rh.hit.geomID / kKinds, kind = rh.hit.geomID % kKinds;
-  const Scenes* in = &*st.own;
-  std::uint32_t instance = kNone;
-  if (rh.hit.instID[0] != RTC_INVALID_GEOMETRY_ID) {
-    instance = rh.hit.instID[0] - kFirstInstance;
-    in = &st.groups[st.group_of[instance]];
-  }
-  return PrimitiveId{static_cast<PrimitiveId::Kind>(kind), in->base[side][kind] + rh.hit.primID, instance};
+  return primitive_of(st, rh.hit.geomID, rh.hit.primID, rh.hit.instID[0]);
 }
 
 }  // namespace
@@ -292,10 +308,11 @@ Accel::~Accel() = default;
 Accel::Accel(Accel&&) noexcept = default;
 Accel& Accel::operator=(Accel&&) noexcept = default;
 
-Result<Accel> Accel::build(const Geometry& g, int threads) {
+Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
   Accel a;
   a.state_ = std::make_unique<State>();
   State& st = *a.state_;
+  st.coincident = coincident;
   st.device =
       rtcNewDevice(fmt::format("threads={},user_threads=0,{}", std::max(1, threads), kDeviceConfig).c_str());
   if (!st.device)
@@ -311,11 +328,11 @@ Result<Accel> Accel::build(const Geometry& g, int threads) {
   bool boundaries = g.own.any_passing();
   for (const PrimitiveSet& set : g.groups) {
     Scenes& scenes = st.groups.emplace_back();
-    fill(st.device, g, set, set.any_passing(), scenes);
+    fill(st, g, set, set.any_passing(), scenes);
     commit(scenes);
     boundaries = boundaries || set.any_passing();
   }
-  fill(st.device, g, g.own, boundaries, st.own.emplace());
+  fill(st, g, g.own, boundaries, st.own.emplace());
   attach_instances(g, st);
   commit(*st.own);
   if (const RTCError e = rtcGetDeviceError(st.device); e != RTC_ERROR_NONE) {
@@ -332,6 +349,28 @@ std::optional<PrimitiveId> Accel::nearest(const V3& o, const V3& d, float t_max)
 std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, float t_max) const {
   if (!state_->own->boundary) return std::nullopt;
   return trace(*state_, state_->own->boundary, o, d, t_max);
+}
+
+Together Accel::between(const V3& a, const V3& b) const {
+  Together together;
+  const V3 d = b - a;
+  if (!state_->coincident || !traceable(a, d)) return together;
+  RTCRayHit rh;
+  set_ray(rh.ray, a, d, 1);
+  rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  Collecting all;
+  rtcInitIntersectContext(&all.context);
+  all.context.filter = collect_callback;
+  rtcIntersect1(state_->own->all, &all.context, &rh);
+  for (std::size_t i = 0; i < all.count; ++i)
+    together.ids[i] = primitive_of(*state_, all.met[i].geometry, all.met[i].primitive, all.met[i].instance);
+  // A triangle is found in every leaf that has a part of it.
+  const auto first = together.ids.begin(), last = first + static_cast<std::ptrdiff_t>(all.count);
+  std::sort(first, last, [](const PrimitiveId& x, const PrimitiveId& y) {
+    return std::tie(x.kind, x.index, x.instance) < std::tie(y.kind, y.index, y.instance);
+  });
+  together.count = static_cast<int>(std::unique(first, last) - first);
+  return together;
 }
 
 bool Accel::occluded(const V3& o, const V3& d, float t_max) const {

@@ -9,13 +9,15 @@ struct Features {
   bool grids = false;      // heterogeneous media
   bool chromatic = false;  // extinction that differs between channels
   bool emission = false;   // media that give off light
+  bool overlaps = false;   // media within or across each other (media_state.h)
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
-           (emission || !need.emission);
+           (emission || !need.emission) && (overlaps || !need.overlaps);
   }
 };
-inline constexpr Features kEverything{.media = true, .grids = true, .chromatic = true, .emission = true};
+inline constexpr Features kEverything{
+    .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true};
 
 }  // namespace ls::render

@@ -25,6 +25,8 @@ struct SurfaceInfo {  // one per scene shape
   std::uint32_t light = kNone;                       // index into Lights
   std::uint32_t interior = kNone, exterior = kNone;  // media
   bool transition = false;                           // crossing it changes the medium
+  bool crossed = false;                              // some light gets to its other side
+  bool sheet = false;                                // not closed: has an edge, or bounds a body with others
   bool null = false;                                 // index-matched: rays pass
   bool veil = false;                                 // a share of the light passes (BsdfTable::veil)
   bool normals = false, uvs = false;                 // triangles: per-vertex data
@@ -34,6 +36,9 @@ struct SurfaceInfo {  // one per scene shape
   bool wants_slopes = false;  // hits carry dp/du and dp/dv (bump maps); wants_tangent is true then, too
   bool smooth = true;         // of its material: next-event estimation makes sense
   float orientation = 1;      // -1: normals are flipped against winding or the outward direction
+  // Of surfaces that coincide somewhere with another, one of the two null: the largest reach of those (see
+  // SurfaceHit), so that a ray steps over all of them at once. 0: none does.
+  float together = 0;
 };
 
 struct Sphere {
@@ -96,6 +101,9 @@ struct SurfaceHit {
   V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
   std::uint32_t surface = 0;
   PrimitiveId primitive;
+  // The largest coordinate that the meeting was computed with: p, and the distances that the BVH finds across
+  // the surface, are good to a few units in the last place of it (see offset_point).
+  float reach = 1;
 
   UvPoint uv_point() const { return {uv, du, dv}; }
   // From dp/du and dp/dv in the world; `scale` is the geometry's.
@@ -152,12 +160,24 @@ double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, do
 // Azimuth and polar angle, each over its range, of a unit direction from the sphere's centre.
 V2 sphere_uv(const Sphere& s, const V3d& n);
 
-// Moves a point off the surface to the side that `w` leaves to. In the unit-size world positions are good to
-// a few units in the last place of 1 (6e-8), and so are the BVH's distances perpendicular to a surface: 2^-20
-// = 16 of them.
-inline V3 offset_point(const V3& p, const V3& ng, const V3& w) {
-  const float m = std::max(1.f, std::max(std::abs(p.x), std::max(std::abs(p.y), std::abs(p.z))));
-  return p + ng * std::copysign(m * 0x1p-20f, dot(ng, w));
+inline float largest(const V3& v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
+
+// Moves a point off the surface to the side that `w` leaves to, by 16 units in the last place of the reach.
+// Of these, rounding takes p at most one off the surface (sqrt(3) / 2). The BVH takes a triangle's corners
+// relative to the ray's origin and finds the distance of its plane by products of these: each component is
+// good to half a unit in the last place of the difference of two coordinates, of at most twice the reach,
+// and so are the six rounded products and sums: together below 8. What is left is a margin of two.
+inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
+  return p + ng * std::copysign(reach * 0x1p-20f, dot(ng, w));
+}
+inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
+  return offset_point(hit.p, hit.ng, hit.reach, w);
+}
+// Of shapes that are met in double precision, where p lies at a distance of up to `size` from what the shape
+// is placed by: p is rounded to float32, and 2^-28 turns 16 units in the last place of float32 into 16 of
+// double's, times 2.
+inline float reach_in_double(const V3& p, double size) {
+  return std::max(largest(p), static_cast<float>(size * 0x1p-28));
 }
 
 }  // namespace ls::render

@@ -25,6 +25,16 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
   return sign;
 }
 
+// Whether the normals of a mirrored body end up pointing inwards, as some do in Mitsuba. Its medium stays
+// inside: who mirrors a glass of water does not mean to fill the room.
+bool mirrored_inwards(const Shape& shape, float orientation) {
+  if (!(Affine(shape.to_world).determinant() < 0)) return false;
+  if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;
+  const bool mesh =
+      std::holds_alternative<CubeShape>(shape.geometry) || std::holds_alternative<MeshShape>(shape.geometry);
+  return mesh && orientation > 0;  // relative to the winding, which is turned round
+}
+
 // From scene space to one of unit size about a centre; a power of two.
 struct Space {
   V3d center{0, 0, 0};
@@ -44,6 +54,20 @@ Space unit_space(const Bounds& b) {
     s.scale = std::ldexp(1., -exponent);
   }
   return s;
+}
+
+// A closed mesh has no area to any side, all in all: its normals, weighted by area, add up to nothing.
+bool is_sheet(const LocalMesh& mesh) {
+  V3d sum(0);
+  double area = 0;
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const V3d &a = mesh.positions[mesh.indices[i]], &b = mesh.positions[mesh.indices[i + 1]],
+              &c = mesh.positions[mesh.indices[i + 2]];
+    const V3d n = (b - a).cross(c - a);
+    sum += n;
+    area += n.length();
+  }
+  return sum.length() > 1e-6 * area;
 }
 
 // Normals that a file gives decide which side of a triangle shines and is lit, even against its winding;
@@ -67,6 +91,7 @@ void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::u
 void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t surface, const Space& space) {
   const auto base = static_cast<std::uint32_t>(g.positions.size());
   SurfaceInfo& info = g.surfaces[surface];
+  if (info.transition && !mesh.indices.empty()) info.sheet = is_sheet(mesh);
   for (const V3d& v : mesh.positions) g.positions.push_back(V3(space(v)));
   if (!mesh.normals.empty()) {
     info.normals = true;
@@ -101,6 +126,7 @@ void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& sp
     s.surface = surface;
     g.spheres.push_back(s);
   }
+  if (p.disk || p.cylinder) g.surfaces[surface].sheet = true;
   if (p.disk) {
     Disk d = *p.disk;
     d.center = space(d.center);
@@ -126,9 +152,11 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
   info.veil = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
+  info.crossed = info.null || traits.at(s.bsdf.value).transmits;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;
   info.orientation = orientation_of(s, vertex_normals);
+  if (mirrored_inwards(s, info.orientation)) std::swap(info.interior, info.exterior);
   return info;
 }
 

@@ -10,11 +10,11 @@ namespace {
 
 // The directions from x to the sphere's emitting side, as 1 - cos of their half angle, without cancellation
 // (STABILITY N26): 2 is every direction, for an inner side seen from inside; 0 is none, where the emitting
-// side is turned away. Points on the surface itself, good to a few units in the last place of the world,
-// count to the side that emits: sampling and density must agree on them.
-float one_minus_cos(const Sphere& s, float sign, const V3& x) {
+// side is turned away. Points on the surface itself, good to a few units in the last place of their
+// coordinates, count to the side that emits: sampling and density must agree on them.
+float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
-  const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20);
+  const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20 * reach);
   const bool inside = d2 < margin * margin;
   if (inside != (sign < 0)) return 0;
   if (inside) return 2;
@@ -89,7 +89,9 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
            v2 = geometry_->positions[idx[2]];
   Point y;
   y.p = v0 * b0 + v1 * b1 + v2 * b2;
-  y.n = normalize(cross(v1 - v0, v2 - v0)) * l.sign;
+  // In double: the square of a small triangle's area is nothing in float32.
+  const V3d n = V3d(v1 - v0).cross(V3d(v2 - v0));
+  y.n = V3(n * (l.sign / n.length()));
   y.uv = {b1, b2};
   if (!geometry_->uvs.empty() && geometry_->surfaces[geometry_->triangle_surface[tri]].uvs) {
     y.uv = geometry_->uvs[idx[0]] * b0 + geometry_->uvs[idx[1]] * b1 + geometry_->uvs[idx[2]] * b2;
@@ -98,7 +100,8 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
 }
 
 std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, const V3& x, float p) const {
-  const V3 target = offset_point(y.p, y.n, y.n);  // just in front of the light: the shadow ray ends before it
+  const V3 target =
+      offset_point(y.p, y.n, l.reach, y.n);  // just in front of the light: the shadow ray ends before it
   const V3 f = target - x;
   const float d2 = dot(f, f);
   if (!(d2 > 0)) return std::nullopt;
@@ -118,7 +121,7 @@ std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, c
 
 std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3& x, float p) const {
   const Sphere& sphere = geometry_->spheres[l.primitive];
-  const float cone = one_minus_cos(sphere, l.sign, x);
+  const float cone = one_minus_cos(sphere, l.reach, l.sign, x);
   if (!(cone > 0)) return std::nullopt;
   const V3 axis = normalize(V3(sphere.center - V3d(x)));
   const float one_minus = cone * u.x, cosine = 1 - one_minus;
@@ -138,7 +141,7 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   const double reach = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * reach - sphere.center).normalized();
   const V3 y(sphere.center + n * sphere.radius);
-  const V3 target = offset_point(y, V3(n), V3(n) * l.sign), f = target - x;
+  const V3 target = offset_point(y, V3(n), l.reach, V3(n) * l.sign), f = target - x;
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
   s.pdf = p / (kTwoPi * cone);
@@ -209,7 +212,7 @@ float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const
   const Light& l = lights_[light];
   const float p = by_tree(n) ? probability_at(light, x, n) : l.probability;
   if (l.kind == Kind::sphere) {
-    const float cone = one_minus_cos(geometry_->spheres[l.primitive], l.sign, x);
+    const float cone = one_minus_cos(geometry_->spheres[l.primitive], l.reach, l.sign, x);
     return cone > 0 ? p / (kTwoPi * cone) : 0;
   }
   const V3 f = hit.p - x;

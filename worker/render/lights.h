@@ -128,6 +128,7 @@ class Lights {
     std::uint32_t primitive = 0;  // sphere, cylinder; mesh: first triangle
     std::vector<double> cdf;      // mesh: of triangle areas
     float sign = 1;               // orientation of the emitting side
+    float reach = 1;              // area lights: the largest coordinate of a point on it
     float cos_cutoff = 0, cos_beam = 0, cutoff = 0, inv_transition = 0, tan_cutoff = 0;  // spot
     float falloff = 1;                // beam: with cos_cutoff, cos_beam and, by cosines, inv_transition
     float tan_x = 0, tan_y = 0;       // projector: of half its fields of view

@@ -85,6 +85,8 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
     ++left_out_;
     return;
   }
+  const LightBounds box = shape_bounds(l);
+  l.reach = std::max(largest(box.low), largest(box.high));
   g.surfaces[shape].light = static_cast<std::uint32_t>(lights_.size());
   lights_.push_back(std::move(l));
 }

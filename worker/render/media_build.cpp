@@ -211,6 +211,7 @@ Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w)
                    [&](const HeterogeneousMedium& h) { return heterogeneous(scene, h, files, w); }},
         scene.media[i]);
     if (!m) return tl::unexpected(m.error());
+    m->priority = std::visit([](const auto& given) { return given.priority; }, scene.media[i]);
     w.media.push_back(*m);
   }
   return {};

@@ -44,6 +44,7 @@ struct Medium {
   C3 emission{0, 0, 0};
   std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
   float kelvin_scale = 1, kelvin_offset = 0;
+  int priority = 0;  // where media overlap, the highest are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z; }
 
   // Scattering coefficient per unit of extinction density at a point of a grid.
@@ -265,6 +266,10 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
   }
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
+
+// As of a flight that is known to have come to t unscattered: the other media of a place ended it there. Grids
+// are asked for their exact depth, so that it does not matter how that came to be known.
+Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 
 // Unbiased estimate (exact where homogeneous) of the transmittance between t0 and t1.
 template <Features F>

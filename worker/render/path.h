@@ -17,7 +17,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 
+#include "worker/render/media_state.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
 #include "worker/render/vertex_light.h"
@@ -58,7 +60,14 @@ class PathTracer {
     typename Light<F>::Vertex in_medium;
   };
 
+  using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
+
+  std::optional<float> scatter_in_media(const SurfaceHit* end);
   std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
+  std::optional<float> scatter_among(const SurfaceHit* end);
+  void light_vertex(const Medium& medium, const V3& p, const V3& d);
+  void add_glow_among(float t_max);
+  float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_glow(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
@@ -66,10 +75,17 @@ class PathTracer {
   void light_surface(const SurfaceHit& hit, const V3& wo);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
-  C3 unoccluded(const V3& start, const V3& p, const LightSample& light, std::uint32_t medium,
+  C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
-  C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left, std::uint32_t medium,
+  C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left, Within medium,
                         RandomStream stream);
+  C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
+  Within start_medium() const;
+  Within beyond(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
+  void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
+  Together others_at(const SurfaceHit& hit, const V3& from, const V3& w) const;
+  Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
+  void prefer_scatterer(SurfaceHit& hit) const;
   bool survives(float u);
 
   void add(const C3& weighted) {
@@ -93,13 +109,8 @@ class PathTracer {
   // must not put it on the other side, where the medium has no end.
   V3 clear_of_ends(V3 p, const Segment& s, float t) const {
     if (s.lead > 0) p += clear_of(o_ - start_, t);
-    if (s.end) p += clear_of(offset_point(s.end->p, s.end->ng, -d_) - s.end->p, s.length - t);
+    if (s.end) p += clear_of(offset_point(*s.end, -d_) - s.end->p, s.length - t);
     return p;
-  }
-  std::uint32_t medium_beyond(const SurfaceHit& hit, const V3& w, std::uint32_t current) const {
-    const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
-    if (!s.transition || !world_.use_media) return current;
-    return dot(w, hit.ng) > 0 ? s.exterior : s.interior;
   }
 
   const World& world_;
@@ -113,7 +124,7 @@ class PathTracer {
   int hero_ = 0;
   int depth_ = 0;    // scatterings so far
   int segment_ = 0;  // rays so far, null crossings included
-  std::uint32_t medium_ = kNone;
+  Within medium_;
   Vertex last_;
   SampleOutcome outcome_;
   MediumCounters counters_;
@@ -125,16 +136,17 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   start_ = o_ = ray.o;
   d_ = ray.d;
   last_.p = o_;
-  if constexpr (F.media) medium_ = world_.use_media ? world_.camera_medium : kNone;
+  if constexpr (F.media) medium_ = start_medium();
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   float t_max = ray.t_max;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(o_, d_, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, o_, d_, hit);
+    if (met && world_.coincident) prefer_scatterer(hit);
     if constexpr (F.media) {
-      if (medium_ != kNone) {
-        if (const auto u = scatter_in_medium(world_.media[medium_], met ? &hit : nullptr)) {
+      if (medium_.any()) {
+        if (const auto u = scatter_in_media(met ? &hit : nullptr)) {
           if (!survives(*u)) break;
           continue;
         }
@@ -160,6 +172,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     if (!u || !survives(*u)) break;
   }
   outcome_.cut_off = outcome_.cut_off || segment_ == kMaxSegments;
+  if constexpr (F.overlaps) outcome_.cut_off = outcome_.cut_off || medium_.overflowed();
   outcome_.majorant_violations = counters_.majorant_violations;
   return outcome_;
 }
@@ -215,9 +228,8 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
-  const V3 p = offset_point(hit.p, hit.ng, light->direction);
-  std::uint32_t medium = kNone;
-  if constexpr (F.media) medium = medium_beyond(hit, light->direction, medium_);
+  const V3 p = offset_point(hit, light->direction);
+  const Within medium = beyond(hit, light->direction, d_, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
 }
@@ -230,8 +242,8 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
   const V3 wo = hit.shading.to_local(-d_);
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
-  const auto s =
-      world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
+  const auto s = world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv_point(), wo, g.u(2),
+                                     {g.u(0), g.u(1)});
   if (!s) return std::nullopt;
   const V3 w = normalize(hit.shading.to_world(s->wi));
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return std::nullopt;  // through the true surface: no such light
@@ -242,12 +254,12 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
   last_.n = hit.shading.n;
   last_.pdf = s->pdf;
   last_.delta = s->delta;
-  start_ = hit.p;
-  o_ = offset_point(hit.p, hit.ng, w);
-  d_ = w;
   // Reflected rays too: what lies on either side of a surface is the scene's word (as for next-event
   // estimation).
-  if constexpr (F.media) medium_ = medium_beyond(hit, w, medium_);
+  if constexpr (F.media) medium_ = beyond(hit, w, d_, medium_);
+  start_ = hit.p;
+  o_ = offset_point(hit, w);
+  d_ = w;
   return g.u(3);
 }
 
@@ -272,8 +284,8 @@ bool PathTracer<F, Light>::passes_veil(const SurfaceHit& hit) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit) {
   start_ = hit.p;
-  o_ = offset_point(hit.p, hit.ng, d_);
-  if constexpr (F.media) medium_ = medium_beyond(hit, d_, medium_);
+  o_ = offset_point(hit, d_);
+  if constexpr (F.media) medium_ = beyond(hit, d_, d_, medium_);
 }
 
 template <Features F, template <Features> class Light>
@@ -314,4 +326,6 @@ bool PathTracer<F, Light>::survives(float u) {
 }  // namespace ls::render
 
 #include "worker/render/path_glow.h"
+#include "worker/render/path_media.h"
+#include "worker/render/path_overlap.h"
 #include "worker/render/path_shadow.h"

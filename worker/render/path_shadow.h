@@ -10,7 +10,7 @@ namespace ls::render {
 // not on it.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
-                                    std::uint32_t medium, RandomStream stream) {
+                                    const Within& medium, RandomStream stream) {
   V3 d = light.direction;
   float left = light.distance;
   if (std::isfinite(left)) {
@@ -21,8 +21,7 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
   }
   if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
   bool walk = world_.veils;
-  if constexpr (F.media)
-    walk = walk || (world_.use_media && (medium != kNone || world_.accel.has_boundaries()));
+  if constexpr (F.media) walk = walk || (world_.use_media && (medium.any() || world_.accel.has_boundaries()));
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
 
@@ -30,16 +29,16 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
 // share.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
-                                            std::uint32_t medium, RandomStream stream) {
+                                            Within medium, RandomStream stream) {
   V3 from = start, o = p;
   for (int i = 0; i < kMaxSegments; ++i) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest_boundary(o, d, left);
     const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
     if constexpr (F.media) {
-      if (medium != kNone) {
+      if (medium.any()) {
         const float t = (met ? std::min(hit.t, left) : left) + dot(o - from, d);
-        value *= transmittance<F>(world_.media[medium], from, d, 0, t, RandomStream(stream.next()));
+        value *= through_media(medium, from, d, t, stream);
         if (is_black(value)) return value;
       }
     }
@@ -49,8 +48,11 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
       value *= world_.bsdfs.veil(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
       if (is_black(value)) return value;
     }
-    if constexpr (F.media) medium = medium_beyond(hit, d, medium);
-    const V3 next = offset_point(hit.p, hit.ng, d);
+    if constexpr (F.media) medium = beyond(hit, d, d, medium);
+    if constexpr (F.overlaps) {
+      if (medium.overflowed()) break;
+    }
+    const V3 next = offset_point(hit, d);
     if (std::isfinite(left)) left -= dot(next - o, d);
     from = hit.p;
     o = next;
@@ -58,6 +60,20 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
   }
   outcome_.cut_off = true;
   return {0, 0, 0};
+}
+
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::through_media(const Within& media, const V3& from, const V3& d, float t,
+                                       RandomStream& stream) const {
+  if constexpr (F.overlaps) {
+    if (media.several()) {
+      C3 value(1);
+      for (const std::uint32_t m : media.all())
+        value *= transmittance<F>(world_.media[m], from, d, 0, t, RandomStream(stream.next()));
+      return value;
+    }
+  }
+  return transmittance<F>(world_.media[media.one()], from, d, 0, t, RandomStream(stream.next()));
 }
 
 }  // namespace ls::render

@@ -148,6 +148,8 @@ WorldReport describe(const World& w) {
   feature(w.need.grids, "density grids, majorants and their trackers");
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
   feature(w.need.emission, "light given off by media");
+  feature(w.need.overlaps, "media within or across each other");
+  feature(w.coincident, "a search for surfaces that lie on null ones");
   const bool angles = w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
   feature(w.distant_mis ? angles : w.equiangular, "equi-angular sampling about lights");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");

@@ -25,7 +25,9 @@ enum class Purpose : std::uint32_t {
   veil,
   emission,
   distance,
-  track_distance
+  track_distance,
+  overlap,
+  overlap_emission
 };
 
 // Four numbers of one purpose at one path vertex.

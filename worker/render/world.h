@@ -10,6 +10,7 @@
 #include "worker/render/features.h"
 #include "worker/render/geometry.h"
 #include "worker/render/lights.h"
+#include "worker/render/media_state.h"
 #include "worker/render/medium.h"
 #include "worker/render/pixel_filter.h"
 #include "worker/render/render.h"
@@ -34,6 +35,9 @@ class World {
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;
+  bool overlaps = false;    // media may lie within or across each other: paths keep a MediaState,
+  MediaState camera_media;  // which begins as this
+  bool coincident = false;  // surfaces lie on each other, one of them null (coincident.h)
   Features need;
   bool use_media = true;     // false: the integrator `path`, which sees no media
   bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too

@@ -3,7 +3,9 @@
 #include <cmath>
 
 #include "common/assets/image.h"
+#include "worker/render/coincident.h"
 #include "worker/render/media_build.h"
+#include "worker/render/media_overlap.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -28,6 +30,7 @@ Features needs_of(const World& w) {
     use(s.interior);
     use(s.exterior);
   }
+  f.overlaps = f.media && media_may_overlap(w);
   return f;
 }
 
@@ -128,12 +131,15 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
   w.clamped_inputs += w.lights.clamped_inputs();
-  auto accel = Accel::build(w.geometry, threads);
+  w.coincident = find_coincident(w.geometry);
+  auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
   place_camera(scene, settings, w);
   w.filter = PixelFilter(scene.film.filter);
   w.need = needs_of(w);
+  w.overlaps = w.need.overlaps;
+  if (w.overlaps) w.camera_media = camera_media(w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = w.need.media && homogeneous_media && w.lights.any_with_place();

@@ -152,11 +152,12 @@ TEST(Cylinders, ClosedByDisksLoseNoRay) {
     std::normal_distribution<double> normal;
     std::uint64_t lost = 0;
     V3 o(0), ng(0);
+    float reach = 0;
     for (int i = 0; i < 50000; ++i) {
       const double x = normal(rng), y = normal(rng), z = normal(rng);
       V3 d(V3d(x, y, z).normalized());
       if (dot(d, ng) * dot(ng, o) > 0) d = -d;
-      const V3 from = ng == V3(0) ? o : offset_point(o, ng, d);
+      const V3 from = ng == V3(0) ? o : offset_point(o, ng, reach, d);
       const auto primitive = w->accel.nearest(from, d, kInfinity);
       SurfaceHit hit;
       if (!primitive || !w->geometry.complete(*primitive, from, d, hit)) {
@@ -166,6 +167,7 @@ TEST(Cylinders, ClosedByDisksLoseNoRay) {
       }
       o = hit.p;
       ng = hit.ng;
+      reach = hit.reach;
     }
     EXPECT_EQ(lost, 0u) << s;
   }

@@ -73,7 +73,7 @@ std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, uns
     }
     d = random_direction(rng);
     if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;  // inwards: these shapes are about the origin
-    o = offset_point(hit.p, hit.ng, d);
+    o = offset_point(hit, d);
   }
   return lost;
 }
@@ -284,7 +284,7 @@ TEST(Normals, ShadingFrameIsRightHandedAndAgreesWithTheGeometricNormal) {
 
 TEST(Offset, LeavesToTheSideOfTheDirection) {
   for (const float z : {-1.f, 1.f}) {
-    const V3 p = offset_point(V3(.5f, .25f, .125f), V3(0, 0, 1), V3(.1f, 0, z));
+    const V3 p = offset_point(V3(.5f, .25f, .125f), V3(0, 0, 1), 1, V3(.1f, 0, z));
     EXPECT_EQ(p.z > .125f, z > 0);
     EXPECT_NEAR(std::abs(p.z - .125f), 0x1p-20f, 0x1p-26f);
   }
