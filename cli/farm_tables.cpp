@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/say.h"
 #include "common/base/plain_text.h"
@@ -92,7 +93,7 @@ std::string jobs_table(const json& answer) {
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
                     time_of(job, "eta_seconds"),
-                    text(job, "name") +
+                    text(job, "name") + (unclean(job) ? " (numbers not clean)" : "") +
                         (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
   return rows.size() == 1 ? "no jobs" : table(rows);
 }
@@ -130,6 +131,8 @@ std::string job_text(const json& job) {
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)
       if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});
+  if (job.contains("health")) rows.push_back({"numbers", unclean(job) ? "not clean" : "clean"});
+  for (const std::string& line : health_lines(job)) rows.push_back({"", line});
   const json* frames = frames_of(job);
   return frames ? table(rows) + frames_table(*frames) : table(rows);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/patience.h"
 #include "cli/progress.h"
@@ -62,6 +63,7 @@ FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const Watch
 }
 
 int say_end(const json& job) {
+  say_health(job);
   const std::string state = text_field(job, "state"), id = text_field(job, "id");
   if (state == "done") return kOk;
   const std::string error = text_field(job, "error");

@@ -179,8 +179,10 @@ class LocalRender {
     if (!report) return tl::unexpected(report.error());
     if (options_.report)
       if (auto saved = save_result(*options_.report, *report); !saved) return saved;
+    if (!options_.quiet && say_summary)
+      say(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
+    say_report_health(*report);
     if (options_.quiet || !say_summary) return {};
-    say(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
     print("pixels_sha256 " + pixels_digest(*report));
     return {};
   }

@@ -17,8 +17,9 @@ int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std
     return usage_error(
         fmt::format("--pixel {},{}: the image is {} x {}, counted from 0", x, y, size.width, size.height));
   const render::SampleValue value = render::render_sample(*built->world, x, y, sample);
-  print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}{}", x, y, sample, value.rgb[0], value.rgb[1],
-                    value.rgb[2], value.finite ? "" : " (not finite: counts as zero)"));
+  print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}", x, y, sample, value.rgb[0], value.rgb[1],
+                    value.rgb[2]));
+  for (const auto& [cause, entry] : value.health.causes) print(sentence(cause, entry.count));
   return kOk;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/say.h"
 
@@ -50,9 +51,17 @@ std::string report_summary(const std::string& report) {
   if (const auto ci = pair_field(j, "relmse_ci95"))
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
   if (const std::string verdict = text_field(j, "verdict"); !verdict.empty()) line += ": " + verdict;
-  if (const auto bad = number(j, "nonfinite_samples"); bad > 0)
-    line += fmt::format("; {:g} samples were not finite and count as zero", bad);
   return line;
+}
+
+void say_report_health(const std::string& report) {
+  const json j = json::parse(report, nullptr, false);
+  if (!j.is_object()) return;
+  say_health(j);
+  if (const auto cut = number(j, "clamped_values"); cut > 0)
+    say(fmt::format("{:.0f} values are above 65504, the largest of a half-precision image, and stand in it as that; "
+                    "--float keeps them",
+                    cut));
 }
 
 std::string pixels_digest(const std::string& report) {

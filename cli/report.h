@@ -23,6 +23,8 @@ Result<std::string> local_report(const std::string& report, const LocalFacts& fa
 
 // What a person wants to know at the end, one line.
 std::string report_summary(const std::string& report);
+// What is wrong with its numbers, to stderr; nothing, as a rule.
+void say_report_health(const std::string& report);
 std::string pixels_digest(const std::string& report);  // empty if there is none
 
 std::uint64_t peak_rss_bytes();  // of this process and its ended children, the larger

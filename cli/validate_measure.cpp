@@ -60,11 +60,7 @@ std::uint64_t samples_gone_wrong(const render::Health& health) {
   return health.nonfinite + health.negative + health.majorant_violations;
 }
 
-void add(render::Health& sum, const render::Health& h) {
-  sum.nonfinite += h.nonfinite;
-  sum.negative += h.negative;
-  sum.majorant_violations += h.majorant_violations;
-}
+void add(render::Health& sum, const render::Health& h) { sum.merge(h); }
 
 render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples,
                                 int threads) {

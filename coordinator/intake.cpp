@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/job/replay_command.h"
 #include "common/protocol/limits.h"
 #include "common/scene/integrators.h"
 #include "common/scene/nori_words.h"
@@ -197,6 +198,11 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   return intake;
 }
 
+std::string replay_of(const StoredJob& job) {
+  const auto frame = frame_of(job.id);
+  return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
+}
+
 JobPlan plan_of(const StoredJob& job) {
   JobPlan plan;
   plan.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets};
@@ -206,6 +212,7 @@ JobPlan plan_of(const StoredJob& job) {
   plan.time = job.spec.time;
   plan.priority = job.spec.priority;
   plan.tags = job.spec.tags;
+  plan.replay = replay_of(job);
   return plan;
 }
 

@@ -28,6 +28,9 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
 tl::expected<std::vector<Intake>, Rejected> take_in_sequence(const SubmitRequest& request,
                                                              const BlobStore& blobs);
 
+// What renders one of its samples again: common/job/replay_command.h.
+std::string replay_of(const StoredJob& job);
+
 // The farm's view of a stored job.
 JobPlan plan_of(const StoredJob& job);
 

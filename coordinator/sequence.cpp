@@ -102,6 +102,7 @@ void add_up(JobView& v, std::span<const JobView> frames) {
     v.health.nonfinite += f.health.nonfinite;
     v.health.negative += f.health.negative;
     v.health.majorant_violations += f.health.majorant_violations;
+    if (const auto id = frame_of(f.id)) add_notes(v.notes, f.notes, id->frame);
   }
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
 }

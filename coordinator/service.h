@@ -17,6 +17,7 @@
 #include "common/base/error.h"
 #include "common/base/frame_range.h"
 #include "common/base/id.h"
+#include "common/job/health_notes.h"
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
 #include "common/scene/read.h"
@@ -80,7 +81,8 @@ struct JobView {
   double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
   double elapsed_seconds = 0, core_seconds = 0;
   double submitted_unix = 0;  // wall clock, for people
-  UnitHealth health;
+  Health health;                  // of what is folded; of a sequence its totals alone
+  std::vector<HealthNote> notes;  // the same for people; none: all is well
   // Of a sequence; its other figures are those of all frames together: sums, means over pixels, and
   // elapsed_seconds from the first ray of any frame to the last fold.
   std::optional<FramesView> frames;

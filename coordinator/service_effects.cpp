@@ -150,6 +150,7 @@ void Service::on(const JobStateChanged& e, Todo&) {
   if (e.to == JobState::cancelled || e.to == JobState::failed) {
     entry->stored.totals.render_seconds = entry->fold_seconds;
     entry->stored.totals.ended_unix = unix_now();
+    if (entry->assembly) entry->stored.totals.health = entry->assembly->health().total();
     entry->clock_zero.reset();
     entry->leased.clear();
     if (entry->assembly) entry->assembly->forget_waiting();
@@ -191,6 +192,7 @@ void Service::on(const JobFinished& e, Todo&) {
   entry->stored.stopped = e.stopped;
   entry->stored.totals.render_seconds = entry->fold_seconds;
   entry->stored.totals.ended_unix = unix_now();
+  if (entry->assembly) entry->stored.totals.health = entry->assembly->health().total();
   entry->clock_zero.reset();
   entry->finishing = ++last_final_;
   entry->leased.clear();

@@ -6,6 +6,7 @@
 
 #include "common/base/log.h"
 #include "common/image/final_image.h"
+#include "coordinator/intake.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -19,8 +20,14 @@ std::span<const std::byte> bytes_of(const std::string& text) { return std::as_by
 }  // namespace
 
 Provenance Service::provenance_of(const StoredJob& job) const {
-  return {job.scene,         canonical_json(job.settings), job.build, job.numeric_class.value_or(Digest{}),
-          job.settings.seed, job.totals.render_seconds};
+  const Health& health = job.totals.health;
+  return {job.scene,
+          canonical_json(job.settings),
+          job.build,
+          job.numeric_class.value_or(Digest{}),
+          job.settings.seed,
+          job.totals.render_seconds,
+          health.clean() ? "clean" : canonical_json(health)};
 }
 
 // All but the digest of the pixels, which takes its time.
@@ -29,8 +36,10 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
   facts.job = entry.stored;
   facts.job.state = shown_state(entry);
   facts.convergence = entry.points;
+  facts.replay = replay_of(entry.stored);
   if (!entry.assembly) return facts;
   const Film& film = entry.assembly->film();
+  facts.job.totals.health = entry.assembly->health().total();
   facts.samples = film.samples();
   facts.job.totals.spp_done =
       static_cast<double>(facts.samples) /
@@ -48,27 +57,30 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   entry->snapshot_running = true;
   entry->assembly->folds_since_snapshot = 0;
   entry->last_snapshot = now();
-  chores_.push([this, entry, film = entry->assembly->film(), errors = entry->assembly->errors()] {
-    if (const auto written = write_snapshot(entry, film, errors); !written)
+  chores_.push([this, entry, folded = folded_of(*entry)] {
+    if (const auto written = write_snapshot(entry, folded); !written)
       log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
     const std::lock_guard lock(mutex_);
     entry->snapshot_running = false;
   });
 }
 
-Result<void> Service::write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors) {
+Service::Folded Service::folded_of(const JobEntry& entry) {
+  return {entry.assembly->film(), entry.assembly->errors(), entry.assembly->health()};
+}
+
+Result<void> Service::write_snapshot(const EntryPtr& entry, const Folded& folded) {
   if (auto made = make_folder(folder(entry->stored.id)); !made) return made;  // nothing may have come of it
   return write_atomically(folder(entry->stored.id) / "film.snap",
-                          save_snapshot(film, errors, snapshot_format()));
+                          save_snapshot(folded.film, folded.errors, folded.health, snapshot_format()));
 }
 
 Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   std::unique_lock lock(mutex_);
   if (!entry->assembly || entry->removed) return {};
-  const Film film = entry->assembly->film();
-  const RoundErrors errors = entry->assembly->errors();
+  const Folded folded = folded_of(*entry);
   lock.unlock();
-  return write_snapshot(entry, film, errors);
+  return write_snapshot(entry, folded);
 }
 
 void Service::load_folded(JobEntry& entry) const {
@@ -81,8 +93,8 @@ void Service::load_folded(JobEntry& entry) const {
 void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   std::unique_lock lock(mutex_);
   if (entry->finishing != number || !entry->assembly) return;
-  const Film film = entry->assembly->film();
-  const RoundErrors errors = entry->assembly->errors();
+  const Folded folded = folded_of(*entry);
+  const Film& film = folded.film;
   ReportFacts facts = facts_locked(*entry);
   facts.job.state = JobState::done;
   const JobFigures figures = farm_.job(entry->stored.id).value_or(JobFigures{});
@@ -102,7 +114,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
           !done)
         return done;
       // Last and not to be missed: an extension goes on from it.
-      return write_snapshot(entry, film, errors);
+      return write_snapshot(entry, folded);
     }();
     if (!written) {
       lock.lock();

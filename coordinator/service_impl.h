@@ -221,7 +221,13 @@ class Service final : public Coordinator {
   // ---- final images and snapshots (service_finish.cpp), on the keeper thread ----
   void finish(const EntryPtr& entry, std::uint64_t number);
   void retire(const EntryPtr& entry);
-  Result<void> write_snapshot(const EntryPtr& entry, const Film& film, const RoundErrors& errors);
+  struct Folded {  // a cheap copy to work on outside of the lock
+    Film film;
+    RoundErrors errors;
+    HealthBook health;
+  };
+  static Folded folded_of(const JobEntry& entry);
+  Result<void> write_snapshot(const EntryPtr& entry, const Folded& folded);
   Result<void> write_snapshot_now(const EntryPtr& entry);
   ReportFacts facts_locked(const JobEntry& entry) const;
   Provenance provenance_of(const StoredJob& job) const;

@@ -116,7 +116,6 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  totals.health = {};
   std::set<std::tuple<TileIndex, RoundIndex, std::uint64_t>> seen;
   for (const auto& [record, place] : entry.log->found()) {
     if (record.tile >= entry.grid.count() ||
@@ -131,15 +130,12 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
         seen.erase({record.tile, record.round, record.samples.s1});
         continue;
       }
-      entry.assembly->hold(record.tile, record.round, {std::nullopt, place, record.samples, record.digest});
+      entry.assembly->hold(record.tile, record.round, {std::nullopt, place, record.samples, record.digest, record.health});
       entry.replay_at[{record.tile, record.round}] = record.at_seconds;
     }
     event.accepted.push_back({record.tile, record.round, record.samples, record.digest, record.worker});
     event.elapsed_seconds = std::max(event.elapsed_seconds, record.at_seconds);
     totals.core_seconds += record.cpu_seconds;
-    totals.health.nonfinite += record.health.nonfinite;
-    totals.health.negative += record.health.negative;
-    totals.health.majorant_violations += record.health.majorant_violations;
     entry.replay.emplace_back(record.at_seconds, record.cpu_seconds);
     if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
   }

@@ -122,13 +122,11 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
   if (wanted.verdict == Wanted::Verdict::yes && wanted.samples == a.expected.samples &&
       (!entry.log || place)) {
     entry.stored.totals.core_seconds += r.cpu_seconds;
-    entry.stored.totals.health.nonfinite += r.health.nonfinite;
-    entry.stored.totals.health.negative += r.health.negative;
-    entry.stored.totals.health.majorant_violations += r.health.majorant_violations;
     if (entry.assembly)
       entry.assembly->hold(
           r.unit.tile, r.unit.round,
-          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest});
+          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest,
+           r.health});
   }
   // A duplicate by the farm's book is compared there; a race that made one unstored is told as nothing: the
   // copy that was stored stands, and this one is equal or evidence the next time.

@@ -58,7 +58,7 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
   }
   static constexpr const char* kKept[] = {
       "seed",          "scene",          "spp",    "samples", "load_seconds", "render_seconds",
-      "core_seconds",  "peak_rss_bytes", "rmse",   "relmse",  "relmse_ci95",  "nonfinite_samples",
+      "core_seconds",  "peak_rss_bytes", "rmse",   "relmse",  "relmse_ci95",  "nonfinite_samples", "health",
       "pixels_sha256", "numeric_class",  "stopped"};
   json frames = json::array();
   std::uint64_t samples = 0, rss = 0;
@@ -96,6 +96,7 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
          {"nonfinite_samples", view.health.nonfinite},
          {"negative_samples", view.health.negative},
          {"majorant_violations", view.health.majorant_violations},
+         {"health", json::parse(health_json(view.health, view.notes))},
          {"pixels_sha256", all_done ? json(chain.finish().hex()) : json()},
          {"features_used", last.is_object() ? last.value("features_used", json()) : json::array()},
          {"features_left_out", last.is_object() ? last.value("features_left_out", json()) : json::array()},

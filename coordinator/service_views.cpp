@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/image/final_image.h"
+#include "coordinator/intake.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -94,7 +95,8 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.elapsed_seconds = elapsed_locked(entry);
   v.core_seconds = job.totals.core_seconds;
   v.submitted_unix = job.submitted_unix;
-  v.health = job.totals.health;
+  v.health = entry.assembly ? entry.assembly->health().total() : job.totals.health;
+  v.notes = health_notes(v.health, replay_of(job));
   v.spp = even_spp(job.spp.value_or(kMaxSppWithoutLimit));
   v.spp_done = job.totals.spp_done;
   v.units_done = job.totals.units;
@@ -196,6 +198,7 @@ Result<std::string> Service::report_json(const JobId& id) const {
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
   facts.pixels = pixels_sha256(shown->film);
+  if (!shown->job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
   if (facts.samples == 0 && shown->film.samples() > 0) {
     facts.samples = shown->film.samples();
     facts.error = image_error(shown->film.error());

@@ -51,10 +51,7 @@ json to_value(const JobView& v) {
          {"elapsed_seconds", number(v.elapsed_seconds)},
          {"core_seconds", number(v.core_seconds)},
          {"submitted_unix", number(v.submitted_unix)},
-         {"health",
-          {{"nonfinite", v.health.nonfinite},
-           {"negative", v.health.negative},
-           {"majorant_violations", v.health.majorant_violations}}}};
+         {"health", json::parse(health_json(v.health, v.notes))}};
   const auto frame = frame_of(v.id);
   j["sequence"] = frame ? json(frame->sequence.value) : json();
   j["frame"] = frame ? json(frame->frame) : json();

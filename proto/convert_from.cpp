@@ -114,6 +114,18 @@ Result<FromWorker> progress_from(const pb::Progress& in) {
   return progress;
 }
 
+Result<Health> health_from(const pb::UnitResult& in) {
+  if (in.health().empty() && in.nonfinite() == 0 && in.negative() == 0 && in.majorant_violations() == 0) return Health{};
+  auto health = parse_health(in.health().empty() ? "{}" : in.health());
+  if (!health) return wrong("result.health", health.error().message);
+  // Of a program that knows no causes.
+  const auto rest = [](std::uint64_t told, std::uint64_t named) { return told > named ? told - named : 0; };
+  health->add(HealthCause::unnamed, rest(in.nonfinite(), health->nonfinite));
+  health->add(HealthCause::negative, rest(in.negative(), health->negative));
+  health->add(HealthCause::majorant_violation, rest(in.majorant_violations(), health->majorant_violations));
+  return health;
+}
+
 Result<FromWorker> result_from(const pb::UnitResult& in) {
   LS_TRY(unit, key_from(in.unit()));
   LS_TRY(lease, id_from(in.lease(), "result.lease"));
@@ -122,13 +134,9 @@ Result<FromWorker> result_from(const pb::UnitResult& in) {
   if (in.exr().empty() || in.exr().size() > limits::kPartialBytes)
     return wrong("result.exr",
                  fmt::format("has {} bytes; 1 to {} are allowed", in.exr().size(), limits::kPartialBytes));
+  LS_TRY(health, health_from(in));
   const auto* bytes = reinterpret_cast<const std::byte*>(in.exr().data());
-  return UnitResult{unit,
-                    LeaseId{lease},
-                    {bytes, bytes + in.exr().size()},
-                    digest,
-                    cpu,
-                    {in.nonfinite(), in.negative(), in.majorant_violations()}};
+  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu, std::move(health)};
 }
 
 Result<FromWorker> failure_from(const pb::UnitFailure& in) {

@@ -68,6 +68,7 @@ void put(const UnitResult& result, pb::FromWorker& out) {
   r->set_nonfinite(result.health.nonfinite);
   r->set_negative(result.health.negative);
   r->set_majorant_violations(result.health.majorant_violations);
+  if (!result.health.clean()) r->set_health(canonical_json(result.health));
 }
 
 void put(const UnitFailure& failure, pb::FromWorker& out) {

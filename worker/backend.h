@@ -28,7 +28,7 @@ struct RenderedUnit {
   Partial partial;
   double cpu_seconds = 0;
   double wall_seconds = 0;  // from the first sample to the last
-  UnitHealth health;
+  Health health;
 };
 
 // Blocking calls, made from several threads of the agent at once (one a render thread). `stop` asks for an

@@ -71,7 +71,8 @@ class InProcessBackend final : public LocalBackend {
     out.partial.sums = std::move(tile.sums);
     out.cpu_seconds = thread_cpu_seconds() - start;
     out.wall_seconds = seconds(clock_.now() - begin);
-    out.health = {tile.health.nonfinite, tile.health.negative, tile.health.majorant_violations};
+    out.health = std::move(tile.health);
+    out.health.merge(render::changed_inputs(*ready));
     return out;
   }
 

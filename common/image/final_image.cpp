@@ -94,6 +94,15 @@ Digest pixels_sha256(const Film& film) {
   return hash.finish();
 }
 
+std::uint64_t values_above_half(const Film& film) {
+  std::uint64_t above = 0;
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    for (const double mean : film.pixels(t).mean) above += !(std::abs(pixel_value(mean)) <= kLargestHalf);
+  }
+  return above;
+}
+
 Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output) {
   Planes planes = gather(film);
   FinalImage out;
@@ -115,6 +124,7 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool floa
                      {"lightshaft:relmse", fmt::format("{:.9g}", image_error(film.error()).relmse)},
                      {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
                      {"lightshaft:tiles", tile_digests(film)}};
+  if (!from.health.empty()) picture.strings["lightshaft:health"] = from.health;
   auto exr = write_exr(picture);
   if (!exr) return tl::unexpected(exr.error());
   out.exr = std::move(*exr);

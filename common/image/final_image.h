@@ -27,6 +27,8 @@ struct Provenance {
   Digest numeric_class;
   std::uint64_t seed = 0;
   double seconds = 0;  // render time
+  // "clean", or canonical_json() of the Health; empty: not known, and not written.
+  std::string health;
 };
 struct FinalImage {
   std::vector<std::byte> exr;
@@ -34,6 +36,9 @@ struct FinalImage {
 };
 // Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp. Works on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+
+// How many values of R, G and B it clamps in a half image.
+std::uint64_t values_above_half(const Film& film);
 
 // A final EXR of somebody's, read back: the layers that every one has, and all its header strings. Sizes are
 // bounded.

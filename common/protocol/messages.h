@@ -14,6 +14,7 @@
 #include "common/base/digest.h"
 #include "common/base/id.h"
 #include "common/image/frame.h"
+#include "common/image/health.h"
 #include "common/image/rounds.h"
 #include "common/job/settings.h"
 
@@ -62,21 +63,13 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Counts of what went wrong numerically in a unit; all zero on a healthy one.
-struct UnitHealth {
-  std::uint64_t nonfinite = 0;            // samples that were NaN or infinite: counted, contributing zero
-  std::uint64_t negative = 0;             // samples with a negative channel: kept, counted
-  std::uint64_t majorant_violations = 0;  // densities above their bound
-  bool operator==(const UnitHealth&) const = default;
-};
-
 struct UnitResult {
   UnitKey unit;
   LeaseId lease;
   std::vector<std::byte> exr;  // encoded Partial
   Digest digest;               // unit_digest of it
   double cpu_seconds = 0;      // of the thread that rendered it
-  UnitHealth health;
+  Health health;
   bool operator==(const UnitResult&) const = default;
 };
 

@@ -44,6 +44,7 @@ Result<TileError> Assembly::fold(TileIndex tile, RoundIndex round, const Waiting
   const auto error = film_.fold(tile, round, *waiting.partial, waiting.digest);
   if (!error) return error;
   errors_.folded(tile, round, *error);
+  health_.folded(tile, round, waiting.samples, waiting.health);
   ++folds_since_snapshot;
   return error;
 }

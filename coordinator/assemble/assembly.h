@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/image/film.h"
+#include "coordinator/assemble/health_book.h"
 #include "coordinator/assemble/round_errors.h"
 #include "coordinator/store/partial_log.h"
 
@@ -20,12 +21,14 @@ struct WaitingPartial {
   std::optional<PartialLog::Place> place;
   SampleRange samples;
   Digest digest;
+  Health health;
 };
 
 class Assembly {
  public:
   Assembly(TileGrid grid, bool keep_relative) : film_(grid), errors_(grid.count(), keep_relative) {}
-  Assembly(Film film, RoundErrors errors) : film_(std::move(film)), errors_(std::move(errors)) {}
+  Assembly(Film film, RoundErrors errors, HealthBook health)
+      : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)) {}
 
   // Keeps a partial until take(). Its pixels are dropped, if it has a place, when too many wait
   // (kMaxPendingPartials).
@@ -39,6 +42,7 @@ class Assembly {
 
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
+  const HealthBook& health() const { return health_; }
   void checkpoint_taken(RoundIndex round) { errors_.checkpoint_taken(round); }
   // Rounds folded of each tile for a job of `spp` samples; a tail that was cut for fewer samples does not
   // count.
@@ -48,14 +52,16 @@ class Assembly {
  private:
   Film film_;
   RoundErrors errors_;
+  HealthBook health_;
   std::map<std::pair<TileIndex, RoundIndex>, WaitingPartial> waiting_;
   std::size_t waiting_bytes_ = 0;
 };
 
-// The folded state as a file: {"LSSNAP1\n", build, film, error figures}, closed by a SHA-256. Returned as
+// The folded state as a file: {"LSSNAP1\n", build, film, error figures, health}, closed by a SHA-256. Returned as
 // nothing if it is missing, damaged, of another grid or another build: then everything is folded again from
 // the partials.
-std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, std::string_view build);
+std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, const HealthBook& health,
+                                     std::string_view build);
 std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
                                       bool keep_relative, std::string_view build);
 

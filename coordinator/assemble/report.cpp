@@ -49,6 +49,7 @@ std::string report_json(const ReportFacts& facts) {
          {"nonfinite_samples", totals.health.nonfinite},
          {"negative_samples", totals.health.negative},
          {"majorant_violations", totals.health.majorant_violations},
+         {"health", json::parse(health_json(totals.health, health_notes(totals.health, facts.replay)))},
          {"clamped_values", facts.clamped_values},
          {"pixels_sha256", facts.pixels.hex()},
          {"features_used", job.features_used},

@@ -18,6 +18,7 @@ struct ReportFacts {
   Digest pixels;
   std::uint64_t clamped_values = 0;  // in the final EXR
   std::vector<ConvergencePoint> convergence;
+  std::string replay;  // the job's replay_command()
 };
 std::string report_json(const ReportFacts& facts);
 

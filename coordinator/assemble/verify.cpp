@@ -32,6 +32,8 @@ Verified verify_result(const UnitResult& result, const UnitHeader& expected, Fra
         fmt::format("{} bytes are more than the {} allowed", result.exr.size(), ls::limits::kPartialBytes));
   if (!std::isfinite(result.cpu_seconds) || result.cpu_seconds < 0)
     return bad(result, Errc::invalid_argument, "its CPU time is not a number of seconds");
+  if (const auto sound = check_health(result.health, expected.tile, round_range(result.unit.round)); !sound)
+    return bad(result, sound.error().code, sound.error().message);
   auto partial = decode_partial(result.exr, expected, frame);
   if (!partial) {
     const auto own = decode_partial_file(result.exr);

@@ -26,6 +26,7 @@ struct JobPlan {
   std::optional<double> time;          // seconds from the first ray
   int priority = 0;                    // higher first
   std::vector<std::string> tags;       // a worker must carry all of them
+  std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
 };
 
 // ---- jobs

@@ -4,6 +4,8 @@
 
 #include <set>
 
+#include "common/job/replay_command.h"
+
 namespace ls::coordinator {
 namespace {
 constexpr std::size_t kMaxAttemptsKept = 16;
@@ -36,7 +38,7 @@ const std::vector<FailedAttempt>& UnitFailures::attempts(UnitCode code) const {
 }
 
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
-                             const std::vector<FailedAttempt>& attempts) {
+                             const std::vector<FailedAttempt>& attempts, const std::string& replay) {
   std::string text;
   if (attempts.empty()) return text;
   const UnitFailure& last = attempts.back().failure;
@@ -52,8 +54,8 @@ std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
     if (a.failure.sample) text += fmt::format(" sample {}", *a.failure.sample);
   }
   if (last.pixel) {
-    text += fmt::format(". Replay it with: lightshaft render SCENE --pixel {},{} --sample {}",
-                        last.pixel->first, last.pixel->second, last.sample.value_or(samples.s0));
+    text += ". Replay it with: " + replay_command(replay, last.pixel->first, last.pixel->second,
+                                                  last.sample.value_or(samples.s0));
   }
   return text;
 }

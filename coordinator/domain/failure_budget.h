@@ -54,6 +54,6 @@ struct WorkerFailures {
 
 // The sentence for the job's owner: unit, pixel, signal, what each worker said, how to replay it.
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
-                             const std::vector<FailedAttempt>& attempts);
+                             const std::vector<FailedAttempt>& attempts, const std::string& replay);
 
 }  // namespace ls::coordinator

@@ -162,7 +162,7 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   }
   const auto report = [&](const std::string& head) {
     const PixelRect rect = job.plan.grid.rect(tile_of(code));
-    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code)), failure);
+    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay), failure);
   };
   if (job.failures.exhausted(code, known)) return report("");
   if (known > 0 && willing == 0) {

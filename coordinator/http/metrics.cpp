@@ -30,7 +30,7 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
   std::map<JobState, std::uint64_t> by_state;
   std::uint64_t done = 0, planned = 0;
   double core_seconds = 0, eta = 0, queued = 0;
-  UnitHealth health;
+  Health health;
   for (const auto& job : jobs) {
     ++by_state[job.state];
     core_seconds += job.core_seconds;

@@ -30,7 +30,7 @@ struct JobTotals {
   double spp_done = 0;
   std::uint64_t units = 0;          // done
   std::uint64_t units_planned = 0;  // 0: as many
-  UnitHealth health;
+  Health health;
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
   bool operator==(const JobTotals&) const = default;
 };

@@ -19,7 +19,9 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x3150534c;  // "LSP1"
+constexpr std::uint32_t kMagic = 0x3250534c;     // "LSP2"
+constexpr std::uint32_t kOldMagic = 0x3150534c;  // "LSP1": with three counters instead of a text
+constexpr std::uint64_t kHealthBytes = 64 << 10;
 
 // As on disk; little endian like every machine we run on.
 struct RawHeader {
@@ -28,7 +30,7 @@ struct RawHeader {
   std::uint64_t s0 = 0, s1 = 0;
   std::array<std::uint8_t, 32> digest{};
   double cpu_seconds = 0, at_seconds = 0;
-  std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
+  std::uint64_t health_bytes = 0, health_check = 0, unused = 0;
   std::array<char, ls::limits::kIdBytes> worker{};
   std::uint64_t payload_check = 0;
   std::uint64_t header_check = 0;  // over all before it
@@ -46,7 +48,7 @@ std::uint64_t header_check(const RawHeader& raw) {
   return check_of(std::as_bytes(std::span(&raw, 1)).first(offsetof(RawHeader, header_check)));
 }
 
-RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr) {
+RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr, std::span<const std::byte> health) {
   RawHeader raw;
   raw.bytes = static_cast<std::uint32_t>(exr.size());
   raw.tile = record.tile;
@@ -56,9 +58,8 @@ RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr) {
   raw.digest = record.digest.bytes;
   raw.cpu_seconds = record.cpu_seconds;
   raw.at_seconds = record.at_seconds;
-  raw.nonfinite = record.health.nonfinite;
-  raw.negative = record.health.negative;
-  raw.majorant_violations = record.health.majorant_violations;
+  raw.health_bytes = health.size();
+  if (!health.empty()) raw.health_check = check_of(health);
   std::memcpy(raw.worker.data(), record.worker.value.data(),
               std::min(record.worker.value.size(), raw.worker.size()));
   raw.payload_check = check_of(exr);
@@ -66,7 +67,7 @@ RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr) {
   return raw;
 }
 
-PartialRecord unpack(const RawHeader& raw) {
+PartialRecord unpack(const RawHeader& raw, Health health) {
   PartialRecord record;
   record.tile = raw.tile;
   record.round = raw.round;
@@ -74,10 +75,12 @@ PartialRecord unpack(const RawHeader& raw) {
   record.digest.bytes = raw.digest;
   record.cpu_seconds = raw.cpu_seconds;
   record.at_seconds = raw.at_seconds;
-  record.health = {raw.nonfinite, raw.negative, raw.majorant_violations};
+  record.health = std::move(health);
   record.worker.value.assign(raw.worker.data(), strnlen(raw.worker.data(), raw.worker.size()));
   return record;
 }
+
+std::uint64_t health_bytes(const RawHeader& raw) { return raw.magic == kMagic ? raw.health_bytes : 0; }
 
 // The header at `offset` if a whole record of a file of `size` bytes stands there.
 std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
@@ -87,9 +90,28 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   if (!bytes) return std::nullopt;
   RawHeader raw;
   std::memcpy(&raw, bytes->data(), sizeof raw);
-  if (raw.magic != kMagic || raw.header_check != header_check(raw)) return std::nullopt;
-  if (raw.bytes > ls::limits::kPartialBytes || raw.bytes > size - offset - sizeof raw) return std::nullopt;
+  if ((raw.magic != kMagic && raw.magic != kOldMagic) || raw.header_check != header_check(raw)) return std::nullopt;
+  if (raw.bytes > ls::limits::kPartialBytes || health_bytes(raw) > kHealthBytes ||
+      raw.bytes + health_bytes(raw) > size - offset - sizeof raw)
+    return std::nullopt;
   return raw;
+}
+
+// Nothing: damaged.
+std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
+                                const std::filesystem::path& path) {
+  Health health;
+  if (raw.magic == kOldMagic) {
+    health.add(HealthCause::unnamed, raw.health_bytes);
+    health.add(HealthCause::negative, raw.health_check);
+    health.add(HealthCause::majorant_violation, raw.unused);
+    return health;
+  }
+  if (raw.health_bytes == 0) return health;
+  const auto bytes = read_at(file, offset, raw.health_bytes, path);
+  if (!bytes || check_of(*bytes) != raw.health_check) return std::nullopt;
+  auto read = parse_health({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  return read ? std::optional(std::move(*read)) : std::nullopt;
 }
 
 }  // namespace
@@ -126,8 +148,11 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
       const auto exr = read_at(*file, at + sizeof(RawHeader), raw->bytes, path);
       if (!exr || check_of(*exr) != raw->payload_check) break;
     }
-    found_.push_back({unpack(*raw), {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
-    at += sizeof(RawHeader) + raw->bytes;
+    auto health = health_at(*file, at + sizeof(RawHeader) + raw->bytes, *raw, path);
+    if (!health) break;
+    found_.push_back(
+        {unpack(*raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
+    at += sizeof(RawHeader) + raw->bytes + health_bytes(*raw);
   }
   if (at == size) return {};
   // In an older segment this is damage of the disk: what follows is rendered again, the bytes stay for
@@ -163,17 +188,21 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
     if (auto made = make_folder(folder_); !made) return tl::unexpected(made.error());
     if (auto done = start_segment(0); !done) return tl::unexpected(done.error());
   }
-  if (size_ > 0 && size_ + sizeof(RawHeader) + exr.size() > limits::kMaxSegmentBytes) {
+  const std::string text = record.health.clean() ? "" : canonical_json(record.health);
+  const auto health = std::as_bytes(std::span(text));
+  const std::uint64_t whole = sizeof(RawHeader) + exr.size() + health.size();
+  if (size_ > 0 && size_ + whole > limits::kMaxSegmentBytes) {
     if (auto done = flush(); !done) {
       lost_ = done.error();
       return tl::unexpected(done.error());
     }
     if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
   }
-  const RawHeader raw = pack(record, exr);
+  const RawHeader raw = pack(record, exr, health);
   const auto path = segment_path(segment_);
   auto written = write_all(current_, std::as_bytes(std::span(&raw, 1)), path);
   if (written) written = write_all(current_, exr, path);
+  if (written && !health.empty()) written = write_all(current_, health, path);
   if (!written) {
     // Half a record must not stand before the next one; where it cannot be cut the next one opens a new
     // segment.
@@ -181,7 +210,7 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
     return tl::unexpected(written.error());
   }
   const Place place{segment_, size_ + sizeof raw, raw.bytes, raw.payload_check};
-  size_ += sizeof raw + exr.size();
+  size_ += whole;
   unsynced_ = true;
   return place;
 }

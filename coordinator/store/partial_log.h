@@ -1,5 +1,5 @@
 // Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed
-// size, closed by a checksum, and the EXR bytes. What stood in a file when sync() returned survives kill -9
+// size, closed by a checksum, the EXR bytes, and the unit's health as text where it isn't clean. What stood in a file when sync() returned survives kill -9
 // and power loss; a torn record behind it is found at open() and cut.
 //
 // append() and sync() from one thread; read() from any.
@@ -27,7 +27,7 @@ struct PartialRecord {
   WorkerId worker;
   double cpu_seconds = 0;
   double at_seconds = 0;  // since the job's first ray
-  UnitHealth health;
+  Health health;
   bool operator==(const PartialRecord&) const = default;
 };
 

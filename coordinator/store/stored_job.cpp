@@ -17,11 +17,23 @@ json to_value(const JobTotals& t) {
           {"spp_done", t.spp_done},
           {"units", t.units},
           {"units_planned", t.units_planned},
-          {"nonfinite", t.health.nonfinite},
-          {"negative", t.health.negative},
-          {"majorant_violations", t.health.majorant_violations},
+          {"health", json::parse(canonical_json(t.health))},
           {"began_unix", t.began_unix},
           {"ended_unix", t.ended_unix}};
+}
+
+Health health_of(const json& totals) {
+  Health health;
+  if (const auto causes = totals.find("health"); causes != totals.end()) {
+    auto read = parse_health(causes->dump());
+    if (!read) throw std::invalid_argument(read.error().message);
+    return std::move(*read);
+  }
+  // A record from before there were causes.
+  health.add(HealthCause::unnamed, totals.at("nonfinite").get<std::uint64_t>());
+  health.add(HealthCause::negative, totals.at("negative").get<std::uint64_t>());
+  health.add(HealthCause::majorant_violation, totals.at("majorant_violations").get<std::uint64_t>());
+  return health;
 }
 
 JobTotals totals_of(const json& j) {
@@ -33,7 +45,7 @@ JobTotals totals_of(const json& j) {
   t.spp_done = j.at("spp_done");
   t.units = j.at("units");
   t.units_planned = j.value("units_planned", std::uint64_t{0});
-  t.health = {j.at("nonfinite"), j.at("negative"), j.at("majorant_violations")};
+  t.health = health_of(j);
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
   return t;

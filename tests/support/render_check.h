@@ -30,7 +30,7 @@ struct Estimate {
   // Of the standard error (Satterthwaite, from the fourth powers of the differences): small where a few
   // pixels rule.
   std::array<double, 3> freedom{};
-  render::Health health;
+  Health health;
   std::string variant;
   double seconds = 0;
 };
@@ -79,11 +79,7 @@ inline Estimate estimate(const SceneKit& kit, std::uint64_t spp, std::uint64_t s
     e.standard_error[c] = std::sqrt(square) / pixels;
     e.freedom[c] = fourth > 0 ? 3 * square * square / fourth : pixels;
   }
-  for (const auto& r : results) {
-    e.health.nonfinite += r.health.nonfinite;
-    e.health.negative += r.health.negative;
-    e.health.majorant_violations += r.health.majorant_violations;
-  }
+  for (const auto& r : results) e.health.merge(r.health);
   return e;
 }
 

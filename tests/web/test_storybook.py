@@ -13,7 +13,7 @@ FACTS = {
     "job-queued": ["Waiting for a worker", "The first point appears"],
     "job-done": ["Done after 7 min: the target error is reached."],
     "job-failed": ["The job failed", "SIGSEGV on 3 workers", "lightshaft render forge-v12.xml --pixel 412,96 --sample 11"],
-    "job-unhealthy": ["The numbers of this image are not clean", "3 samples were not finite", "1,204 times the medium was denser", "2 warnings about the scene", "Don't trust this estimate yet"],
+    "job-unhealthy": ["The numbers of this image are not clean", "3 samples were not a number (NaN); they count as zero; first at pixel 412,96, sample 11.", "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 412,96 --sample 11", "1,204 times a medium was denser", "37 negative values of volumes of the scene were made 0.", "2 warnings about the scene", "Don't trust this estimate yet"],
     "job-unknown": ["There is no job \"nope\"."],
     "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 numeric classes", "lost", "6.2 min ago"],
     "workers-empty": ["No worker is connected", "lightshaft-worker --coordinator"],

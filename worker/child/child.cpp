@@ -307,7 +307,11 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   out.partial.sums.assign(slot.sums, slot.sums + unit.rect.pixels() * kPartialChannels);
   out.cpu_seconds = reply.cpu_seconds;
   out.wall_seconds = reply.wall_seconds;
-  out.health = {reply.nonfinite, reply.negative, reply.majorant_violations};
+  if (!answer->text.empty()) {
+    auto health = parse_health(answer->text);
+    if (!health) return {failed("the renderer's answer cannot be read: " + health.error().message), false};
+    out.health = std::move(*health);
+  }
   return {std::move(out), false};
 }
 

@@ -88,7 +88,7 @@ class Server {
   }
 
  private:
-  // Runs it; an exception becomes the reply's outcome.
+  // Runs it; an exception becomes the reply's outcome. What comes back is the reply's text.
   template <class Run>
   static std::string guarded(Reply& reply, Run run) {
     try {
@@ -155,10 +155,7 @@ class Server {
     std::copy(sums.begin(), sums.end(), slot.sums);
     reply.cpu_seconds = rendered->cpu_seconds;
     reply.wall_seconds = rendered->wall_seconds;
-    reply.nonfinite = rendered->health.nonfinite;
-    reply.negative = rendered->health.negative;
-    reply.majorant_violations = rendered->health.majorant_violations;
-    return {};
+    return rendered->health.clean() ? "" : canonical_json(rendered->health);
   }
 
   LocalBackend& backend_;

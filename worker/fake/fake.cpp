@@ -51,6 +51,8 @@ class FakeBackend final : public LocalBackend {
     out.partial =
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples});
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
+    if (faulty && options_.fault.kind == FakeFault::Kind::unwell)
+      out.health.add(HealthCause::infinite, 2, {unit.rect.x0, unit.rect.y0, unit.samples.s0});
     out.cpu_seconds = thread_cpu_seconds() - start;
     out.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
@@ -83,6 +85,7 @@ class FakeBackend final : public LocalBackend {
         while (!stop) ::usleep(1000);
         break;
       case FakeFault::Kind::wrong:
+      case FakeFault::Kind::unwell:
       case FakeFault::Kind::none:
         break;
     }
@@ -120,9 +123,11 @@ Result<FakeFault> parse_fake_fault(std::string_view text) {
     fault.kind = FakeFault::Kind::memory;
   else if (kind == "wrong")
     fault.kind = FakeFault::Kind::wrong;
+  else if (kind == "unwell")
+    fault.kind = FakeFault::Kind::unwell;
   else
     return fail(Errc::invalid_argument,
-                fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong", kind));
+                fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong, unwell", kind));
   while (end < text.size()) {
     const std::size_t begin = end + 1;
     end = std::min(text.find(',', begin), text.size());

@@ -15,11 +15,12 @@ namespace ls::worker {
 
 // Misbehaviour on chosen units, for tests.
 struct FakeFault {
-  enum class Kind { none, crash, hang, memory, wrong } kind = Kind::none;
+  enum class Kind { none, crash, hang, memory, wrong, unwell } kind = Kind::none;
   // Which units: of jobs with this seed, this tile, this round. Negative: any.
   std::int64_t seed = -1, tile = -1, round = -1;
 };
-// "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong; empty: none.
+// "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong, unwell; empty: none.
+// `unwell`: the pixels are right, but it tells of two infinite samples at the tile's first pixel.
 Result<FakeFault> parse_fake_fault(std::string_view text);
 
 Digest fake_numeric_class();  // SHA-256 of "fake"

@@ -88,7 +88,7 @@ struct HeteroBuilder {
     return load_volume(volume, files, w.geometry.center, w.geometry.scale, to_sigma);
   }
   std::array<const Grid*, 3> keep(LoadedVolume& volume) {
-    w.clamped_inputs += volume.clamped;
+    w.inputs.add(HealthCause::negative_density, volume.clamped);
     for (Grid& g : volume.channels) w.grids.push_back(std::move(g));
     const std::size_t n = volume.channels.size(), first = w.grids.size() - n;
     return {&w.grids[first], &w.grids[first + (n == 1 ? 0 : 1)], &w.grids[first + (n == 1 ? 0 : 2)]};
@@ -131,7 +131,7 @@ Result<void> HeteroBuilder::albedo() {
   auto loaded = load(volume, per_unit);
   if (!loaded) return tl::unexpected(loaded.error());
   // Look-ups stop at 1: no medium scatters more than it takes.
-  for (const Grid& g : loaded->channels) w.clamped_inputs += g.count_above(1);
+  for (const Grid& g : loaded->channels) w.inputs.add(HealthCause::bright_albedo, g.count_above(1));
   out.albedo = keep(*loaded);
   return {};
 }

@@ -39,8 +39,12 @@ inline constexpr float kForcedSurvival = .9998f;
 
 struct SampleOutcome {
   C3 radiance{0, 0, 0};
-  bool cut_off = false;
+  HealthCause cut_off = HealthCause::none;  // the first cause for which it is rejected, whatever its radiance
   std::uint64_t majorant_violations = 0;
+
+  void reject(HealthCause cause) {
+    if (cut_off == HealthCause::none) cut_off = cause;
+  }
 };
 
 template <Features F, template <Features> class Light = VertexLight>
@@ -158,7 +162,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
       if (is_finite(d_))
         add_environment();
       else
-        outcome_.cut_off = true;
+        outcome_.reject(HealthCause::no_direction);
       break;
     }
     add_emission(hit);
@@ -171,8 +175,9 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     const auto u = scatter_on_surface(hit);
     if (!u || !survives(*u)) break;
   }
-  outcome_.cut_off = outcome_.cut_off || segment_ == kMaxSegments;
-  if constexpr (F.overlaps) outcome_.cut_off = outcome_.cut_off || medium_.overflowed();
+  if (segment_ == kMaxSegments) outcome_.reject(HealthCause::too_many_surfaces);
+  if constexpr (F.overlaps)
+    if (medium_.overflowed()) outcome_.reject(HealthCause::nested_media);
   outcome_.majorant_violations = counters_.majorant_violations;
   return outcome_;
 }

@@ -50,7 +50,10 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     }
     if constexpr (F.media) medium = beyond(hit, d, d, medium);
     if constexpr (F.overlaps) {
-      if (medium.overflowed()) break;
+      if (medium.overflowed()) {
+        outcome_.reject(HealthCause::nested_media);
+        return {0, 0, 0};
+      }
     }
     const V3 next = offset_point(hit, d);
     if (std::isfinite(left)) left -= dot(next - o, d);
@@ -58,7 +61,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     o = next;
     if (!(left > 0)) return value;
   }
-  outcome_.cut_off = true;
+  outcome_.reject(HealthCause::too_many_surfaces);
   return {0, 0, 0};
 }
 

@@ -52,7 +52,24 @@ constexpr float kLargestRadiance = 0x1p96f;
 bool usable(const SampleOutcome& s) {
   const C3& c = s.radiance;
   return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
-         std::abs(c.z) <= kLargestRadiance && !s.cut_off;
+         std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
+}
+bool negative(const SampleOutcome& s) { return s.radiance.x < 0 || s.radiance.y < 0 || s.radiance.z < 0; }
+
+// Why it is not usable; none if it is.
+HealthCause rejected_for(const SampleOutcome& s) {
+  if (usable(s) || s.cut_off != HealthCause::none) return s.cut_off;
+  const C3& c = s.radiance;
+  if (std::isnan(c.x) || std::isnan(c.y) || std::isnan(c.z)) return HealthCause::not_a_number;
+  return is_finite(c) ? HealthCause::too_large : HealthCause::infinite;
+}
+
+// Out of the way of the samples that are right.
+[[gnu::cold, gnu::noinline]] void count(const SampleOutcome& s, const HealthSpot& spot, Health& health) {
+  health.add(HealthCause::majorant_violation, s.majorant_violations, spot);
+  const HealthCause cause = rejected_for(s);
+  health.add(cause, 1, spot);
+  if (cause == HealthCause::none && negative(s)) health.add(HealthCause::negative, 1, spot);
 }
 
 struct PixelSums {
@@ -65,14 +82,13 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
   for (std::uint64_t s = range.s0; s < range.s1; ++s) {
     if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
     const SampleOutcome out = sample(w, x, y, s);
-    health.majorant_violations += out.majorant_violations;
     // A sample that went wrong is counted, contributes zero and stays in N: never drawn again (STABILITY
     // N54).
-    if (!usable(out)) {
-      ++health.nonfinite;
-      continue;
+    const bool add = usable(out);
+    if (!add || out.majorant_violations > 0 || negative(out)) [[unlikely]] {
+      count(out, {x, y, s}, health);
+      if (!add) continue;
     }
-    if (out.radiance.x < 0 || out.radiance.y < 0 || out.radiance.z < 0) ++health.negative;
     for (int c = 0; c < 3; ++c) sums.half[s & 1][c] += static_cast<double>(out.radiance[c]);
   }
   return sums;
@@ -135,7 +151,9 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
   const SampleOutcome out = choose(world).sample(world, x, y, sample);
-  return {{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out)};
+  SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
+  count(out, {x, y, sample}, value.health);
+  return value;
 }
 
 WorldReport describe(const World& w) {
@@ -169,8 +187,10 @@ WorldReport describe(const World& w) {
              {"materials", w.bsdfs.bytes()},
              {"environment map", w.lights.map() ? w.lights.map()->bytes() : 0},
              {"grids", grids}};
-  r.clamped_inputs = w.clamped_inputs;
+  for (const auto& [cause, entry] : w.inputs.causes) r.clamped_inputs += entry.count;
   return r;
 }
+
+const Health& changed_inputs(const World& world) { return world.inputs; }
 
 }  // namespace ls::render

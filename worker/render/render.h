@@ -12,6 +12,7 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/image/frame.h"
+#include "common/image/health.h"
 #include "common/image/rounds.h"
 #include "common/job/settings.h"
 #include "common/scene/scene.h"
@@ -19,6 +20,7 @@
 namespace ls::render {
 
 class World;
+using ls::Health;
 
 // Where the bytes of the scene's assets lie on this machine.
 using AssetFiles = std::map<Digest, std::filesystem::path>;
@@ -28,9 +30,6 @@ using AssetFiles = std::map<Digest, std::filesystem::path>;
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
-struct Health {
-  std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
-};
 // Where the renderer is, for whoever must explain its death. Written with relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
@@ -39,7 +38,7 @@ struct Breadcrumb {
 
 struct TileResult {
   std::vector<float> sums;  // six planes, see common/image/partial.h
-  Health health;
+  Health health;             // of the samples, by cause and pixel; not of the inputs
   bool stopped = false;  // `stop` was seen: sums are not valid
 };
 
@@ -53,10 +52,11 @@ std::vector<std::string> covering_variants(const World& world);
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// One sample of one pixel: its radiance, for replay.
+// One sample of one pixel, for replay: its radiance, and what was wrong with it.
 struct SampleValue {
   double rgb[3];
-  bool finite;
+  bool finite;    // false: it is rejected
+  Health health;  // of this sample alone
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
 
@@ -68,6 +68,8 @@ struct WorldReport {
   // Negative densities and texels set to 0, degenerate triangles dropped, ...
   std::uint64_t clamped_inputs = 0;
 };
+// The same by cause.
+const Health& changed_inputs(const World& world);
 WorldReport describe(const World& world);
 
 // SHA-256 of the build and a start-up battery: machines of one class give the same bits. Computed once.

@@ -53,7 +53,7 @@ class World {
   // Of the image in the full frame, in pixels: the pixels of a crop are those of the frame.
   int origin_x = 0, origin_y = 0;
 
-  std::uint64_t clamped_inputs = 0;
+  Health inputs;  // what was changed of the scene's inputs, by cause
 
   bool depth_allows(int scatterings) const { return max_depth < 0 || scatterings < max_depth; }
 };

@@ -103,7 +103,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto geometry = Geometry::build(scene, loader);
   if (!geometry) return tl::unexpected(geometry.error());
   w.geometry = std::move(*geometry);
-  w.clamped_inputs += w.geometry.dropped_triangles;
+  w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
   auto textures = TextureTable::build(scene, [&](const Asset& a) -> Result<ImageData> {
     const auto it = files.find(a.digest);
     if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
@@ -114,7 +114,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto bsdfs = BsdfTable::build(scene, w.textures);
   if (!bsdfs) return tl::unexpected(bsdfs.error());
   w.bsdfs = std::move(*bsdfs);
-  w.clamped_inputs += w.textures.clamped_texels() + w.bsdfs.clamped_inputs();
+  w.inputs.add(HealthCause::negative_texel, w.textures.clamped_texels());
+  w.inputs.add(HealthCause::reflectance, w.bsdfs.clamped_inputs());
   note_surface_needs(scene, w);
   if (w.use_media) {
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
@@ -130,7 +131,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   });
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
-  w.clamped_inputs += w.lights.clamped_inputs();
+  w.inputs.add(HealthCause::negative_texel, w.lights.clamped_inputs());
   w.coincident = find_coincident(w.geometry);
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());

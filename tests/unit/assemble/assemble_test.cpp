@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -19,7 +20,7 @@ UnitHeader header(TileIndex tile, SampleRange samples) {
 WaitingPartial waiting(TileIndex tile, SampleRange samples) {
   Partial partial = fake_partial(header(tile, samples));
   const Digest digest = unit_digest(partial);
-  return {std::move(partial), std::nullopt, samples, digest};
+  return {std::move(partial), std::nullopt, samples, digest, {}};
 }
 UnitResult result_of(const Partial& partial) {
   UnitResult r;
@@ -73,7 +74,7 @@ TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
   for (TileIndex t = 0; t < kGrid.count(); ++t)
     for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
 
-  auto bytes = save_snapshot(assembly.film(), assembly.errors(), "f");
+  auto bytes = save_snapshot(assembly.film(), assembly.errors(), assembly.health(), "f");
 
   const auto loaded = load_snapshot(bytes, kGrid, false, "f");
   ASSERT_TRUE(loaded);
@@ -86,6 +87,57 @@ TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
     EXPECT_FALSE(load_snapshot(bytes, kGrid, false, "f")) << i;
     bytes[i] ^= std::byte{1};
   }
+}
+
+Health unwell(int x, std::uint64_t sample) {
+  Health h;
+  h.add(HealthCause::infinite, 1, {x, 0, sample});
+  return h;
+}
+
+TEST(HealthBook, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
+  HealthBook book, at_once;
+  book.folded(0, 0, {0, 2}, unwell(1, 0));
+  book.folded(0, 1, {2, 4}, {});
+  book.folded(0, 2, {4, 6}, unwell(1, 5));
+  book.folded(1, 2, {4, 6}, unwell(33, 5));
+  EXPECT_EQ(book.total().nonfinite, 3u);
+  EXPECT_EQ(HealthBook::load(book.save()).value(), book);
+
+  Health full = unwell(1, 5);
+  full.merge(unwell(1, 7));
+  book.folded(0, 2, {4, 8}, full);
+  book.folded(1, 2, {4, 8}, {});
+
+  at_once.folded(0, 0, {0, 2}, unwell(1, 0));
+  at_once.folded(0, 2, {4, 8}, full);
+  EXPECT_EQ(book, at_once);
+  EXPECT_EQ(book.total().nonfinite, 3u);
+}
+
+TEST(HealthBook, RefusesTextCutAnywhereAndOtherText) {
+  HealthBook book;
+  book.folded(0, 0, {0, 2}, unwell(1, 0));
+  book.folded(3, 2, {4, 6}, unwell(1, 5));
+  const std::string text = book.save();
+  const auto lines = [](std::string_view s) { return std::count(s.begin(), s.end(), '\n'); };
+  for (std::size_t n = 0; n < text.size(); ++n) {
+    const auto part = text.substr(0, n);
+    EXPECT_EQ(HealthBook::load(part).has_value(), part.ends_with('\n') && lines(part) == 1) << part;
+  }
+  for (const char* bad : {"", "x\n", "{}\n{}\n", "{}\n1{}\n", "{}\n-1 {}\n", "{}\n1 []\n"})
+    EXPECT_FALSE(HealthBook::load(bad)) << bad;
+  EXPECT_TRUE(HealthBook::load("{}\n"));
+}
+
+TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
+  Assembly assembly(kGrid, false);
+  WaitingPartial first = waiting(0, {0, 2});
+  first.health = unwell(1, 0);
+  ASSERT_TRUE(assembly.fold(0, 0, first));
+  const auto bytes = save_snapshot(assembly.film(), assembly.errors(), assembly.health(), "f");
+  EXPECT_EQ(load_snapshot(bytes, kGrid, false, "f").value().health(), assembly.health());
+  EXPECT_EQ(assembly.health().total(), first.health);
 }
 
 TEST(Assembly, ATailCutForFewerSamplesDoesNotCountForMore) {

@@ -71,6 +71,19 @@ TEST(Child, GivesTheSameBitsAsTheRendererInProcess) {
             direct->render(job, unit(0), kGoOn).value().partial);
 }
 
+TEST(Child, TellsOfTheHealthOfAUnit) {
+  const auto child = backend("unwell,tile=1");
+  const LocalJob job = job_with_seed(3);
+
+  const auto well = child->render(job, unit(0), kGoOn), unwell = child->render(job, unit(1), kGoOn);
+
+  EXPECT_TRUE(well.value().health.clean());
+  Health expected;
+  expected.add(HealthCause::infinite, 2, {0, 0, 0});
+  EXPECT_EQ(unwell.value().health, expected);
+  EXPECT_EQ(unwell.value().partial.sums, well.value().partial.sums);
+}
+
 TEST(Child, NamesSignalPixelAndSampleOfACrash) {
   const auto child = backend("crash,tile=1");
   const LocalJob job = job_with_seed(3);

@@ -33,6 +33,15 @@ AssignLease assignment() {
   return {lease, brief};
 }
 
+Health unwell() {
+  Health h;
+  h.add(HealthCause::infinite, 1, {1, 2, 3});
+  h.add(HealthCause::negative, 2, {1, 2, 3});
+  h.add(HealthCause::majorant_violation, 3, {4, 2, 3});
+  h.add(HealthCause::negative_density, 4);
+  return h;
+}
+
 const std::vector<FromWorker> kFromWorker = {
     WorkerHello{kProtocolVersion,
                 "n",
@@ -46,7 +55,8 @@ const std::vector<FromWorker> kFromWorker = {
                 WorkerId{"w-9"}},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
     UnitResult{
-        {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, {1, 2, 3}},
+        {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, unwell()},
+    UnitResult{{JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}}, digest_of_text("u"), 0.5, {}},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, true, "why", 11, std::pair{3, 4}, 99},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, false, "why", {}, {}, {}},
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}},
@@ -68,6 +78,23 @@ template <class Message, class Wire>
 Result<Message> over_the_wire(const Message& message, Wire wire) {
   wire.ParseFromString(to_wire(message).SerializeAsString());
   return from_wire(wire);
+}
+
+// A worker that knows no causes is not taken for a healthy one.
+TEST(Convert, CountsWithoutCausesAreKeptAsSuch) {
+  pb::FromWorker wire = to_wire(FromWorker(kFromWorker[2]));
+  wire.mutable_result()->set_nonfinite(5);
+  const auto more = std::get<UnitResult>(from_wire(wire).value());
+  EXPECT_EQ(more.health.nonfinite, 5u);
+  EXPECT_EQ(more.health.causes.at(HealthCause::unnamed).count, 4u);
+
+  wire.mutable_result()->clear_health();
+  const auto old = std::get<UnitResult>(from_wire(wire).value());
+  EXPECT_EQ(old.health.causes.at(HealthCause::unnamed).count, 5u);
+  EXPECT_EQ(old.health.negative, 2u);
+
+  wire.mutable_result()->set_health("[]");
+  EXPECT_THAT(from_wire(wire).error().message, HasSubstr("result.health"));
 }
 
 TEST(Convert, ReadsEveryWorkerMessageBackAsItWas) {

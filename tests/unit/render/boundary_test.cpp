@@ -83,7 +83,11 @@ TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
   kit.look({0, -.1, .15}, {0, 0, 0});
   kit.scene.sensor.fov = 10;
   const auto world = test::world_of(kit);
-  for (std::uint64_t s = 0; s < 16; ++s) EXPECT_FALSE(render_sample(*world, 0, 0, s).finite) << s;
+  for (std::uint64_t s = 0; s < 16; ++s) {
+    const SampleValue value = render_sample(*world, 0, 0, s);
+    EXPECT_FALSE(value.finite) << s;
+    EXPECT_EQ(value.health.causes.count(HealthCause::too_many_surfaces), 1u) << s;
+  }
 }
 
 }  // namespace

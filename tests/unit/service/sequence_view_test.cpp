@@ -58,7 +58,7 @@ TEST(SequenceView, AddsUpAndWeighsByPixels) {
   auto frames = with({JobState::done, JobState::running});
   frames[0].size = {10, 30};
   frames[0].spp_done = 16, frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 3;
-  frames[0].health.nonfinite = 2;
+  frames[0].health.add(HealthCause::infinite, 2, {1, 2, 3});
   frames[1].spp_done = 8, frames[1].progress = .5, frames[1].units_done = 4, frames[1].core_seconds = 1;
 
   const JobView v = whole(frames);

@@ -25,7 +25,7 @@ StoredJob sample_job(std::string id) {
   job.stopped = StopReason::error;
   job.numeric_class = sha256("class");
   job.totals.core_seconds = 12.125;
-  job.totals.health.nonfinite = 3;
+  job.totals.health.add(HealthCause::infinite, 3, {4, 5, 6});
   return job;
 }
 

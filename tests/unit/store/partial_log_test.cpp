@@ -19,7 +19,6 @@ PartialRecord record(std::uint32_t n) {
   r.worker.value = "w-" + std::to_string(n);
   r.cpu_seconds = n * .5;
   r.at_seconds = n;
-  r.health = {n, 1, 2};
   return r;
 }
 std::vector<std::byte> payload(std::uint32_t n, std::size_t size = 700) {
@@ -44,6 +43,54 @@ TEST(PartialLog, CostsNoFileBeforeTheFirstRecord) {
   ASSERT_TRUE(log->sync());
 
   EXPECT_EQ(PartialLog::open(folder).value()->found().size(), 1u);
+}
+
+PartialRecord unwell(std::uint32_t n) {
+  PartialRecord r = record(n);
+  r.health.add(HealthCause::infinite, 2, {static_cast<int>(n), 1, 3});
+  r.health.add(HealthCause::negative_density, 7);
+  return r;
+}
+
+TEST(PartialLog, KeepsTheHealthOfARecord) {
+  TempFolder dir;
+  {
+    auto log = PartialLog::open(dir.path()).value();
+    for (std::uint32_t i = 0; i < 6; ++i)
+      ASSERT_TRUE(log->append(i % 2 ? unwell(i) : record(i), payload(i)));
+    ASSERT_TRUE(log->sync());
+  }
+  const auto log = PartialLog::open(dir.path()).value();
+  ASSERT_EQ(log->found().size(), 6u);
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(log->found()[i].record, i % 2 ? unwell(i) : record(i));
+    EXPECT_EQ(log->read(log->found()[i].place).value(), payload(i));
+  }
+}
+
+// A record ends with the text of its health: what of it is missing, or is another text, is no health.
+TEST(PartialLog, CutsARecordWhoseHealthIsTornOrDamaged) {
+  for (const bool torn : {true, false}) {
+    TempFolder dir;
+    {
+      auto log = PartialLog::open(dir.path()).value();
+      ASSERT_TRUE(log->append(record(0), payload(0)));
+      ASSERT_TRUE(log->append(unwell(1), payload(1)));
+      ASSERT_TRUE(log->sync());
+    }
+    const auto file = dir.path() / "partials-000.seg";
+    const auto size = std::filesystem::file_size(file);
+    if (torn) {
+      std::filesystem::resize_file(file, size - 1);
+    } else {
+      std::fstream damaged(file, std::ios::binary | std::ios::in | std::ios::out);
+      damaged.seekp(static_cast<std::streamoff>(size - 10));
+      damaged.put('9');
+    }
+    const auto log = PartialLog::open(dir.path()).value();
+    ASSERT_EQ(log->found().size(), 1u) << torn;
+    EXPECT_EQ(std::filesystem::file_size(file), kRecordBytes);
+  }
 }
 
 TEST(PartialLog, FindsEveryRecordAfterReopening) {

@@ -5,7 +5,7 @@ const kNow = 1765000000; // unix seconds
 const job = (id, name, state, more = {}) => ({
   id, name, state, stopped: "", progress: 0, spp: 512, spp_done: 0, rmse: null, relmse: null, relmse_ci95: null, target_error: null,
   eta_seconds: null, error: "", warnings: [], size: [640, 360], tile: 32, priority: 0, units_done: 0, units_total: 2880,
-  elapsed_seconds: 0, core_seconds: 0, submitted_unix: kNow, health: { nonfinite: 0, negative: 0, majorant_violations: 0 }, ...more,
+  elapsed_seconds: 0, core_seconds: 0, submitted_unix: kNow, health: { clean: true, nonfinite: 0, negative: 0, majorant_violations: 0, causes: [] }, ...more,
 });
 
 const half = {
@@ -27,7 +27,11 @@ export const jobs = [
 ];
 
 export const unhealthy = job("j-7f3a91c2", "steam-bath.xml", "running", {
-  ...half, submitted_unix: kNow - 240, health: { nonfinite: 3, negative: 0, majorant_violations: 1204 },
+  ...half, submitted_unix: kNow - 240, health: { clean: false, nonfinite: 3, negative: 0, majorant_violations: 1204, causes: [
+    { cause: "not_a_number", effect: "rejected", count: 3, text: "3 samples were not a number (NaN); they count as zero", frame: null, first: [{ pixel: [412, 96], sample: 11 }], replay: "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 412,96 --sample 11" },
+    { cause: "majorant_violation", effect: "kept", count: 1204, text: "1,204 times a medium was denser than its bound, so the image may be biased", frame: null, first: [{ pixel: [300, 2], sample: 7 }], replay: "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 300,2 --sample 7" },
+    { cause: "negative_density", effect: "input", count: 37, text: "37 negative values of volumes of the scene were made 0", frame: null, first: [], replay: null },
+  ] },
   warnings: ["steam-bath.xml:31:9: warning: 'strict_normals' means nothing here and is ignored", "steam-bath.xml:52:5: warning: 37 voxels of \"steam\" were negative and became 0"],
 });
 

@@ -142,13 +142,12 @@ export function jobsInOrder(state) {
     (a, b) => (rank[a.state] ?? 3) - (rank[b.state] ?? 3) || b.submitted_unix - a.submitted_unix || (a.id < b.id ? -1 : 1));
 }
 
-/** Sentences about figures that should be zero and are not. */
+/** What is wrong with the numbers of a job: {key, text, place, replay} for each cause; nothing if all is well. */
 export function healthComplaints(job) {
-  const health = job.health ?? {};
-  const say = (n, text) => (n > 0 ? [`${n.toLocaleString("en")} ${text}`] : []);
-  return [
-    ...say(health.nonfinite, "samples were not finite; they count as black"),
-    ...say(health.negative, "samples were negative"),
-    ...say(health.majorant_violations, "times the medium was denser than its bound, so the image may be biased"),
-  ];
+  return (job.health?.causes ?? []).map(({ cause, text, first, frame, replay }) => ({ key: cause, text, place: placeOf(first?.[0], frame), replay: replay ?? null }));
+}
+
+function placeOf(spot, frame) {
+  if (!spot) return null;
+  return `first ${frame === null || frame === undefined ? "" : `in frame ${frame} `}at pixel ${spot.pixel.join(",")}, sample ${spot.sample.toLocaleString("en")}`;
 }

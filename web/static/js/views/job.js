@@ -58,10 +58,14 @@ function alerts(job) {
   const warnings = job.warnings ?? [];
   return [
     job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? "The job failed" : "Something is wrong", h("pre", null, job.error))) : null,
-    complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map((text) => h("li", { key: text }, text))))) : null,
+    complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,
     warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
   ];
 }
+
+const complaint = ({ key, text, place, replay }) => h("li", { key },
+  place ? `${text}; ${place}.` : `${text}.`,
+  replay ? h("p", { key: "replay", class: "replay" }, "See it again: ", h("code", null, replay)) : null);
 
 function downloadLinks(job) {
   const link = (href, label, hint, name) => h("a", { key: label, class: "button", href, download: name }, label, h("small", null, hint));
