@@ -147,10 +147,12 @@ FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::file
   return {};
 }
 
-FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Digest& text,
+FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const JobSpec& spec,
+                                              const Digest& text,
                                               const std::function<void(const std::string&)>& said) {
   std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};  // null: the scene's text
-  for (const auto& [name, file] : scene.files) by_digest.emplace(file.digest.hex(), &file);
+  for (const auto& [name, file] : scene.files)
+    if (is_needed(scene, spec, file)) by_digest.emplace(file.digest.hex(), &file);
   for (auto next = by_digest.begin(); next != by_digest.end();) {
     json question{{"digests", json::array()}};
     for (; next != by_digest.end() && question["digests"].size() < kDigestsPerQuestion; ++next)
@@ -178,7 +180,7 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Dig
 FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& spec,
                                       const std::function<void(const std::string&)>& said) {
   const Digest text = sha256(scene.text);
-  if (auto sent = upload_missing(scene, text, said); !sent) return tl::unexpected(sent.error());
+  if (auto sent = upload_missing(scene, spec, text, said); !sent) return tl::unexpected(sent.error());
   json body{{"scene", text.hex()},
             {"assets", json::object()},
             {"name", std::filesystem::path(scene.name).filename().string()}};

@@ -42,7 +42,7 @@ class FarmApi {
 
  private:
   explicit FarmApi(HttpClient client) : client_(std::move(client)) {}
-  Answer<void> upload_missing(const LocalScene& scene, const Digest& text,
+  Answer<void> upload_missing(const LocalScene& scene, const JobSpec& spec, const Digest& text,
                               const std::function<void(const std::string&)>& said);
   HttpClient client_;
 };

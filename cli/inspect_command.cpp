@@ -1,69 +1,69 @@
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include <algorithm>
+#include <span>
 
 #include "cli/commands.h"
+#include "cli/inspection.h"
 #include "cli/job_options.h"
 #include "cli/local_world.h"
 #include "cli/say.h"
-#include "common/base/plain_text.h"
 #include "worker/machine.h"
+#include "worker/render/counters_list.h"
 
 namespace ls::cli {
 namespace {
 
-using nlohmann::ordered_json;
-
 struct Flags {
   std::string scene, frame;
   std::vector<std::string> defines;
-  bool json = false, strict = false;
+  bool json = false, strict = false, variants = false, work = false;
 };
 
-ordered_json to_json(const LocalScene& scene, const LocalWorld& built, const render::WorldReport& report) {
-  const auto& job = built.job;
-  ordered_json j{{"scene", scene.name},
-                 {"scene_sha256", job.scene.hex()},
-                 {"size", {job.settings.size.width, job.settings.size.height}},
-                 {"spp", job.spp ? ordered_json(*job.spp) : ordered_json()},
-                 {"integrator", job.settings.integrator},
-                 {"max_depth", job.settings.max_depth},
-                 {"variant", report.variant},
-                 {"features_used", report.used},
-                 {"features_left_out", report.left_out},
-                 {"assets", ordered_json::array()},
-                 {"structures", ordered_json::array()},
-                 {"clamped_inputs", report.clamped_inputs},
-                 {"warnings", job.warnings}};
-  for (const BlobRef& asset : job.assets)
-    j["assets"].push_back({{"name", asset.name}, {"bytes", asset.bytes}, {"sha256", asset.digest.hex()}});
-  for (const auto& [name, bytes] : report.bytes)
-    j["structures"].push_back({{"name", name}, {"bytes", bytes}});
-  return j;
+// Enough to meet what a scene has, and little enough to wait for.
+constexpr int kSmallSide = 32;
+constexpr SampleRange kSmallSamples{0, 4};
+
+FrameSize small(FrameSize size) {
+  const int longer = std::max(size.width, size.height);
+  const auto scaled = [&](int x) { return longer <= kSmallSide ? x : std::max(1, x * kSmallSide / longer); };
+  return {scaled(size.width), scaled(size.height)};
 }
 
-void print_list(const char* title, const std::vector<std::string>& items) {
-  if (items.empty()) return;
-  print(title);
-  for (const std::string& item : items) print("  " + plain_text(item));
+// The sums of a small image by every instantiation that covers the scene.
+tl::expected<std::vector<VariantBits>, coordinator::Rejected> render_variants(const LocalScene& scene,
+                                                                              JobSpec spec, FrameSize full) {
+  spec.size = small(full);
+  const auto built = build_local_world(scene, spec, worker::usable_cpus());
+  if (!built) return tl::unexpected(built.error());
+  std::vector<VariantBits> out;
+  for (const std::string& name : render::covering_variants(*built->world)) {
+    const auto tile = render::render_tile_as(*built->world, name, {0, 0, spec.size->width, spec.size->height},
+                                             kSmallSamples);
+    out.push_back({name, sha256(std::as_bytes(std::span(tile.sums)))});
+  }
+  return out;
 }
 
-void print_text(const LocalScene& scene, const LocalWorld& built, const render::WorldReport& report) {
-  const auto& job = built.job;
-  print(fmt::format("{}: {} x {} pixels, {} samples per pixel, integrator {} ({})", plain_text(scene.name),
-                    job.settings.size.width, job.settings.size.height, job.spp.value_or(0),
-                    job.settings.integrator, report.variant));
-  print_list("used", report.used);
-  print_list("left out", report.left_out);
-  if (!job.assets.empty()) print("assets");
-  for (const BlobRef& asset : job.assets)
-    print(fmt::format("  {}  {}", plain_text(asset.name), show_bytes(asset.bytes)));
-  if (!report.bytes.empty()) print("in memory");
-  for (const auto& [name, bytes] : report.bytes)
-    print(fmt::format("  {}  {}", plain_text(name), show_bytes(bytes)));
-  if (report.clamped_inputs > 0)
-    print(fmt::format("{} inputs were clamped (negative densities and texels, degenerate triangles)",
-                      report.clamped_inputs));
+// What a small image takes, by kind.
+tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
+    [[maybe_unused]] const LocalScene& scene, [[maybe_unused]] JobSpec spec,
+    [[maybe_unused]] FrameSize full) {
+#ifdef LIGHTSHAFT_COUNT
+  spec.size = small(full);
+  const auto built = build_local_world(scene, spec, worker::usable_cpus());
+  if (!built) return tl::unexpected(built.error());
+  render::work_counters() = {};
+  render::render_tile(*built->world, {0, 0, spec.size->width, spec.size->height}, kSmallSamples, nullptr,
+                      nullptr);
+  nlohmann::ordered_json work;
+  for (const auto& [name, count] : render::listed(render::work_counters())) work[name] = count;
+  return work;
+#else
+  return tl::unexpected(coordinator::Rejected{
+      {Errc::invalid_argument, "this build does not count work: configure one with -DLIGHTSHAFT_COUNT=ON"},
+      {}});
+#endif
 }
 
 int run(const Flags& flags) {
@@ -83,12 +83,22 @@ int run(const Flags& flags) {
   if (!built) return say_rejected(built.error());
   for (const std::string& warning : built->job.warnings)
     fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
-  const render::WorldReport report = render::describe(*built->world);
-  if (flags.json)
-    print(to_json(*scene, *built, report).dump(2, ' ', false, ordered_json::error_handler_t::replace));
-  else
-    print_text(*scene, *built, report);
-  return kOk;
+  std::vector<VariantBits> variants;
+  if (flags.variants) {
+    auto rendered = render_variants(*scene, spec, built->job.settings.size);
+    if (!rendered) return say_rejected(rendered.error());
+    variants = std::move(*rendered);
+  }
+  auto told = inspection(*scene, *built, variants);
+  if (flags.work) {
+    const auto work = count_work(*scene, spec, built->job.settings.size);
+    if (!work) return say_rejected(work.error());
+    told["work"] = *work;
+  }
+  const auto text = flags.json ? told.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                               : inspection_text(told);
+  fmt::print("{}", text);
+  return told.value("variants_agree", true) ? kOk : kFailed;
 }
 
 }  // namespace
@@ -103,6 +113,11 @@ void add_inspect(CLI::App& app, Action& action) {
       ->type_name("name=value");
   inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   inspect->add_flag("--strict", flags->strict, "warnings are errors");
+  inspect->add_flag(
+      "--variants", flags->variants,
+      "renders a small image with every instantiation that covers the scene: their bits must be the same");
+  inspect->add_flag("--work", flags->work,
+                    "counts the work of a small image (builds with LIGHTSHAFT_COUNT only)");
   inspect->add_flag("--json", flags->json, "as JSON");
   inspect->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }

@@ -11,7 +11,9 @@
 
 #include "common/job/frame_diagnostics.h"
 #include "common/scene/folder_assets.h"
+#include "common/scene/integrators.h"
 #include "common/scene/limits.h"
+#include "common/scene/prune.h"
 
 namespace ls::cli {
 namespace {
@@ -36,6 +38,7 @@ class RecordedFolder final : public AssetSource {
     auto text = folder_.text(name);
     if (!text) return text;
     if (const auto asset = find(name); !asset) return tl::unexpected(asset.error());
+    if (const auto file = files_.find(std::string(name)); file != files_.end()) file->second.is_text = true;
     texts_ += *text;
     return text;
   }
@@ -131,8 +134,12 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
         {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
   if (auto unused = unused_define(in.defines, in.text + included))
     return refused(in.path, std::move(*unused));
-  return LocalScene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
-                    std::move(files), frame};
+  LocalScene scene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
+                   std::move(files), frame};
+  for (const bool sees_media : {false, true})
+    for (const Asset& a : scene::pruned(scene.scene, sees_media).scene.assets)
+      scene.needed[sees_media].insert(a.digest);
+  return scene;
 }
 
 tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const FrameRange& frames) {
@@ -145,10 +152,12 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const Fram
     if (wrong.full()) break;
     if (!scene) continue;
     warned.add(frame, scene->warnings);
-    if (first)
+    if (first) {
       first->files.merge(scene->files);
-    else
+      for (std::size_t i = 0; i < first->needed.size(); ++i) first->needed[i].merge(scene->needed[i]);
+    } else {
       first = std::move(*scene);
+    }
   }
   if (!wrong.empty())
     return tl::unexpected(coordinator::Rejected{
@@ -174,6 +183,11 @@ tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string
     return tl::unexpected(coordinator::Rejected{
         {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
   return LocalTest{std::move(*read.test), std::move(read.diagnostics), folder.take_files()};
+}
+
+bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file) {
+  const std::string integrator = spec.integrator.value_or(scene.scene.integrator.name);
+  return file.is_text || scene.needed[scene::sees_media(integrator)].contains(file.digest);
 }
 
 coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec) {

@@ -1,11 +1,13 @@
 // A scene on this machine's disk: read, checked, with every file that it names.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@ struct LocalFile {
   std::filesystem::path path;
   Digest digest;
   std::uint64_t bytes = 0;
+  bool is_text = false;  // an included scene file
 };
 
 struct LocalScene {
@@ -28,7 +31,13 @@ struct LocalScene {
   std::vector<Diagnostic> warnings;
   std::map<std::string, LocalFile> files;  // by the name in the scene: assets and included scene files
   std::optional<std::uint32_t> frame;      // that it was read as
+  // Assets that a job makes use of, with an integrator that sees no media and with one that does: the others
+  // need not travel.
+  std::array<std::set<Digest>, 2> needed = {};
 };
+
+// Whether the job makes use of this file of the scene.
+bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file);
 
 // File names are relative to the scene's folder. `strict`: warnings are errors. `frame`: of a sequence.
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(

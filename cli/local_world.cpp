@@ -1,5 +1,7 @@
 #include "cli/local_world.h"
 
+#include "common/scene/integrators.h"
+#include "common/scene/serialize.h"
 #include "coordinator/store/memory_blobs.h"
 #include "worker/render/thread_limit.h"
 
@@ -17,11 +19,16 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   auto intake = coordinator::take_in(submit_request(scene, spec), blobs, scene.frame);
   if (!intake) return tl::unexpected(std::move(intake.error()));
   const auto limit = render::limit_threads(threads);
-  auto world = render::build_world(scene.scene, intake->job.settings, files, threads);
+  // As a worker would get it.
+  const auto stored = deserialize_scene(intake->scene_json);
+  if (!stored) return tl::unexpected(coordinator::Rejected{stored.error(), {}});
+  auto world = render::build_world(*stored, intake->job.settings, files, threads);
   if (!world && world.error().code == Errc::invalid_argument)
     return tl::unexpected(scene_fault(scene, world.error().message));
   if (!world) return tl::unexpected(coordinator::Rejected{world.error(), {}});
-  return LocalWorld{std::move(intake->job), std::move(*world)};
+  const bool sees_media = scene::sees_media(intake->job.settings.integrator);
+  return LocalWorld{std::move(intake->job), std::move(*world), scene::needs_of(*stored, sees_media),
+                    intake->scene_json.size()};
 }
 
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "cli/local_scene.h"
+#include "common/scene/needs.h"
 #include "coordinator/intake.h"
 #include "worker/render/render.h"
 
@@ -13,6 +14,8 @@ namespace ls::cli {
 struct LocalWorld {
   coordinator::StoredJob job;  // settings and samples as a job would have them; warnings
   std::shared_ptr<const render::World> world;
+  scene::Needs needs;
+  std::uint64_t scene_bytes = 0;  // of the canonical scene, as it goes to workers
 };
 // The settings are resolved and the limits checked exactly as for a job.
 tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,

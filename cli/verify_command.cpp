@@ -15,6 +15,8 @@
 #include "cli/say.h"
 #include "cli/verify_image.h"
 #include "common/base/plain_text.h"
+#include "common/scene/integrators.h"
+#include "common/scene/prune.h"
 #include "common/scene/serialize.h"
 #include "coordinator/store/files.h"
 #include "worker/machine.h"
@@ -133,8 +135,10 @@ int run(const Flags& flags) {
   if (!defines) return say_error(defines.error());
   const auto image = open_image(flags.image);
   if (!image) return say_error(image.error());
-  const auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame);
+  auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame);
   if (!scene) return say_rejected(scene.error());
+  // What a job of it renders.
+  scene->scene = scene::pruned(scene->scene, scene::sees_media(image->settings.integrator)).scene;
   if (const auto same = check_same(*image, *scene, flags); !same) return say_error(same.error());
   const int threads = flags.threads > 0 ? flags.threads : worker::usable_cpus();
   const auto limit = render::limit_threads(threads);

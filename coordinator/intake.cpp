@@ -12,68 +12,12 @@
 #include "common/scene/integrators.h"
 #include "common/scene/nori_words.h"
 #include "common/scene/serialize.h"
-#include "coordinator/features.h"
+#include "coordinator/analysis.h"
+#include "coordinator/intake_scene.h"
 #include "coordinator/limits.h"
 
 namespace ls::coordinator {
 namespace {
-
-// "./a/b.obj" and "a/b.obj" are one name.
-std::string plain_name(std::string_view name) {
-  while (name.starts_with("./")) name.remove_prefix(2);
-  return std::string(name);
-}
-
-class UploadedAssets final : public AssetSource {
- public:
-  UploadedAssets(const std::map<std::string, Digest>& assets, const BlobStore& blobs) : blobs_(blobs) {
-    for (const auto& [name, digest] : assets) assets_.emplace(plain_name(name), digest);
-  }
-
-  Result<Asset> find(std::string_view name) override {
-    const auto found = assets_.find(plain_name(name));
-    if (found == assets_.end())
-      return fail(Errc::not_found,
-                  fmt::format("\"{}\" was not sent along: name it among the assets, with its SHA-256{}", name,
-                              offered()));
-    const auto bytes = blobs_.size(found->second);
-    if (!bytes)
-      return fail(Errc::not_found,
-                  fmt::format("the bytes of \"{}\" have not been uploaded: PUT them to /api/v1/blobs/{}",
-                              name, found->second.hex()));
-    return Asset{std::string(name), found->second, *bytes};
-  }
-
-  Result<std::string> text(std::string_view name) override {
-    const auto asset = find(name);
-    if (!asset) return tl::unexpected(asset.error());
-    if (asset->bytes > limits::kMaxIncludeBytes)
-      return fail(Errc::invalid_argument, fmt::format("\"{}\" has {} bytes; an included scene may have {}",
-                                                      name, asset->bytes, limits::kMaxIncludeBytes));
-    const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
-    if (!bytes) return tl::unexpected(bytes.error());
-    text_bytes_ += bytes->size();
-    return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-  }
-
-  std::size_t text_bytes() const { return text_bytes_; }
-
- private:
-  std::string offered() const {
-    if (assets_.empty()) return "; no assets were named";
-    std::string names;
-    std::size_t shown = 0;
-    for (const auto& [name, digest] : assets_) {
-      if (++shown > 5) return "; named were" + names + fmt::format(" and {} more", assets_.size() - 5);
-      names += fmt::format(" \"{}\"", name);
-    }
-    return "; named were" + names;
-  }
-
-  std::map<std::string, Digest> assets_;
-  std::size_t text_bytes_ = 0;
-  const BlobStore& blobs_;
-};
 
 Error invalid(std::string text) { return {Errc::invalid_argument, std::move(text)}; }
 
@@ -141,6 +85,19 @@ Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
   return {std::move(error), std::move(diagnostics)};
 }
 
+// What the job's integrator makes use of; every file of it is here.
+tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
+                                                  std::optional<std::uint32_t> frame,
+                                                  const UploadedScene& read, const RenderSettings& settings) {
+  const bool sees_media = scene::sees_media(settings.integrator);
+  scene::Pruned pruned = scene::pruned(read.scene, sees_media);
+  const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
+  if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
+  const auto again = read_uploaded(request, blobs, frame, true);  // for the places that name it
+  if (!again) return tl::unexpected(again.error());
+  return scene::pruned(again->scene, sees_media);  // it has come meanwhile
+}
+
 }  // namespace
 
 tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobStore& blobs,
@@ -156,27 +113,26 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
                                                        request.assets.size(), limits::kMaxAssets)});
   if (auto ok = check_spec(request.spec); !ok) return refuse(ok.error());
 
-  UploadedAssets assets(request.assets, blobs);
-  ReadResult read = read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame});
-  if (!read.scene)
-    return refuse(invalid(fmt::format("the scene {} cannot be read", request.scene_name)),
-                  std::move(read.diagnostics));
-  const Scene& scene = *read.scene;
+  auto read = read_uploaded(request, blobs, frame, false);
+  if (!read) return tl::unexpected(std::move(read.error()));
 
   Intake intake;
   StoredJob& job = intake.job;
   job.name = request.scene_name.substr(0, limits::kMaxNameBytes);
-  for (const auto& d : read.diagnostics)
+  for (const auto& d : read->warnings)
     if (job.warnings.size() < limits::kMaxWarnings) job.warnings.push_back(format_diagnostic(d));
-  auto settings = settings_of(scene, request.spec, frame.value_or(0), job.warnings);
+  auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return refuse(settings.error());
   job.settings = std::move(*settings);
   job.spec = request.spec;
   job.spp = request.spec.spp;
-  if (!job.spp && !request.spec.target_error && !request.spec.time) job.spp = scene.sample_count;
+  if (!job.spp && !request.spec.target_error && !request.spec.time) job.spp = read->scene.sample_count;
   if (job.spp && *job.spp > limits::kMaxSpp)
     return refuse({Errc::invalid_argument,
                    fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
+  const auto pruned = needed_part(request, blobs, frame, *read, job.settings);
+  if (!pruned) return tl::unexpected(pruned.error());
+  const Scene& scene = pruned->scene;
   for (const Asset& a : scene.assets) {
     const auto known = [&](const BlobRef& b) { return b.digest == a.digest; };
     if (std::none_of(job.assets.begin(), job.assets.end(), known))
@@ -186,10 +142,8 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
     return refuse({Errc::invalid_argument,
                    fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
                                job.assets.size(), ls::limits::kAssetsPerJob)});
-  const SceneFeatures features = features_of(scene);
-  job.features_used = features.used;
-  job.features_left_out = features.left_out;
-  intake.text_bytes = request.scene_text.size() + assets.text_bytes();
+  note_analysis(*pruned, job.settings, job);
+  intake.text_bytes = request.scene_text.size() + read->text_bytes;
   intake.scene_json = serialize(scene);
   job.scene = sha256(intake.scene_json);
   JobPlan plan = plan_of(job);
@@ -205,7 +159,7 @@ std::string replay_of(const StoredJob& job) {
 
 JobPlan plan_of(const StoredJob& job) {
   JobPlan plan;
-  plan.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets};
+  plan.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets, job.needs};
   plan.grid = {job.settings.size, job.settings.tile};
   plan.spp = job.spp;
   plan.target_error = job.spec.target_error;

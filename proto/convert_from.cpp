@@ -54,6 +54,8 @@ Result<JobBrief> brief_from(const pb::JobBrief& in) {
     LS_TRY(name, text_from(blob.name(), limits::kNameBytes, "brief.assets.name"));
     brief.assets.push_back({digest, blob.bytes(), name});
   }
+  LS_TRY(needs, text_from(in.needs(), limits::kNeedsBytes, "brief.needs"));
+  brief.needs = needs;
   brief.job = JobId{job};
   brief.scene = scene;
   brief.settings = settings;

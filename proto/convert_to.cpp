@@ -23,6 +23,7 @@ void put(const JobBrief& brief, pb::JobBrief* out) {
   out->set_job(brief.job.value);
   out->set_scene(digest_bytes(brief.scene));
   out->set_settings(canonical_json(brief.settings));
+  out->set_needs(brief.needs);
   for (const BlobRef& asset : brief.assets) {
     pb::Blob* blob = out->add_assets();
     blob->set_digest(digest_bytes(asset.digest));

@@ -9,6 +9,8 @@
 #include <mutex>
 
 #include "common/base/clock.h"
+#include "common/scene/integrators.h"
+#include "common/scene/needs.h"
 #include "common/scene/serialize.h"
 #include "worker/resident.h"
 
@@ -26,6 +28,21 @@ double thread_cpu_seconds() {
 tl::unexpected<UnitFailure> failed(const Error& error) {
   return tl::unexpected<UnitFailure>(
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
+}
+
+// The coordinator chose what to send and this worker chooses what to leave out: both by the same rules, or
+// not at all.
+tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
+  if (brief.needs.empty()) return {};
+  const std::string own =
+      canonical_json(scene::needs_of(scene, scene::sees_media(brief.settings.integrator)));
+  const std::string other = scene::first_difference(own, brief.needs);
+  if (other.empty()) return {};
+  return tl::unexpected<UnitFailure>(
+      UnitFailure{.reason = fmt::format(
+                      "coordinator and worker do not agree on what the scene needs ({}; here: this worker, "
+                      "there: the coordinator): they are of different versions; install the same one on both",
+                      other)});
 }
 
 Result<std::string> read_file(const std::filesystem::path& path) {
@@ -47,6 +64,7 @@ class InProcessBackend final : public LocalBackend {
     if (!text) return failed(text.error());
     const auto scene = deserialize_scene(*text);
     if (!scene) return failed(scene.error());
+    if (const auto same = check_needs(*scene, job.brief); !same) return tl::unexpected(same.error());
     auto built = render::build_world(*scene, job.brief.settings, job.assets, threads_);
     if (!built) return failed(built.error());
     const std::lock_guard lock(mutex_);

@@ -20,6 +20,7 @@ inline constexpr std::size_t kNameBytes = 128;   // worker, asset, tag, build, a
 inline constexpr std::size_t kTextBytes = 4096;  // reasons and problems
 inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
+inline constexpr std::size_t kNeedsBytes = 16 << 10;
 
 inline constexpr std::size_t kUnitsPerLease = 4096;
 inline constexpr std::size_t kLeasesPerWorker = 1024;

@@ -44,6 +44,9 @@ struct JobBrief {
   RenderSettings settings;
   Digest settings_digest;
   std::vector<BlobRef> assets;  // only those that this scene uses
+  // What the coordinator found the scene to need (common/scene/needs.h), for the worker to compare with what
+  // it finds itself; empty: not said.
+  std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
 

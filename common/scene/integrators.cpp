@@ -1,7 +1,10 @@
 #include "common/scene/integrators.h"
 
 #include <algorithm>
+
 #include <iterator>
+
+#include "common/scene/nori_words.h"
 
 namespace ls::scene {
 namespace {
@@ -45,6 +48,13 @@ auto* row_of(const Rows& rows, std::string_view name) {
 
 std::span<const IntegratorRow> integrators() { return kRows; }
 const IntegratorRow* integrator_row(std::string_view name) { return row_of(kRows, name); }
+
+bool sees_media(std::string_view name) {
+  if (const IntegratorRow* row = integrator_row(name)) return row->ours != "path";
+  const nori::IntegratorRow* row = nori::integrator_row(name);
+  return !row || row->ours != "path";
+}
+
 std::span<const WrapperRow> integrator_wrappers() { return kWrappers; }
 const WrapperRow* wrapper_row(std::string_view name) { return row_of(kWrappers, name); }
 

@@ -21,6 +21,10 @@ struct IntegratorRow {
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);  // nullptr: there is none of that name
 
+// False for `path` and those that become it. `name`: the dialect's, ours or Nori's; what is unknown sees
+// them.
+bool sees_media(std::string_view name);
+
 // Integrators that do something besides, or differently, around a nested one, which is used alone.
 struct WrapperRow {
   std::string_view name;

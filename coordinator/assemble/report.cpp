@@ -59,6 +59,9 @@ std::string report_json(const ReportFacts& facts) {
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};
+  // Texts that this process wrote; of a job from before they were written there are none.
+  j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
+  j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
   const bool known = facts.error.has_value();
   const ImageError e = facts.error.value_or(ImageError{});
   j["rmse"] = known ? number(e.rmse) : json();

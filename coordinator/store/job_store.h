@@ -46,6 +46,8 @@ struct StoredJob {
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
   std::vector<std::string> features_used, features_left_out;
+  std::string needs;     // canonical JSON (common/scene/needs.h); empty in records of earlier versions
+  std::string analysis;  // JSON: the parts of the renderer with reasons, and what was pruned; for the report
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
   std::string error;

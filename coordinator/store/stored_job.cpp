@@ -85,6 +85,8 @@ StoredJob stored_from(const json& j) {
   job.warnings = j.at("warnings");
   job.features_used = j.at("features_used");
   job.features_left_out = j.at("features_left_out");
+  job.needs = j.value("needs", std::string());
+  job.analysis = j.value("analysis", std::string());
   job.state = enum_from(j.at("state"), {JobState::queued, JobState::running, JobState::paused, JobState::done,
                                         JobState::failed, JobState::cancelled});
   if (!j.at("stopped").is_null())
@@ -114,6 +116,8 @@ std::string to_json(const StoredJob& job) {
          {"warnings", job.warnings},
          {"features_used", job.features_used},
          {"features_left_out", job.features_left_out},
+         {"needs", job.needs},
+         {"analysis", job.analysis},
          {"state", to_string(job.state)},
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"error", job.error},

@@ -12,6 +12,7 @@ std::string to_text(const LocalJob& job) {
   const nlohmann::json text = {{"job", job.brief.job.value},
                                {"scene", job.brief.scene.hex()},
                                {"settings", canonical_json(job.brief.settings)},
+                               {"needs", job.brief.needs},
                                {"scene_file", job.scene.string()},
                                {"blobs", names},
                                {"files", assets}};
@@ -31,6 +32,7 @@ Result<LocalJob> from_text(std::string_view text) {
     if (!settings) return tl::unexpected<Error>(settings.error());
     job.brief.settings = std::move(*settings);
     job.brief.settings_digest = digest_of(job.brief.settings);
+    job.brief.needs = json.at("needs").get<std::string>();
     job.scene = json.at("scene_file").get<std::string>();
     for (const auto& blob : json.at("blobs"))
       job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});

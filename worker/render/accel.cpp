@@ -14,6 +14,8 @@
 #include <optional>
 #include <tuple>
 
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
 #include "worker/render/shape_boxes.h"
 
 namespace ls::render {
@@ -39,6 +41,7 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
 
 template <class Shape>
 double shape_distance(const void* user, unsigned prim, const RTCRay& ray) {
+  LS_COUNT(user_geometry);
   const Shape& s = static_cast<const ShapeSet<Shape>*>(user)->shapes[prim];
   return intersect(s, V3d(ray.org_x, ray.org_y, ray.org_z), V3d(ray.dir_x, ray.dir_y, ray.dir_z), ray.tnear,
                    ray.tfar);
@@ -281,7 +284,7 @@ PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned pri
   const unsigned side = geometry / kKinds, kind = geometry % kKinds;
   const Scenes* in = &*st.own;
   std::uint32_t instance = kNone;
-  if (instance_id != RTC_INVALID_GEOMETRY_ID) {
+  if (kBuilt.instances && instance_id != RTC_INVALID_GEOMETRY_ID) {
     instance = instance_id - kFirstInstance;
     in = &st.groups[st.group_of[instance]];
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
 #include "worker/render/fov.h"
 
 namespace ls::render {
@@ -54,7 +56,8 @@ float Camera::aperture_at(double u, double v) const {
 CameraRay Camera::perspective_ray(double x, double y, float aperture, V2 lens) const {
   V3d local(x, y, 1);
   V3 o = origin_;
-  if (aperture > 0) {
+  if (kBuilt.lenses && aperture > 0) {
+    LS_COUNT(lens);
     const V2 p = concentric_disk(lens) * aperture;
     // The point in focus is unmoved by the choice of the lens point.
     local = V3d(x * focus_ - p.x, y * focus_ - p.y, focus_);

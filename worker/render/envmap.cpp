@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "worker/render/counters.h"
 #include "worker/render/transform.h"
 
 namespace ls::render {
@@ -157,6 +158,7 @@ float EnvironmentMap::cell_share(std::uint32_t row, std::uint32_t cell) const {
 }
 
 EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
+  LS_COUNT(environment_map);
   const V3 d = frame_.to_local(direction);
   const float across = std::atan2(d.x, -d.z) * kInvTwoPi * static_cast<float>(texels_.width) - .5f;
   const float column = std::floor(across), x = across - column;
@@ -183,6 +185,7 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
 }
 
 V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
+  LS_COUNT(environment_map);
   // The last of those that begin at or before the word; the words left in it are used for the place within.
   const auto row = std::upper_bound(rows_.begin(), rows_.begin() + used_rows_, y,
                                     [](std::uint32_t word, const Row& r) { return word < r.first; }) -

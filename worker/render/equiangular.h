@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/render/counters.h"
 #include "worker/render/math.h"
 
 namespace ls::render {
@@ -15,6 +16,7 @@ class EquiAngular {
  public:
   // The segment o + t d, t in [0, length], d of unit length, length finite and positive.
   EquiAngular(const V3& o, const V3& d, float length, const V3& pivot) : d_(d) {
+    LS_COUNT(equiangular);
     const float along = dot(pivot - o, d);
     foot_ = o + d * along;
     a_ = -along;

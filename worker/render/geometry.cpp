@@ -3,6 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
+
 namespace ls::render {
 namespace {
 
@@ -196,7 +199,8 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
 V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-  if (!(id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit) : complete_instanced(id, o, d, hit)))
+  if (!(!kBuilt.instances || id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit)
+                                                  : complete_instanced(id, o, d, hit)))
     return false;
   hit.reach = std::max(hit.reach, surfaces[hit.surface].together);
   return true;
@@ -204,6 +208,7 @@ bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hi
 
 bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const {
   hit.primitive = id;
+  if (!kBuilt.user_geometries) return complete_triangle(*this, id.index, o, d, hit);
   switch (id.kind) {
     case PrimitiveId::Kind::triangle:
       return complete_triangle(*this, id.index, o, d, hit);
@@ -244,6 +249,7 @@ float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) 
 // the inverse transpose, so that they stay on the side where they were: the cofactors, turned round where the
 // map mirrors.
 bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+  LS_COUNT(instances);
   const PlacedInstance& i = instances[id.instance];
   if (!complete_local(id, i.to_local.point(V3d(o)), i.to_local.vector(V3d(d)), hit)) return false;
   const auto normal = [&](const V3& n) {

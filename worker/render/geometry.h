@@ -140,6 +140,9 @@ class Geometry {
   std::uint64_t dropped_triangles = 0;  // without area
 
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(triangle_surface.size()); }
+  std::uint64_t primitive_count() const {
+    return triangle_surface.size() + spheres.size() + disks.size() + cylinders.size();
+  }
   std::uint64_t bytes() const;
 
   V3 vertex(std::uint32_t triangle, int k) const { return positions[indices[3 * triangle + k]]; }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/scene/scene.h"
+#include "worker/render/counters.h"
 #include "worker/render/math.h"
 #include "worker/render/transform.h"
 
@@ -51,11 +52,13 @@ class Grid {
   // must be filter().
   template <VolumeFilter kFilter>
   float value(const V3& index) const {
+    LS_COUNT(density);
     if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
     return nearest(index);
   }
   // Value at any index coordinates, whatever the filter: beyond the domain the grid goes on as `wrap` says.
   float value_anywhere(const V3& index) const {
+    LS_COUNT(density);
     const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
     return filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q);
   }
@@ -93,6 +96,8 @@ class Grid {
   V3 domain_lo() const { return lo_; }
   V3 domain_hi() const { return hi_; }
   float max_value() const { return max_value_; }
+  std::uint64_t value_count() const { return values_.size(); }
+  std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
   std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
 
   // Values above `limit`, each counted once.
@@ -140,6 +145,7 @@ class CellWalk {
   CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1);
   bool next() {
     if (!(end_ < stop_)) return false;
+    LS_COUNT(macro_cells);
     if (started_) {
       const int k = exit_[0] < exit_[1] ? (exit_[0] < exit_[2] ? 0 : 2) : (exit_[1] < exit_[2] ? 1 : 2);
       if (--left_[k] < 0) return false;

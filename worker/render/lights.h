@@ -11,6 +11,7 @@
 
 #include "common/base/error.h"
 #include "common/scene/scene.h"
+#include "worker/render/built.h"
 #include "worker/render/envmap.h"
 #include "worker/render/geometry.h"
 #include "worker/render/lights_tree.h"
@@ -76,7 +77,7 @@ class Lights {
   // leave find it.
   C3 environment(const V3& direction, float pdf) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
-    if (!map_) return beside;
+    if (!kBuilt.environment_maps || !map_) return beside;
     const EnvironmentMap::Light light = map_->at(direction);
     const float as_light = light.pdf * map_probability_;
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
@@ -88,6 +89,7 @@ class Lights {
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }
+  std::uint64_t table_bytes() const;
 
   std::size_t count() const { return lights_.size(); }
   std::uint64_t left_out() const { return left_out_; }
@@ -162,7 +164,9 @@ class Lights {
   LightBounds shape_bounds(const Light& light) const;
   LightBounds mesh_bounds(const Light& light) const;
   double power(const Light& light, float scene_radius) const;
-  bool by_tree(const V3& n) const { return !tree_.empty() && (tree_in_media_ || dot(n, n) > 0); }
+  bool by_tree(const V3& n) const {
+    return kBuilt.light_trees && !tree_.empty() && (tree_in_media_ || dot(n, n) > 0);
+  }
   Drawn draw(std::uint32_t word) const;
   Drawn draw(std::uint32_t word, const V3& x, const V3& n) const;
   float probability_at(std::uint32_t light, const V3& x, const V3& n) const;

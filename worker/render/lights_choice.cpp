@@ -126,6 +126,12 @@ LightBounds Lights::bounds(const Light& l) const {
   return b;
 }
 
+std::uint64_t Lights::table_bytes() const {
+  std::uint64_t n = lights_.size() * sizeof(Light) + last_.size() * sizeof(last_[0]);
+  for (const Light& l : lights_) n += l.cdf.size() * sizeof(double);
+  return n;
+}
+
 Lights::Drawn Lights::draw(std::uint32_t word) const {
   const auto it = std::lower_bound(last_.begin(), last_.end() - 1, word);
   const auto i = static_cast<std::uint32_t>(it - last_.begin());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/render/counters.h"
+
 namespace ls::render {
 namespace {
 
@@ -205,6 +207,7 @@ std::uint64_t LightTree::left_share(std::uint32_t node, std::uint64_t words, con
 }
 
 LightTree::Found LightTree::find(std::uint64_t word, std::uint64_t words, const V3& x, const V3& n) const {
+  LS_COUNT(light_tree);
   std::uint32_t i = 0;
   while (nodes_[i].right != 0) {
     const std::uint64_t left = left_share(i, words, x, n);
@@ -221,6 +224,7 @@ LightTree::Found LightTree::find(std::uint64_t word, std::uint64_t words, const 
 }
 
 std::uint64_t LightTree::words_of(std::uint32_t light, std::uint64_t words, const V3& x, const V3& n) const {
+  LS_COUNT(light_tree);
   std::uint64_t trail = trails_[light];
   for (std::uint32_t i = 0; nodes_[i].right != 0 && words > 0; trail >>= 1) {
     const std::uint64_t left = left_share(i, words, x, n);

@@ -15,6 +15,7 @@
 #include <limits>
 #include <vector>
 
+#include "worker/render/counters.h"
 #include "worker/render/features.h"
 #include "worker/render/grid.h"
 #include "worker/render/hash.h"
@@ -228,6 +229,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
 
 template <bool kChromatic>
 C3 transmittance_homogeneous(const Medium& m, float length) {
+  LS_COUNT(transmittance);
   if constexpr (kChromatic) {
     C3 t;
     for (int c = 0; c < 3; ++c) t[c] = m.sigma_t[c] > 0 ? std::exp(-m.sigma_t[c] * length) : 1.f;

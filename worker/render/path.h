@@ -19,6 +19,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "worker/render/built.h"
 #include "worker/render/media_state.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
@@ -147,7 +148,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(o_, d_, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, o_, d_, hit);
-    if (met && world_.coincident) prefer_scatterer(hit);
+    if (kBuilt.coincident && met && world_.coincident) prefer_scatterer(hit);
     if constexpr (F.media) {
       if (medium_.any()) {
         if (const auto u = scatter_in_media(met ? &hit : nullptr)) {
@@ -167,7 +168,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     }
     add_emission(hit);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.null || (surface.veil && passes_veil(hit))) {
+    if ((kBuilt.boundaries && surface.null) || (kBuilt.veils && surface.veil && passes_veil(hit))) {
       pass_boundary(hit);
       if (is_black(beta_)) break;
       continue;

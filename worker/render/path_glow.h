@@ -1,6 +1,7 @@
 // Part of path.h, which includes it: light given off by a medium on the way.
 #pragma once
 
+#include "worker/render/counters.h"
 #include "worker/render/glow.h"
 #include "worker/render/world.h"
 
@@ -11,6 +12,7 @@ namespace ls::render {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_glow(const Medium& medium, float t_max) {
   if (medium.glow == Glow::none || (depth_ == 0 && world_.hide_emitters)) return;
+  LS_COUNT(glow);
   const C3 light = medium.grid
                        ? glow_of_grid(medium, start_, d_, t_max, stream_.stream(segment_, Purpose::emission))
                        : glow_of_length(medium, t_max);

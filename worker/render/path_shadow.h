@@ -1,6 +1,8 @@
 // Part of path.h, which includes it: what a shadow ray brings.
 #pragma once
 
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -19,8 +21,9 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
     if (!(left > 0)) return light.radiance;
     d = f / left;
   }
+  LS_COUNT(shadow_rays);
   if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
-  bool walk = world_.veils;
+  bool walk = kBuilt.veils && world_.veils;
   if constexpr (F.media) walk = walk || (world_.use_media && (medium.any() || world_.accel.has_boundaries()));
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
@@ -33,6 +36,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
   V3 from = start, o = p;
   for (int i = 0; i < kMaxSegments; ++i) {
     SurfaceHit hit;
+    LS_COUNT(boundary_rays);
     const auto primitive = world_.accel.nearest_boundary(o, d, left);
     const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
     if constexpr (F.media) {
@@ -44,7 +48,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     }
     if (!met) return value;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.veil) {
+    if (kBuilt.veils && surface.veil) {
       value *= world_.bsdfs.veil(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
       if (is_black(value)) return value;
     }

@@ -3,6 +3,7 @@
 // in xi).
 #pragma once
 
+#include "worker/render/counters.h"
 #include "worker/render/math.h"
 
 namespace ls::render {
@@ -17,10 +18,12 @@ struct HenyeyGreenstein {
 
   // w: direction of travel before, w1: after. Integrates to 1 over w1.
   float value(const V3& w, const V3& w1) const {
+    LS_COUNT(phase);
     const V3 diff = g >= 0 ? w - w1 : w + w1;  // x measured from the peak
     return from_x(.5f * dot(diff, diff));
   }
   PhaseSample sample(const V3& w, V2 u) const {
+    LS_COUNT(phase);
     const float a = std::abs(g), xi = u.x;
     const float d = (1 - a) * (1 - xi) + (1 + a) * xi, inv2 = 1 / (d * d);
     const float x = 2 * sqr(1 - a) * (1 - xi) * (1 + a * xi) * inv2;

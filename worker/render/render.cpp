@@ -1,6 +1,5 @@
 #include "worker/render/render.h"
 
-#include <fmt/format.h>
 #include <immintrin.h>
 
 #include <cmath>
@@ -133,6 +132,12 @@ TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, 
   return render_tile_with(world, choose(world).sample, tile, samples, stop, breadcrumb);
 }
 
+std::vector<std::string> all_variants(const World& world) {
+  std::vector<std::string> names;
+  for (const Variant& v : variants_for(world)) names.emplace_back(v.name);
+  return names;
+}
+
 std::vector<std::string> covering_variants(const World& world) {
   std::vector<std::string> names;
   for (const Variant& v : variants_for(world)) {
@@ -154,41 +159,6 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;
-}
-
-WorldReport describe(const World& w) {
-  WorldReport r;
-  r.variant = choose(w).name;
-  const auto feature = [&](bool used, const std::string& text) {
-    (used ? r.used : r.left_out).push_back(text);
-  };
-  feature(w.need.media, "participating media");
-  feature(w.need.grids, "density grids, majorants and their trackers");
-  feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
-  feature(w.need.emission, "light given off by media");
-  feature(w.need.overlaps, "media within or across each other");
-  feature(w.coincident, "a search for surfaces that lie on null ones");
-  const bool angles = w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
-  feature(w.distant_mis ? angles : w.equiangular, "equi-angular sampling about lights");
-  feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
-  feature(w.lights.can_sample(), "next-event estimation");
-  feature(w.lights.count() > 1, "choice among lights");
-  feature(w.camera.has_lens(), "thin lens");
-  feature(!w.geometry.instances.empty(), "instances of groups");
-  feature(w.textures.bytes() > 0, "image textures");
-  feature(w.lights.map(), "environment map, sampled by its brightness");
-  if (w.lights.left_out())
-    r.left_out.push_back(fmt::format("{} lights without power or area", w.lights.left_out()));
-  std::uint64_t grids = 0;
-  for (const Grid& g : w.grids) grids += g.bytes();
-  r.bytes = {{"geometry", w.geometry.bytes()},
-             {"bvh", w.accel.bytes()},
-             {"textures", w.textures.bytes()},
-             {"materials", w.bsdfs.bytes()},
-             {"environment map", w.lights.map() ? w.lights.map()->bytes() : 0},
-             {"grids", grids}};
-  for (const auto& [cause, entry] : w.inputs.causes) r.clamped_inputs += entry.count;
-  return r;
 }
 
 const Health& changed_inputs(const World& world) { return world.inputs; }

@@ -49,6 +49,7 @@ TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, 
 // The integrator variants that cover the world, cheapest first, and rendering with one of them: all give the
 // same bits.
 std::vector<std::string> covering_variants(const World& world);
+std::vector<std::string> all_variants(const World& world);  // of the world's integrator
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
@@ -62,9 +63,15 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
 
 // What the scene makes us use and leave out, in words; and the bytes of each structure.
 struct WorldReport {
+  struct Structure {
+    std::string name;
+    std::uint64_t bytes = 0;
+    std::string detail;  // "12 triangles"; or, where there are no bytes, why not
+  };
   std::vector<std::string> used, left_out;
-  std::vector<std::pair<std::string, std::uint64_t>> bytes;
-  std::string variant;  // the integrator instantiation
+  std::vector<Structure> structures;
+  std::string variant;  // the integrator instantiation, one of `variants` that there are
+  std::size_t variants = 0;
   // Negative densities and texels set to 0, degenerate triangles dropped, ...
   std::uint64_t clamped_inputs = 0;
 };

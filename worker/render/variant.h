@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "worker/render/built.h"
 #include "worker/render/path.h"
 #include "worker/render/world.h"
 
@@ -23,6 +24,7 @@ inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, i
 }
 template <Features F, template <Features> class Light>
 SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample) {
+  if constexpr (!kBuilt.features.covers(F)) return {.cut_off = true};  // build_world refuses such scenes
   x += w.origin_x;
   y += w.origin_y;
   const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);

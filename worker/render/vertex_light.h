@@ -8,6 +8,7 @@
 
 #include <cmath>
 
+#include "worker/render/built.h"
 #include "worker/render/equiangular.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
@@ -51,8 +52,8 @@ class VertexLight {
 
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, const Segment& segment, bool may_scatter) {
-    const bool focused =
-        path.world_.equiangular && !medium.grid && std::isfinite(segment.length) && may_scatter;
+    const bool focused = kBuilt.equiangular && path.world_.equiangular && !medium.grid &&
+                         std::isfinite(segment.length) && may_scatter;
     if (focused) focus_on_light(path, medium, segment.length);
     return {focused, segment.length};
   }

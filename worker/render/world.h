@@ -4,6 +4,7 @@
 #include <deque>
 #include <vector>
 
+#include "common/scene/needs.h"
 #include "worker/render/accel.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/camera.h"
@@ -35,6 +36,7 @@ class World {
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;
+  scene::Needs needs;       // of the scene; `need` follows from it
   bool overlaps = false;    // media may lie within or across each other: paths keep a MediaState,
   MediaState camera_media;  // which begins as this
   bool coincident = false;  // surfaces lie on each other, one of them null (coincident.h)

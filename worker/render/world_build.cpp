@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "common/assets/image.h"
+#include "common/scene/integrators.h"
+#include "worker/render/built.h"
 #include "worker/render/coincident.h"
 #include "worker/render/media_build.h"
 #include "worker/render/media_overlap.h"
@@ -11,7 +13,13 @@
 namespace ls::render {
 namespace {
 
-Features needs_of(const World& w) {
+// What the scene's needs ask of the integrator.
+Features features_of(const scene::Needs& n) {
+  return {.media = n.media, .grids = n.grids, .chromatic = n.chromatic, .emission = n.emission};
+}
+
+// What the world that was made of it asks: never more.
+Features found_in(const World& w) {
   Features f;
   if (!w.use_media) return f;
   const auto use = [&](std::uint32_t i) {
@@ -63,6 +71,21 @@ void place_camera(const Scene& scene, const RenderSettings& settings, World& w) 
   w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
 }
 
+// A build without some parts, for experiments, renders what it can render and nothing else.
+Result<void> check_built(const World& w) {
+  const bool has = kBuilt.features.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
+                   (kBuilt.coincident || !w.coincident) && (kBuilt.veils || !w.veils) &&
+                   (kBuilt.instances || w.geometry.instances.empty()) &&
+                   (kBuilt.environment_maps || !w.lights.map()) &&
+                   (kBuilt.light_trees || !w.lights.has_tree()) && (kBuilt.lenses || !w.camera.has_lens()) &&
+                   (kBuilt.textures || w.needs.textures.size() <= w.needs.textures.count("constant")) &&
+                   (kBuilt.user_geometries || w.geometry.triangle_count() == w.geometry.primitive_count());
+  if (has) return {};
+  return fail(Errc::failed_precondition,
+              "the scene needs a part of the renderer that this build was made without (" LIGHTSHAFT_WITHOUT
+              ")");
+}
+
 Result<void> check_indices(const Scene& scene) {
   const auto bad = [](std::uint32_t i, std::size_t n) { return i >= n; };
   for (const Shape& s : scene.shapes) {
@@ -95,7 +118,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.size = settings.size;
   w.max_depth = settings.max_depth;
   w.rr_depth = settings.rr_depth;
-  w.use_media = settings.integrator != "path";
+  w.use_media = scene::sees_media(settings.integrator);
   w.distant_mis = settings.integrator == "volpath_distant_mis";
   w.distance = scene.integrator.distance;
   w.heuristic = scene.integrator.heuristic;
@@ -138,12 +161,18 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.accel = std::move(*accel);
   place_camera(scene, settings, w);
   w.filter = PixelFilter(scene.film.filter);
-  w.need = needs_of(w);
+  const Features found = found_in(w);
+  w.needs = scene::needs_of(scene, w.use_media);
+  w.need = features_of(w.needs);
+  w.need.overlaps = found.overlaps;  // a matter of where the shapes' files put them
+  if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
+  if (!w.need.covers(found))
+    return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = w.need.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
-  w.equiangular = w.need.media && homogeneous_media && w.lights.any_with_place();
+  w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
   // Lights chosen for a whole segment know no point: what is weighed against them must choose alike.
   if (!w.equiangular && settings.integrator != "volpath_distant_mis") w.lights.use_tree_in_media();
   return std::shared_ptr<const World>(world);

@@ -5,6 +5,7 @@
 
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
+#include "worker/render/built.h"
 
 namespace ls::render {
 
@@ -13,12 +14,12 @@ struct Lookup {
   V2 uv;  // of the surface
 
   C3 reflectance(const Slot& s) const {
-    if (s.constant) return s.value;
+    if (!kBuilt.textures || s.constant) return s.value;
     const C3 c = textures.eval(s.texture, uv);
     return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
   }
   float scalar(const Slot& s) const {
-    if (!s.constant) return textures.number(s.texture, uv);
+    if (kBuilt.textures && !s.constant) return textures.number(s.texture, uv);
     const C3& c = s.value;
     return c.x == c.y && c.y == c.z ? c.x : luminance(c);
   }

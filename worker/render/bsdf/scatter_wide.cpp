@@ -3,6 +3,7 @@
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/principled.h"
 #include "worker/render/bsdf/rough_dielectric.h"
+#include "worker/render/counters.h"
 
 namespace ls::render {
 
@@ -68,6 +69,7 @@ BsdfTable::Mixture BsdfTable::mixture(const Material& m, const UvPoint& uv, cons
 }
 
 Veil BsdfTable::veil(BsdfIndex i, const UvPoint& uv, const V3& w) const {
+  LS_COUNT(veils);
   const Material& m = materials_[i.value];
   const Lookup look{*textures_, uv};
   switch (m.kind) {

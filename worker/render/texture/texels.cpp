@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "worker/render/counters.h"
+
 namespace ls::render {
 
 double srgb_to_linear(double v) { return v <= .04045 ? v / 12.92 : std::pow((v + .055) / 1.055, 2.4); }
@@ -105,6 +107,7 @@ Result<void> check_texels(std::string_view name, Texels& t) {
 }  // namespace
 
 C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
+  LS_COUNT(texels);
   const float u = fold(uv.x, wrap), v = fold(uv.y, wrap);
   if (filter == TextureFilter::nearest) return texel(nearest(u, width), nearest(v, height));
   const Span2 x = neighbours(u, width, wrap), y = neighbours(v, height, wrap);
@@ -114,6 +117,7 @@ C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
 }
 
 V2 Texels::slope(const V2& uv, Wrap wrap) const {
+  LS_COUNT(texels);
   const Span2 x = neighbours(fold(uv.x, wrap), width, wrap), y = neighbours(fold(uv.y, wrap), height, wrap);
   const float f00 = luminance(texel(x.lo, y.lo)), f10 = luminance(texel(x.hi, y.lo)),
               f01 = luminance(texel(x.lo, y.hi)), f11 = luminance(texel(x.hi, y.hi));

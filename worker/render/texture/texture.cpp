@@ -11,6 +11,7 @@
 
 #include "common/base/overloaded.h"
 #include "common/scene/limits.h"
+#include "worker/render/built.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -180,7 +181,7 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
 
 C3 TextureTable::eval(TextureIndex i, V2 uv) const {
   const Entry* e = &data_->entries[i.value];
-  if (e->kind == Kind::constant) return e->value;
+  if (!kBuilt.textures || e->kind == Kind::constant) return e->value;
   return value_of(*this, leaf(*data_, e, uv, Read::colour), uv);
 }
 

@@ -1,0 +1,211 @@
+#include "common/scene/prune.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "common/base/overloaded.h"
+#include "common/scene/bsdf_traits.h"
+#include "common/scene/limits.h"
+#include "common/scene/validate.h"
+
+namespace ls::scene {
+namespace {
+
+bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
+
+class Pruner {
+ public:
+  Pruner(const Scene& scene, bool sees_media) : s_(scene), sees_media_(sees_media) {}
+
+  Pruned run() {
+    const std::vector<Asset> assets = s_.assets;
+    media();
+    materials();
+    lights();
+    invisible();
+    if (s_.sensor.aperture_scale && !(s_.sensor.aperture_radius > 0)) {
+      s_.sensor.aperture_scale.reset();
+      note("shape of the lens", "the camera is a pinhole");
+    }
+    Pruned out{compacted(s_), {}};
+    files(assets, out.scene.assets);
+    out.left_out = std::move(left_out_);
+    return out;
+  }
+
+ private:
+  void note(std::string what, std::string why, std::uint32_t count = 1, std::uint64_t bytes = 0) {
+    if (count > 0) left_out_.push_back({std::move(what), std::move(why), count, bytes});
+  }
+  // The value of a texture that has one.
+  const Rgb* constant(TextureIndex t) const {
+    const auto* c = std::get_if<ConstantTexture>(&s_.textures[t.value]);
+    return c ? &c->value : nullptr;
+  }
+  bool everywhere(TextureIndex t, double value) const {
+    const Rgb* c = constant(t);
+    return c && *c == Rgb{value, value, value};
+  }
+  bool black(TextureIndex t) const { return everywhere(t, 0); }
+  bool zero(VolumeIndex v) const {
+    const auto* c = std::get_if<ConstVolume>(&s_.volumes[v.value]);
+    return c && all_zero(c->value);
+  }
+
+  void media();
+  bool does_something(const HomogeneousMedium& m) const {
+    return (m.scale != 0 && !all_zero(m.sigma_t)) || !all_zero(m.emission);
+  }
+  bool does_something(const HeterogeneousMedium& m) const {
+    const bool dense = m.scale != 0 && !zero(m.sigma_t);
+    return dense || (m.emission && m.emission_scale != 0 && !zero(*m.emission));
+  }
+  void drop_dark_sources();
+  void materials();
+  bool simplify(Bsdf& b);
+  void lights();
+  bool has_power(const Emitter& e) const;
+  void invisible();
+  void files(const std::vector<Asset>& before, const std::vector<Asset>& after);
+
+  Scene s_;
+  const bool sees_media_;
+  std::vector<LeftOut> left_out_;
+  std::uint32_t blends_ = 0, masks_ = 0;
+};
+
+// A medium's light of strength 0: the grid that it is multiplied with need not come along.
+void Pruner::drop_dark_sources() {
+  std::uint32_t dark = 0;
+  for (Medium& medium : s_.media) {
+    auto* m = std::get_if<HeterogeneousMedium>(&medium);
+    if (!m || !(m->emission || m->source_radiance || m->temperature) || m->emission_scale != 0) continue;
+    m->emission = m->source_radiance = m->temperature = std::nullopt;
+    ++dark;
+  }
+  note("light given off by a medium", "its strength is 0", dark);
+}
+
+void Pruner::media() {
+  drop_dark_sources();
+  std::vector<bool> live, used(s_.media.size(), false);
+  // One that does nothing may still keep others of lower priority out of its place.
+  const auto priority = [](const Medium& m) {
+    return std::visit([](const auto& x) { return x.priority; }, m);
+  };
+  int lowest = std::numeric_limits<int>::max();
+  for (const Medium& m : s_.media) lowest = std::min(lowest, priority(m));
+  for (const Medium& m : s_.media)
+    live.push_back(sees_media_ &&
+                   (priority(m) > lowest || std::visit([&](const auto& x) { return does_something(x); }, m)));
+  const auto drop_dead = [&](std::optional<MediumIndex>& m) {
+    if (!m) return;
+    used[m->value] = true;
+    if (!live[m->value]) m.reset();
+  };
+  drop_dead(s_.sensor.medium);
+  bool any = s_.sensor.medium.has_value();
+  for (Shape& s : s_.shapes) {
+    drop_dead(s.interior);
+    drop_dead(s.exterior);
+    any = any || s.interior || s.exterior;
+  }
+  // Without any medium no surface leads from one into another.
+  if (!any)
+    for (Shape& s : s_.shapes) s.is_medium_transition = false;
+  std::uint32_t dead = 0;
+  for (std::size_t i = 0; i < live.size(); ++i) dead += used[i] && !live[i];
+  note("medium", sees_media_ ? "it neither takes light nor gives any" : "the integrator `path` sees none",
+       dead);
+}
+
+// One step; whether there was one. A branch keeps its own constants, so that what is left scatters as it did.
+bool Pruner::simplify(Bsdf& b) {
+  if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
+    const bool first = everywhere(blend->weight, 0);
+    if (!first && !everywhere(blend->weight, 1)) return false;
+    ++blends_;
+    const Bsdf kept = s_.bsdfs[(first ? blend->first : blend->second).value];
+    b = kept;
+    return true;
+  }
+  if (const auto* mask = std::get_if<MaskBsdf>(&b)) {
+    const bool clear = everywhere(mask->opacity, 0);
+    if (!clear && !everywhere(mask->opacity, 1)) return false;
+    ++masks_;
+    const Bsdf kept = clear ? Bsdf(NullBsdf{}) : s_.bsdfs[mask->bsdf.value];
+    b = kept;
+    return true;
+  }
+  return false;
+}
+
+// Each step takes one level of nesting away, and nesting is bounded.
+void Pruner::materials() {
+  for (Bsdf& b : s_.bsdfs)
+    for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
+    }
+  // A blend in a two-sided material may have held a two-sided one, of which that shows the front to both
+  // sides.
+  for (Bsdf& b : s_.bsdfs)
+    if (auto* two = std::get_if<TwoSidedBsdf>(&b))
+      for (BsdfIndex* side : {&two->front, &two->back})
+        for (int step = 0; step < kMaxBsdfNesting; ++step)
+          if (const auto* inner = std::get_if<TwoSidedBsdf>(&s_.bsdfs[side->value])) *side = inner->front;
+  note("branch of a blend", "its weight is 0", blends_);
+  note("mask", "its opacity is 0 or 1 everywhere", masks_);
+}
+
+bool Pruner::has_power(const Emitter& emitter) const {
+  return std::visit(
+      overloaded{
+          [](const ConstantEmitter& e) { return !all_zero(e.radiance); },
+          [](const DirectionalEmitter& e) { return !all_zero(e.irradiance); },
+          [](const PointEmitter& e) { return !all_zero(e.intensity); },
+          [&](const SpotEmitter& e) { return !all_zero(e.intensity) && !(e.texture && black(*e.texture)); },
+          [](const EnvmapEmitter& e) { return e.scale != 0; },
+          [&](const ProjectorEmitter& e) { return e.scale != 0 && !black(e.irradiance); }},
+      emitter);
+}
+
+void Pruner::lights() {
+  std::uint32_t dark = 0;
+  for (Shape& s : s_.shapes) {
+    if (!s.emitter || !black(s.emitter->radiance)) continue;
+    s.emitter.reset();
+    ++dark;
+  }
+  dark +=
+      static_cast<std::uint32_t>(std::erase_if(s_.emitters, [&](const Emitter& e) { return !has_power(e); }));
+  note("light", "it is black", dark);
+}
+
+// Surfaces that light passes unchanged, that part no media and do not shine. A group that is left without
+// shapes goes, with its instances.
+void Pruner::invisible() {
+  const auto unseen = [&](const Shape& s) {
+    return std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition && !s.emitter;
+  };
+  note("surface", "light passes it unchanged, and there is no medium on either side",
+       static_cast<std::uint32_t>(std::erase_if(s_.shapes, unseen)));
+  std::vector<bool> seen(s_.groups.size(), false);
+  for (const Shape& s : s_.shapes)
+    if (s.group) seen[s.group->value] = true;
+  note("instance", "nothing of its group can be seen",
+       static_cast<std::uint32_t>(
+           std::erase_if(s_.instances, [&](const Instance& i) { return !seen[i.group.value]; })));
+}
+
+void Pruner::files(const std::vector<Asset>& before, const std::vector<Asset>& after) {
+  for (const Asset& a : before)
+    if (std::none_of(after.begin(), after.end(), [&](const Asset& b) { return a.digest == b.digest; }))
+      note(a.name, "nothing that is needed names it", 1, a.bytes);
+}
+
+}  // namespace
+
+Pruned pruned(const Scene& scene, bool sees_media) { return Pruner(scene, sees_media).run(); }
+
+}  // namespace ls::scene

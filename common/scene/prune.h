@@ -1,0 +1,31 @@
+// What of a scene can't matter to any pixel, taken out before the scene is stored, sent or loaded: dead
+// branches of materials, lights without power, media that do nothing, surfaces that nobody can see; and with
+// them the files that only they named. What is left gives the same image. Its bits are the same too, unless
+// something went that rays used to stop at (invisible surfaces) or that next-event estimation used to choose.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/scene/scene.h"
+
+namespace ls::scene {
+
+// So many of these, and why they are not needed.
+struct LeftOut {
+  std::string what, why;
+  std::uint32_t count = 1;
+  std::uint64_t bytes = 0;  // of files; 0 for anything else
+  bool operator==(const LeftOut&) const = default;
+};
+
+struct Pruned {
+  Scene scene;                    // compacted
+  std::vector<LeftOut> left_out;  // in a fixed order
+};
+
+// `scene` is consistent (validate.h). `sees_media`: false for the integrator `path`, whose scenes have none.
+// Pruning what is pruned changes nothing.
+Pruned pruned(const Scene& scene, bool sees_media);
+
+}  // namespace ls::scene

@@ -1,0 +1,175 @@
+"""What a scene does not need is not sent, not loaded, not mapped, and changes no bit."""
+
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+from cli_kit import FOG, lightshaft, vol_bytes, write_fog
+from local_farm import ROOT, LocalFarm
+
+UNUSED_BYTES = 5 << 20
+GRID = re.compile(r'<medium name="interior".*?</medium>', re.S)
+
+
+def inspect(scene, *flags):
+    return json.loads(lightshaft("inspect", scene, "--json", *flags).stdout)
+
+
+# ---- every instantiation that covers a scene gives the same bits ----
+
+HOMOGENEOUS = '<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{}"/><rgb name="albedo" value="0.9, 0.8, 0.6"/></medium>'
+GLOWING = HOMOGENEOUS.format("1").replace("</medium>", '<rgb name="emission" value="0.3, 0.2, 0"/></medium>')
+VARIED = {
+    "grid": (FOG, 2),
+    "homogeneous": (GRID.sub(HOMOGENEOUS.format("1.5"), FOG), 4),
+    "chromatic": (GRID.sub(HOMOGENEOUS.format("0.5, 1.5, 3"), FOG), 2),
+    "glowing": (GRID.sub(GLOWING, FOG), 1),
+    "vacuum": (GRID.sub("", FOG), 5),
+    "chosen by distance": (FOG.replace('<integrator type="volpath"/>', '<integrator type="volpath_distant_mis"/>'), 2),
+}
+
+
+def agree(scene, at_least):
+    told = inspect(scene, "--variants")
+    assert told["variants_agree"], told["variant_bits"]
+    assert len({v["variant"] for v in told["variant_bits"]}) == len(told["variant_bits"]) >= at_least, told["variant_bits"]
+    assert told["variant_bits"][0]["variant"] == told["variant"]
+    return told
+
+
+@pytest.mark.parametrize("kind", VARIED)
+def test_every_instantiation_gives_the_same_bits(kind, tmp_path):
+    scene = write_fog(tmp_path)
+    text, at_least = VARIED[kind]
+    scene.write_text(text.replace('<default name="density" value="2"/>', "") if "$density" not in text else text)
+    agree(scene, at_least)
+
+
+def test_every_instantiation_gives_the_same_bits_of_the_demo_scenes(tmp_path):
+    pytest.importorskip("numpy")
+    room = ROOT / "scenes" / "steam_room"
+    subprocess.run([sys.executable, "-B", room / "make_steam.py", tmp_path / "steam.vol", "--voxel", "0.25"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-B", room / "make_scene.py", tmp_path / "steam_room.xml"], check=True)
+    agree(tmp_path / "steam_room.xml", 2)
+    bath = tmp_path / "bath"
+    subprocess.run([sys.executable, "-B", ROOT / "scenes" / "bath" / "make_bath.py", bath, "--setting", "sketch"], check=True)
+    agree(bath / "bath.xml", 2)
+
+
+def test_every_instantiation_gives_the_same_bits_of_the_validation_scenes(tmp_path):
+    subprocess.run([sys.executable, "-B", ROOT / "scenes" / "validate" / "make_tests.py", tmp_path], check=True)
+    scenes = 0
+    for tests in sorted(tmp_path.glob("*.xml")):
+        for scene in re.findall(r"<scene>.*?</scene>", tests.read_text(), re.S):
+            one = tmp_path / f"scene-{scenes}.xml"
+            one.write_text(scene)
+            agree(one, 1)
+            scenes += 1
+    assert scenes >= 5
+
+
+# ---- what nothing needed names ----
+
+def random_grid(path):
+    n = round((UNUSED_BYTES / 4) ** (1 / 3)) + 1
+    path.write_bytes(vol_bytes([0.5] * n ** 3, n, n, n) + os.urandom(4096))  # another digest at each run
+    assert path.stat().st_size > UNUSED_BYTES
+
+
+def with_unused(scene, folder):
+    """The scene with two large grids that no pixel depends on: one in no surface, one of density 0."""
+    for name in ("unused.vol", "nothing.vol"):
+        random_grid(folder / name)
+    medium = ('<medium type="heterogeneous" id="{}"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/></volume>'
+              '<float name="scale" value="{}"/></medium>')
+    more = (medium.format("unused", "unused.vol", 1) + medium.format("nothing", "nothing.vol", 0) +
+            '<shape type="sphere"><bsdf type="diffuse"/><ref name="interior" id="nothing"/></shape>')
+    ball = '<shape type="sphere"><bsdf type="diffuse"/></shape>'
+    fat, lean = folder / "fat.xml", folder / "lean.xml"
+    lean.write_text(scene.read_text().replace("</scene>", ball + "</scene>"))
+    fat.write_text(scene.read_text().replace("</scene>", more + "</scene>"))
+    return fat, lean
+
+
+def bytes_under(folder):
+    return sum(p.stat().st_size for p in pathlib.Path(folder).rglob("*") if p.is_file())
+
+
+def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
+    fat, lean = with_unused(write_fog(tmp_path), tmp_path)
+    told = inspect(fat)
+    assert [a["name"] for a in told["assets"]] == ["fog.vol"]
+    assert {f["name"] for f in told["files_left_out"]} == {"unused.vol", "nothing.vol"}
+    assert told["structures"] == inspect(lean)["structures"]
+    assert told["scene_bytes"] == inspect(lean)["scene_bytes"]
+
+    pixels = {}
+    (tmp_path / "farm").mkdir()
+    with LocalFarm(tmp_path / "farm") as farm:
+        farm.add_worker(fake=False)
+        env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+        for scene in (fat, lean):
+            said = lightshaft("submit", scene, "--spp", 2, env=env)
+            job = said.stdout.split()[0]
+            pixels[scene] = farm.pixels(job)
+            assert "unused.vol" not in said.stderr and "nothing.vol" not in said.stderr
+            report = farm.report(job)
+            assert report["needs"]["grids"] and "volume grids" in report["features_used"]
+        analysis = report["analysis"]
+        assert any(part["part"] == "volume grids" and part["why"] == "grid of fog.vol" for part in analysis["parts"])
+        assert bytes_under(farm.data) < UNUSED_BYTES and bytes_under(tmp_path / "farm" / "cache") < UNUSED_BYTES
+    assert pixels[fat] == pixels[lean]
+
+
+def test_a_scene_may_be_sent_whole_and_nothing_beyond_its_needs_goes_to_workers(tmp_path):
+    """By hand, as a browser does it: everything uploaded; the worker still fetches what is needed alone."""
+    fat, _ = with_unused(write_fog(tmp_path), tmp_path)
+    (tmp_path / "farm").mkdir()
+    with LocalFarm(tmp_path / "farm") as farm:
+        farm.add_worker(fake=False)
+        digests = {}
+        for path in (fat, *tmp_path.glob("*.vol")):
+            digests[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+            farm.request("PUT", f"/api/v1/blobs/{digests[path.name]}", path.read_bytes(), "application/octet-stream")
+        scene = digests.pop("fat.xml")
+        body = {"scene": scene, "assets": digests, "name": "fat.xml", "spec": {"spp": 2}}
+        job = json.loads(farm.request("POST", "/api/v1/jobs", json.dumps(body).encode()))["id"]
+        farm.wait_for_job(job)
+        assert bytes_under(farm.data) > UNUSED_BYTES > bytes_under(tmp_path / "farm" / "cache")
+
+
+# ---- libraries ----
+
+def family(pid):
+    """A process and all below it."""
+    found = [pid]
+    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+        for child in (task / "children").read_text().split():
+            found += family(int(child))
+    return found
+
+
+def mapped(worker):
+    return "".join(pathlib.Path(f"/proc/{pid}/maps").read_text() for pid in family(worker.popen.pid))
+
+
+def test_a_worker_maps_openvdb_only_once_a_scene_names_a_vdb(tmp_path):
+    pytest.importorskip("numpy")
+    bath = tmp_path / "bath"
+    subprocess.run([sys.executable, "-B", ROOT / "scenes" / "bath" / "make_bath.py", bath, "--setting", "sketch"], check=True)
+    (tmp_path / "farm").mkdir()
+    with LocalFarm(tmp_path / "farm") as farm:
+        worker = farm.add_worker(fake=False)
+        env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+        farm.pixels(lightshaft("submit", write_fog(tmp_path), "--spp", 2, env=env).stdout.split()[0])
+        libraries = mapped(worker)
+        assert "libembree3" in libraries
+        assert "openvdb" not in libraries and "liblightshaft_vdb" not in libraries
+        farm.pixels(lightshaft("submit", bath / "bath.xml", "--spp", 2, "--size", "16x12", env=env).stdout.split()[0])
+        libraries = mapped(worker)
+        assert "liblightshaft_vdb" in libraries and "openvdb" in libraries

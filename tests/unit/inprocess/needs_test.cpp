@@ -1,0 +1,61 @@
+// A worker whose idea of what a scene needs differs from the coordinator's renders nothing of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/needs.h"
+#include "common/scene/serialize.h"
+#include "tests/support/render_check.h"
+#include "worker/inprocess.h"
+
+namespace ls::worker {
+namespace {
+
+using ::testing::HasSubstr;
+
+LocalJob job_of(const test::SceneKit& kit, const test::ScratchFolder& folder) {
+  LocalJob job;
+  const std::string text = serialize(kit.scene);
+  job.scene = folder.path() / "scene.json";
+  std::ofstream(job.scene, std::ios::binary) << text;
+  job.brief.job = JobId{"j-1"};
+  job.brief.scene = sha256(text);
+  job.brief.settings = test::settings_of(kit.scene);
+  job.brief.settings_digest = digest_of(job.brief.settings);
+  return job;
+}
+test::SceneKit ball() {
+  test::SceneKit kit;
+  kit.shape(SphereShape{}, Transform{}, kit.diffuse(.5));
+  kit.environment();
+  return kit;
+}
+
+TEST(InProcess, RendersASceneWhoseNeedsAreThoseThatTheCoordinatorFound) {
+  const test::ScratchFolder folder;
+  LocalJob job = job_of(ball(), folder);
+  job.brief.needs = canonical_json(scene::needs_of(ball().scene, true));
+  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job));
+}
+
+TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
+  const test::ScratchFolder folder;
+  LocalJob job = job_of(ball(), folder);
+  test::SceneKit other = ball();
+  other.scene.emitters.push_back(PointEmitter{});
+  job.brief.needs = canonical_json(scene::needs_of(other.scene, true));
+
+  const auto refused = make_inprocess_backend(1)->prepare(job);
+
+  ASSERT_FALSE(refused);
+  EXPECT_FALSE(refused.error().scene_at_fault);  // another worker may be of the right version
+  EXPECT_THAT(refused.error().reason, HasSubstr("do not agree on what the scene needs"));
+  EXPECT_THAT(refused.error().reason, HasSubstr("\"point\":1"));
+}
+
+TEST(InProcess, TakesAJobThatSaysNothingOfNeeds) {
+  const test::ScratchFolder folder;
+  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job_of(ball(), folder)));
+}
+
+}  // namespace
+}  // namespace ls::worker

@@ -1,0 +1,191 @@
+// What a scene does not need costs it nothing, and leaving it out does not change a bit.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/prune.h"
+#include "tests/support/render_check.h"
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
+#include "worker/render/world.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneKit;
+using test::translate;
+using test::operator*;
+
+const PixelRect kAll{0, 0, 12, 8};
+TileResult render(const World& w) { return render_tile(w, kAll, {0, 16}, nullptr, nullptr); }
+
+SceneKit room() {
+  SceneKit kit({12, 8});
+  const BsdfIndex white = kit.diffuse(.6);
+  kit.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(3), white);
+  kit.shape(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(180) * test::scale(.5), white).emitter =
+      AreaEmitter{kit.texture({3, 2, 1})};
+  kit.scene.emitters.push_back(PointEmitter{{1, -1, 1}, {1, 1, 1}});
+  kit.environment(.1);
+  kit.look({0, -5, 1}, {0, 0, 0}, 40);
+  return kit;
+}
+SceneKit foggy() {
+  SceneKit kit = room();
+  kit.container(CubeShape{}, test::scale(.9), kit.null(), kit.homogeneous({.8, .8, .8}, {.9, .5, .2}));
+  return kit;
+}
+SceneKit cloudy() {
+  SceneKit kit = room();
+  const VolumeIndex v =
+      kit.grid({2, 2, 2}, {0, 1, 2, 3, 4, 5, 6, 7}, translate({-1, -1, -1}) * test::scale(2));
+  kit.container(CubeShape{}, test::scale(.9), kit.null(), kit.heterogeneous(v, {.9, .9, .9}));
+  return kit;
+}
+SceneKit with(SceneKit kit, auto change) {
+  change(kit);
+  return kit;
+}
+
+// Scenes with something dead in them that no ray stops at and that next-event estimation does not choose.
+std::vector<SceneKit> scenes_with_dead_parts() {
+  std::vector<SceneKit> all;
+  for (SceneKit (*base)() : {room, foggy, cloudy}) {
+    const auto blended = [](double weight, bool of_glass) {
+      return [=](SceneKit& k) {
+        const BsdfIndex other = of_glass ? k.glass(1.5) : k.mirror();
+        const TextureIndex w = k.texture({weight, weight, weight});
+        k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
+                k.bsdf(BlendBsdf{w, k.diffuse(.4), other}));
+      };
+    };
+    all.push_back(with(base(), blended(0, false)));
+    all.push_back(with(base(), blended(1, false)));
+    all.push_back(with(base(), blended(1, true)));
+    all.push_back(with(base(), [](SceneKit& k) {  // a mask that hides nothing of a ball
+      k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
+              k.bsdf(MaskBsdf{k.texture({1, 1, 1}), k.diffuse(.4)}));
+    }));
+    all.push_back(with(base(), [](SceneKit& k) {  // one that hides all of it, but its light
+      k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
+              k.bsdf(MaskBsdf{k.texture({0, 0, 0}), k.diffuse(.4)}))
+          .emitter = AreaEmitter{k.texture({1, 2, 3})};
+    }));
+    all.push_back(with(base(), [](SceneKit& k) {  // black lights before and behind those that shine
+      k.scene.emitters.insert(k.scene.emitters.begin(), PointEmitter{{2, -1, 1}, {0, 0, 0}});
+      k.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {0, 0, 0}});
+      k.scene.shapes.front().emitter = AreaEmitter{k.texture({0, 0, 0})};
+    }));
+    all.push_back(with(base(), [](SceneKit& k) {  // a medium that does nothing, seen through its boundary
+      const MediumIndex fog = k.homogeneous({.5, .5, .5}, {.5, .5, .5});
+      Shape& s = k.container(SphereShape{}, translate({.2, -2.6, .4}) * test::scale(.4), k.null(),
+                             k.homogeneous({0, 0, 0}, {.5, .5, .5}));
+      k.container(SphereShape{}, translate({.2, -2.6, 2.4}) * test::scale(.4), k.null(), fog);
+      static_cast<void>(s);
+    }));
+  }
+  return all;
+}
+
+TEST(LeaveOut, TakingOutDeadPartsDoesNotChangeABit) {
+  int changed = 0, scene = 0;
+  for (SceneKit kit : scenes_with_dead_parts()) {
+    const auto before = render(*test::world_of(kit));
+    const scene::Pruned pruned = scene::pruned(kit.scene, true);
+    EXPECT_FALSE(pruned.left_out.empty()) << scene;
+    kit.scene = pruned.scene;
+    const auto world = test::world_of(kit);
+    EXPECT_EQ(render(*world).sums, before.sums) << scene;
+    changed += world->veils;
+    ++scene;
+  }
+  EXPECT_EQ(changed, 0);  // no mask or blend is left that shadow rays would have to look at
+}
+
+TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
+  const auto bytes = [](const SceneKit& kit) {
+    std::map<std::string, std::uint64_t> b;
+    for (const auto& s : describe(*test::world_of(kit)).structures) b[s.name] = s.bytes;
+    return b;
+  };
+  auto vacuum = bytes(room());
+  for (const char* name : {"textures", "environment map", "grid values", "majorant cells", "light tree"})
+    EXPECT_EQ(vacuum.at(name), 0u) << name;
+  for (const char* name : {"geometry", "bvh", "materials", "light table"})
+    EXPECT_GT(vacuum.at(name), 0u) << name;
+  EXPECT_EQ(bytes(foggy()).at("grid values"), 0u);
+  EXPECT_GE(bytes(cloudy()).at("grid values"), 8 * sizeof(float));
+  EXPECT_GT(bytes(cloudy()).at("majorant cells"), 0u);
+  const auto many = bytes(with(room(), [](SceneKit& k) {
+    for (int i = 0; i < 40; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
+  }));
+  EXPECT_GT(many.at("light tree"), 0u);
+}
+
+TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
+  const auto variant = [](const SceneKit& kit) { return describe(*test::world_of(kit)).variant; };
+  EXPECT_EQ(variant(room()), "surfaces");
+  EXPECT_EQ(variant(foggy()), "homogeneous grey media");
+  EXPECT_EQ(variant(cloudy()), "grey grids");
+  auto world = test::world_of(cloudy());
+  EXPECT_EQ(all_variants(*world).back(), covering_variants(*world).back());
+}
+
+TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {
+  SceneKit kit = room();
+  kit.scene.emitters.clear();
+  const auto world = test::world_of(kit);
+  EXPECT_EQ(world->lights.count(), 1u);
+  EXPECT_FALSE(world->lights.has_tree());
+  EXPECT_EQ(world->lights.choose({~0u, 1, 2}, V3(0), V3(0, 0, 1)).probability, 1.f);
+}
+
+// A build without parts names what it was made without; this one has them all.
+static_assert(built_without("").features == kEverything);
+static_assert(!built_without("grids,textures").features.grids && !built_without("grids,textures").textures);
+static_assert(built_without("grids,textures").features.media && built_without("grids").instances);
+
+#ifdef LIGHTSHAFT_COUNT
+
+WorkCounters counted(const SceneKit& kit) {
+  const auto world = test::world_of(kit);
+  work_counters() = {};
+  render(*world);
+  return work_counters();
+}
+
+TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
+  const WorkCounters vacuum = counted(room());
+  EXPECT_GT(vacuum.shadow_rays, 0u);
+  EXPECT_EQ(vacuum.density + vacuum.macro_cells + vacuum.phase + vacuum.transmittance + vacuum.glow, 0u);
+  EXPECT_EQ(vacuum.equiangular + vacuum.boundary_rays + vacuum.veils, 0u);
+  EXPECT_EQ(vacuum.texels + vacuum.instances + vacuum.user_geometry + vacuum.light_tree, 0u);
+  EXPECT_EQ(vacuum.environment_map + vacuum.lens, 0u);
+
+  const WorkCounters fog = counted(foggy());
+  EXPECT_GT(std::min({fog.phase, fog.transmittance, fog.equiangular, fog.boundary_rays}), 0u);
+  EXPECT_EQ(fog.density + fog.macro_cells + fog.glow + fog.veils + fog.texels + fog.light_tree + fog.lens,
+            0u);
+
+  const WorkCounters cloud = counted(cloudy());
+  EXPECT_GT(std::min({cloud.phase, cloud.density, cloud.macro_cells}), 0u);
+  EXPECT_EQ(cloud.transmittance + cloud.equiangular + cloud.glow + cloud.veils + cloud.texels, 0u);
+}
+
+TEST(LeaveOutCounters, CountWhatIsUsed) {
+  const WorkCounters lens = counted(with(room(), [](SceneKit& k) { k.scene.sensor.aperture_radius = .1; }));
+  EXPECT_EQ(lens.lens, 12u * 8 * 16);
+  const WorkCounters lights = counted(with(room(), [](SceneKit& k) {
+    for (int i = 0; i < 40; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
+  }));
+  EXPECT_GT(lights.light_tree, 0u);
+  const WorkCounters ball = counted(with(room(), [](SceneKit& k) {
+    k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
+            k.bsdf(MaskBsdf{k.texture({.5, .5, .5}), k.diffuse(.4)}));
+  }));
+  EXPECT_GT(std::min(ball.user_geometry, ball.veils), 0u);
+}
+
+#endif
+
+}  // namespace
+}  // namespace ls::render
