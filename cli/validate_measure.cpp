@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numbers>
 #include <thread>
 #include <vector>
 
@@ -25,26 +26,42 @@ FrameSize enough(FrameSize size) {
 // Sums over pixels of the mean, the squared error's estimate, and its square.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
-  void add(double a, double b) {
-    const double v = (a - b) * (a - b) / 4;
-    mean += (a + b) / 2;
+  void add(double weight, double a, double b) {
+    const double v = weight * weight * (a - b) * (a - b) / 4;
+    mean += weight * (a + b) / 2;
     square += v;
     fourth += v * v;
   }
 };
 
-void collect(const render::TileResult& frame, std::size_t count, double per_half, Measured& m) {
+// Shares of pixels in the mean, by row: of a spherical camera the solid angle, so that it is a mean over
+// directions; else all alike. The mean over all of them is 1.
+std::vector<double> row_weights(const Scene& scene, FrameSize size) {
+  std::vector<double> weights(static_cast<std::size_t>(size.height), 1);
+  if (scene.sensor.projection != Projection::spherical) return weights;
+  const double step = std::numbers::pi / size.height;
+  for (std::size_t y = 0; y < weights.size(); ++y) {
+    const auto row = static_cast<double>(y);
+    weights[y] = (std::cos(row * step) - std::cos((row + 1) * step)) / 2 * size.height;
+  }
+  return weights;
+}
+
+void collect(const render::TileResult& frame, const std::vector<double>& weights, std::size_t count,
+             double per_half, Measured& m) {
+  const std::size_t width = count / weights.size();
   std::array<Sums, 4> sums;
   m.health = frame.health;
   for (std::size_t i = 0; i < count; ++i) {
+    const double weight = weights[i / width];
     double bright[2] = {0, 0};
     for (std::size_t c = 0; c < 3; ++c) {
       const double a = frame.sums[c * count + i] / per_half, b = frame.sums[(3 + c) * count + i] / per_half;
-      sums[c].add(a, b);
+      sums[c].add(weight, a, b);
       bright[0] += kLuminance[c] * a;
       bright[1] += kLuminance[c] * b;
     }
-    sums[Measured::luminance].add(bright[0], bright[1]);
+    sums[Measured::luminance].add(weight, bright[0], bright[1]);
   }
   const auto pixels = static_cast<double>(count);
   for (std::size_t k = 0; k < 4; ++k) {
@@ -115,7 +132,8 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
   const std::uint64_t per_half = std::max<std::uint64_t>(1, (paths + 2 * pixels - 1) / (2 * pixels));
   Measured m;
   m.paths = 2 * per_half * pixels;
-  collect(render_frame(**world, size, {0, 2 * per_half}, threads), pixels, static_cast<double>(per_half), m);
+  collect(render_frame(**world, size, {0, 2 * per_half}, threads), row_weights(scene, size), pixels,
+          static_cast<double>(per_half), m);
   m.seconds = seconds(clock.now() - start);
   return m;
 }

@@ -1,6 +1,6 @@
-// The mean of a scene's frame, rendered through the renderer's public face, with a standard error that
-// low-discrepancy sequences don't fool: the two halves of every pixel and all pixels are independent, so that
-// (A - B)^2 / 4 estimates each pixel's squared error without bias.
+// The mean of a scene's frame (of a spherical camera: over directions), rendered through the renderer's
+// public face, with a standard error that low-discrepancy sequences don't fool: the two halves of every pixel
+// and all pixels are independent, so that (A - B)^2 / 4 estimates each pixel's squared error without bias.
 #pragma once
 
 #include <array>

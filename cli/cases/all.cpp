@@ -27,6 +27,16 @@ void Table::exact(std::string id, std::string rows, std::string about,
 Table all_cases() {
   Table t;
   add_depths(t);
+  add_scales(t);
+  add_grids(t);
+  add_albedos(t);
+  add_phases(t);
+  add_lamps(t);
+  add_light_shapes(t);
+  add_slabs(t);
+  add_single(t);
+  add_fields(t);
+  add_seed(t);
   return t;
 }
 

@@ -101,6 +101,16 @@ class Table {
 
 // One subject each.
 void add_depths(Table& t);
+void add_scales(Table& t);
+void add_grids(Table& t);
+void add_albedos(Table& t);
+void add_phases(Table& t);
+void add_lamps(Table& t);
+void add_light_shapes(Table& t);
+void add_slabs(Table& t);
+void add_single(Table& t);
+void add_fields(Table& t);
+void add_seed(Table& t);
 
 // All of them, in the order of the report.
 Table all_cases();

@@ -1,36 +1,28 @@
-// Optical depths from 0 to 1e6: what is seen through, given off and scattered in a unit of a medium.
+// Optical depths from 0 to 1e6: what is seen through, given off and scattered.
 #include <fmt/format.h>
 
 #include <cmath>
 
 #include "cli/cases/case.h"
 #include "cli/cases/checks.h"
-#include "cli/cases/ways.h"
+#include "cli/cases/stages.h"
 
 namespace ls::cases {
 namespace {
 
 constexpr double kThin[] = {1e-12, 1e-9, 1e-6, 1e-3};
+// A figure that every sample gives alike is a product of some ten float32 numbers, 2^-24 each.
+constexpr double kTenRoundings = 6e-7;
 
-// The unit cube of a medium, seen along x through its middle.
-SceneKit cube(const Way& way, const Rgb& sigma_t, const Rgb& albedo = rgb(0), double g = 0) {
-  SceneKit kit;
-  way.choose(kit);
-  const MediumIndex m = way.medium(kit, sigma_t, albedo, g, Transform{});
-  kit.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), kit.null(), m);
-  kit.look({-3, .5, .5}, {.5, .5, .5});
-  return kit;
-}
+constexpr Way kDistant{false, true}, kDistantGrid{true, true}, kVolpath{false, false};
 
-SceneKit emitting(const Way& way, double sigma_a) {
-  SceneKit kit = cube(way, rgb(sigma_a));
-  if (way.grid) {
-    auto& m = std::get<HeterogeneousMedium>(kit.scene.media[0]);
-    m.emission = kit.constant(rgb(1));
+void glow(SceneKit& kit, MediumIndex m, double emission) {
+  if (auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[m.value])) {
+    h->emission = rgb(emission);
   } else {
-    std::get<HomogeneousMedium>(kit.scene.media[0]).emission = rgb(1);
+    const VolumeIndex v = kit.constant(rgb(emission));
+    std::get<HeterogeneousMedium>(kit.scene.media[m.value]).emission = v;
   }
-  return kit;
 }
 
 // (1 - e^-x) / x.
@@ -39,35 +31,127 @@ double phi(double x) { return x == 0 ? 1 : -std::expm1(-x) / x; }
 void nothing(Table& t) {
   for (const Way& way : all_ways()) {
     t.exact("N01-no-extinction" + way.name(), "N1",
-            "A medium without extinction before a white sky: 1 exactly, in every sample.",
+            "A medium without extinction before a white sky shows 1 exactly, in every sample.",
             [way](const Bench& b) {
-              SceneKit kit = cube(way, rgb(0));
+              SceneKit kit = unit_cube(way, rgb(0));
               kit.environment();
               return every_value(b, kit, 64, grey(1), 0);
             });
   }
 }
 
-void glow(Table& t) {
+// L = eps (1 - e^-tau) / sigma along a unit: deterministic but for macro cells of grids that are drawn.
+void emission(Table& t) {
   for (const Way& way : both_media()) {
     for (const double tau : kThin) {
-      t.mean(fmt::format("N02-emission-{:g}{}", tau, way.name()), "N2 7.6b",
-             "A unit of a medium that absorbs this little gives off eps (1 - e^-tau) / sigma.",
-             [=] { return emitting(way, tau); }, grey(phi(tau)), {.band = 1e-4});
+      t.exact(fmt::format("N02-emission-{:g}{}", tau, way.name()), "N2 N7 7.6b",
+              "A unit of a medium that absorbs this little gives off eps (1 - e^-tau) / sigma.",
+              [=](const Bench& b) {
+                SceneKit kit = unit_cube(way, rgb(tau));
+                glow(kit, {0}, 1);
+                return every_value(b, kit, 64, grey(phi(tau)), kTenRoundings);
+              });
     }
     for (const double tau : {0., 1., 1e3, 1e6}) {
-      t.mean(fmt::format("N67-emission-{:g}{}", tau, way.name()), "N67 N3 7.6b",
+      t.mean(fmt::format("N67-emission-{:g}{}", tau, way.name()), "N67 N3 N7 7.6b",
              "Light given off without extinction is eps d; at depth it is eps / sigma.",
-             [=] { return emitting(way, tau); }, grey(phi(tau)), {.band = 1e-3});
+             [=] {
+               SceneKit kit = unit_cube(way, rgb(tau));
+               glow(kit, {0}, 1);
+               return kit;
+             },
+             grey(phi(tau)), {.band = 1e-4});
     }
   }
+}
+
+void thin_scattering(Table& t) {
+  for (const double tau : kThin) {
+    for (const Way& way : {kDistant, kDistantGrid}) {
+      t.mean(fmt::format("N02-sunlit-{:g}{}", tau, way.name()), "N2",
+             "Sunlight scattered once in a medium this thin: proportional to its depth.",
+             [=] { return lit_cube(way, rgb(tau), rgb(1)); }, grey(lit_cube_answer(tau, 1)), {.band = 1e-4});
+    }
+    for (const Way& way : {kVolpath, kDistant, kDistantGrid}) {
+      t.mean(fmt::format("N02-lamplit-{:g}{}", tau, way.name()), "N2 N22",
+             "A lamp's light scattered once in a medium this thin: proportional to its depth.",
+             [=] {
+               SceneKit kit = passing(way, rgb(tau), rgb(1));
+               kit.scene.emitters.push_back(PointEmitter{{.5, 0, 0}, rgb(1 / (4 * kPi))});
+               return kit;
+             },
+             grey(passing_answer(.5, tau)), {.band = 1e-3});
+    }
+  }
+  // What others do: 1 - expf(-tau), which is 0 in float32 below 6e-8 and quantised above.
+  t.mean("bug-one-minus-exp/homogeneous/distant-mis", "N2 bug",
+         "The truncated exponential by expm1: 1 - exp in float32 would lose half of this depth's precision.",
+         [] { return lit_cube(kDistant, rgb(2e-7), rgb(1)); }, grey(lit_cube_answer(2e-7, 1)),
+         {.band = 1e-4});
+}
+
+void opaque(Table& t) {
+  for (const Way& way : all_ways()) {
+    for (const double tau : {1e3, 1e6}) {
+      t.exact(fmt::format("N03-nothing-gets-through-{:g}{}", tau, way.name()), "N3",
+              "Of a white sky behind this depth nothing is left, exactly.", [=](const Bench& b) {
+                SceneKit kit = unit_cube(way, rgb(tau));
+                kit.environment();
+                return every_value(b, kit, 64, grey(0), 0);
+              });
+    }
+  }
+  // 1 - sqrt(1 - a) H(1), Chandrasekhar 1950; six digits of it.
+  constexpr double kDigits = 2e-6;
+  for (const Way& way : all_ways()) {
+    for (const double tau : {1e3, 1e6}) {
+      t.mean(fmt::format("N03-semi-infinite-a.9-{:g}{}", tau, way.name()), "N3 7.1",
+             "An all but endless medium of this depth reflects what Chandrasekhar's H gives.",
+             [=] { return half_space(way, .9, tau, 1); }, grey(.414947), {.slack = kDigits});
+    }
+  }
+}
+
+// Light straight down through an absorber onto a floor: only shadow rays see it.
+void shadows(Table& t) {
+  for (const double tau : {20., 30., 80.}) {
+    const double expected = std::exp(-tau) / (2 * kPi);
+    // The exponent is a float32 of 2^-24: what it does to e^-tau.
+    const double tolerance = kTenRoundings + 2 * tau * 0x1p-24;
+    for (const Way& way : both_media()) {
+      t.exact(fmt::format("N05-shadow-{:g}{}", tau, way.name()), "N5 N60",
+              "A shadow ray through this depth: e^-tau to the last digits, not by chance.",
+              [=](const Bench& b) {
+                SceneKit kit = lit_floor();
+                way.choose(kit);
+                const MediumIndex m = way.medium(kit, rgb(tau), rgb(0), 0, box({-1, -1, 1}, {1, 1, 2}));
+                kit.container(CubeShape{}, translate({0, 0, 1.5}) * scale(1, 1, .5), kit.null(), m);
+                return every_value(b, kit, 16, grey(expected), tolerance);
+              });
+    }
+  }
+  // Where densities change, little light is walked by few (kRouletteDepth): right in the mean.
+  // Density 0, 1, 2, 3 at the centres of four voxels along z, clamped beyond: 1.5 in all.
+  t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
+         "A shadow ray through a ramp of densities, by residual tracking.",
+         [] {
+           SceneKit kit = lit_floor();
+           const VolumeIndex ramp = kit.grid({1, 1, 4}, {0, 1, 2, 3}, box({-1, -1, 1}, {1, 1, 2}));
+           kit.container(CubeShape{}, translate({0, 0, 1.5}) * scale(1, 1, .5), kit.null(),
+                         kit.heterogeneous(ramp, rgb(0), 8 / 1.5));
+           return kit;
+         },
+         grey(std::exp(-8.) / (2 * kPi)), {.band = .02});
 }
 
 }  // namespace
 
 void add_depths(Table& t) {
   nothing(t);
-  glow(t);
+  emission(t);
+  thin_scattering(t);
+  opaque(t);
+  shadows(t);
 }
 
 }  // namespace ls::cases

@@ -1,12 +1,18 @@
 // The one place where the table says how sure it is.
 #pragma once
 
+#include <cstddef>
+
 namespace ls::cases {
 
 // A right renderer fails any case of the whole table by chance with this probability at most, and a renderer
 // that is off by more than the band passes a case with no more: shared by all intervals of the table (Sidak),
 // whichever of them are run.
 inline constexpr double kWrongVerdicts = 1e-3;
+
+// A case whose interval came out too wide is run anew with more paths, so often at most; each is an interval
+// of the table's.
+inline constexpr std::size_t kAttempts = 3;
 
 // Radiance is float32: a path of n vertices multiplies about 10 n numbers, each rounded by 2^-24, and errors
 // of many samples partly share their sign. Holds for paths of 25 vertices in the worst case.

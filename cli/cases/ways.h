@@ -20,7 +20,10 @@ struct Way {
            : distance == DistanceSampling::equiangular ? "distant-equiangular"
                                                        : "distant-exponential";
   }
-  std::string name() const { return "/" + medium_name() + "/" + integrator_name(); }
+  std::string name() const {
+    std::string n(1, '/');
+    return n.append(medium_name()).append(1, '/').append(integrator_name());
+  }
 
   void choose(SceneKit& kit) const {
     kit.scene.integrator.name = distant ? "volpath_distant_mis" : "volpath";
@@ -41,6 +44,8 @@ struct Way {
 
 // Media of both kinds with the default integrator and the other one.
 inline std::vector<Way> all_ways() { return {{false, false}, {true, false}, {false, true}, {true, true}}; }
+// One of each kind, for what takes long.
+inline std::vector<Way> two_ways() { return {{false, false}, {true, true}}; }
 inline std::vector<Way> both_media() { return {{false, false}, {true, false}}; }
 
 // The map of the unit cube to the box [lo, hi].

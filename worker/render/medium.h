@@ -173,7 +173,8 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 // Where so little light is left, the rest of the way is walked by few: below e^-4 a tracker survives with the
 // share that is left of that, and goes on with e^-4. It is the estimate so far that decides, not the
 // control's depth alone: a ray that misses the hot voxel of an otherwise empty cell has a deep control there
-// and a transmittance of 1, made up for by its factors (STABILITY N10).
+// and a transmittance of 1, made up for by its factors (STABILITY N10). Only where there is something to track:
+// constant densities cost nothing, and their tails are exact (N5).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -214,7 +215,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
       control = 0;
       foldable = 1;
       if (!(largest > 0)) return {0, 0, 0};
-      if (largest < kRouletteTransmittance) {
+      if (largest < kRouletteTransmittance && rate > 0) {
         const float q = largest / kRouletteTransmittance;
         if (!(stream.uniform() < q)) return {0, 0, 0};
         for (float& x : factor) x /= q;

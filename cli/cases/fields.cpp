@@ -1,0 +1,125 @@
+// Closed forms in space: atmospheres, mean paths through bodies, and the light of a lamp in an endless
+// medium.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cli/cases/case.h"
+#include "cli/cases/stages.h"
+
+namespace ls::cases {
+namespace {
+
+// The unit cube of densities that change along x only, seen along x before a white sky: trilinear between the
+// voxels' centres and constant in the outer halves, so that the mean of the voxels is the integral, exactly.
+SceneKit layered(const std::vector<float>& values, double sigma) {
+  SceneKit kit;
+  const BsdfIndex null = kit.null();
+  kit.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), null,
+                kit.heterogeneous(kit.grid({static_cast<int>(values.size()), 1, 1}, values, Transform{}),
+                                  rgb(0), sigma));
+  kit.environment();
+  kit.look({-3, .5, .5}, {.5, .5, .5}, 1e-5);
+  return kit;
+}
+
+template <class F>
+std::vector<float> sampled(F density, int n) {
+  std::vector<float> v;
+  for (int i = 0; i < n; ++i) v.push_back(static_cast<float>(density((i + .5) / n)));
+  return v;
+}
+
+// Voxel means are midpoint sums: good to f'' / (24 n^2), 1e-6 of the depth for 256 voxels below.
+void atmospheres(Table& t) {
+  const auto add = [&](const char* name, const char* about, auto density, double depth) {
+    t.mean(fmt::format("7.6a-{}/grid/volpath", name), "7.6a", about,
+           [=] { return layered(sampled(density, 256), 1); }, grey(std::exp(-depth)), {.slack = 1e-5});
+  };
+  add(
+      "exponential-atmosphere", "Density e^(-z / H): H (1 - e^(-1 / H)).",
+      [](double z) { return 3 * std::exp(-z / .3); }, 3 * .3 * -std::expm1(-1 / .3));
+  add(
+      "linear-ramp", "Density z: half.", [](double z) { return 1.5 * z; }, .75);
+  add(
+      "gaussian-blob", "Density e^(-(x / s)^2) over all of it: sqrt(pi) s erf(L / s).",
+      [](double x) { return 3 * std::exp(-(x - .5) * (x - .5) / .04); },
+      3 * std::sqrt(kPi) * .2 * std::erf(.5 / .2));
+}
+
+// Mean path 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003): mean(1 - L) = sigma_a 4R/3,
+// less the share sigma_a <l^2> / (2 <l>) = sigma_a x mean path still to go from inside. That is .75 R without
+// scattering, and diffusion adds about R^2 sigma_s / 5 = .4 R: below 2 R. A path's weight is a product of
+// albedos, each rounded by 2^-25: against sigma_a / sigma_t = 5e-4 a share of 6e-5.
+void mean_paths(Table& t) {
+  constexpr double kAbsorption = 1e-3, kScattering = 2, kDistance = 1000, kMargin = 1.01;
+  for (const Way& way : all_ways()) {
+    for (const double g : {0., .9}) {
+      t.mean(fmt::format("7.6d-mean-path-g{:g}{}", g, way.name()), "7.6d",
+             "What a sphere absorbs of light from everywhere: its mean path is 4 R / 3, however it scatters.",
+             [=] {
+               SceneKit kit({32, 32});
+               way.choose(kit);
+               const MediumIndex m = way.medium(kit, rgb(kScattering + kAbsorption),
+                                                rgb(kScattering / (kScattering + kAbsorption)), g,
+                                                box({-1, -1, -1}, {1, 1, 1}));
+               kit.container(SphereShape{}, {}, kit.null(), m);
+               kit.environment();
+               kit.scene.integrator.rr_depth =
+                   1000;  // roulette on weights of .9995 would be all the noise there is
+               kit.look({0, -kDistance, 0}, {0, 0, 0}, 2 * std::atan(kMargin / kDistance) * 180 / kPi);
+               return kit;
+             },
+             grey(kPi / (4 * kMargin * kMargin) * kAbsorption * 4 / 3),
+             {.band = .02, .slack = 2 * kAbsorption + 6e-5, .complement = true, .slow = true});
+    }
+  }
+}
+
+// Case, de Hoffmann, Placzek 1953: the fluence phi at r mean free paths from an isotropic lamp of 1 W in an
+// endless medium of albedo c. A camera that sees all directions shows phi / (4 pi), less the lamp itself,
+// which no camera sees: e^-r / (4 pi r^2) of phi.
+void infinite_medium(Table& t) {
+  struct Row {
+    double c, phi[4];
+  };
+  constexpr double kRadii[] = {.25, 1, 2, 5};
+  constexpr Row kRows[] = {{.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
+                           {.5, {1.2648813, .058695138, .0079276237, 1.2913241e-4}},
+                           {.8, {1.5188779, .10741259, .022065806, 9.5217959e-4}},
+                           {.9, {1.6393113, .14328386, .037126399, .0029151251}},
+                           {.99, {1.8031446, .22019457, .084976895, .019841736}},
+                           {.999, {1.8404525, .24795726, .10858551, .036265014}}};
+  for (const Row& row : kRows) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double r = kRadii[i], c = row.c;
+      const double expected = (row.phi[i] - std::exp(-r) / (4 * kPi * r * r)) / (4 * kPi);
+      t.mean(fmt::format("7.6e-fluence-c{:g}-r{:g}/homogeneous/volpath", c, r), "7.6e",
+             "The light of a lamp in an endless medium, over all directions, at this many mean free paths.",
+             [=] {
+               SceneKit kit({64, 64});
+               const MediumIndex m = kit.homogeneous(rgb(1), rgb(c));
+               // A black end far beyond where light comes back from: e^(-2 kappa R), kappa = .055 at c =
+               // .999.
+               kit.container(SphereShape{}, scale(c > .9 ? 150 : 40), kit.diffuse(0), m);
+               kit.scene.emitters.push_back(PointEmitter{{0, 0, 0}, rgb(1 / (4 * kPi))});
+               kit.scene.sensor.medium = m;
+               kit.scene.sensor.projection = Projection::spherical;
+               kit.scene.sensor.to_world = translate({r, 0, 0});
+               return kit;
+             },
+             // Close by, what is scattered once diverges towards the lamp: heavy tails.
+             grey(expected), {.band = .02, .slack = 1e-3, .slow = c > .95 || r > 2 || r < 1});
+    }
+  }
+}
+
+}  // namespace
+
+void add_fields(Table& t) {
+  atmospheres(t);
+  mean_paths(t);
+  infinite_medium(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,220 @@
+// Lights of tiny and of huge solid angle, of no area, of no power, and of powers forty orders apart.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "cli/cases/case.h"
+#include "cli/cases/checks.h"
+#include "cli/cases/stages.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kReflectance = .5;
+
+// The point of the floor at the origin, seen from the side; radiance = reflectance / pi x irradiance.
+SceneKit floor_point(double size = 3) {
+  SceneKit kit;
+  kit.shape(RectangleShape{}, scale(size), kit.diffuse(kReflectance));
+  kit.scene.integrator.max_depth = kOnce;
+  kit.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+  return kit;
+}
+void shine(SceneKit& kit, const Geometry& g, const Transform& t, double radiance = 1) {
+  const TextureIndex light = kit.texture(rgb(radiance));
+  const BsdfIndex black = kit.diffuse(0);
+  kit.shape(g, t, black).emitter = AreaEmitter{light};
+}
+Channels reflected(double irradiance) { return grey(irradiance * kReflectance / kPi); }
+
+void tiny(Table& t) {
+  for (const double ratio : {1e-1, 1e-3, 1e-5}) {
+    const double r = 1000 * ratio, slack = 1e-6;
+    t.mean(fmt::format("N26-sphere-r/d-{:g}", ratio), "N26 7.6g", "A shining sphere: pi r^2 / d^2.",
+           [=] {
+             SceneKit kit = floor_point();
+             shine(kit, SphereShape{}, translate({0, 0, 1000}) * scale(r));
+             return kit;
+           },
+           reflected(kPi * ratio * ratio), {.slack = slack});
+    t.mean(fmt::format("N26-disk-r/d-{:g}", ratio), "N26 7.6g", "A shining disk: pi sin^2 of its half angle.",
+           [=] {
+             SceneKit kit = floor_point();
+             shine(kit, DiskShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+             return kit;
+           },
+           reflected(kPi * ratio * ratio / (1 + ratio * ratio)), {.slack = slack});
+    t.mean(
+        fmt::format("N26-square-a/d-{:g}", ratio), "N26 7.6g",
+        "A shining square: Lambert's formula at its corners.",
+        [=] {
+          SceneKit kit = floor_point();
+          shine(kit, RectangleShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+          return kit;
+        },
+        reflected(4 * ratio / std::sqrt(1 + ratio * ratio) * std::atan(ratio / std::sqrt(1 + ratio * ratio))),
+        {.slack = slack});
+  }
+}
+
+void huge(Table& t) {
+  t.mean(
+      "N27-inside-a-shining-sphere", "N27", "A disk inside a shining sphere: irradiance pi.",
+      [] {
+        SceneKit kit;
+        kit.shape(DiskShape{}, scale(.1), kit.diffuse(kReflectance));
+        const TextureIndex light = kit.texture(rgb(1));
+        Shape& s = kit.shape(SphereShape{}, {}, kit.diffuse(0));
+        s.flip_normals = true;
+        s.emitter = AreaEmitter{light};
+        kit.scene.integrator.max_depth = kOnce;
+        kit.look({-.2, .1, .1}, {0, 0, 0}, 1e-3);
+        return kit;
+      },
+      reflected(kPi));
+  for (const double height : {1e-3, .1, 1.}) {
+    // Square of half side 1 at this height.
+    const double x = 1 / height, s = std::sqrt(1 + x * x);
+    t.mean(fmt::format("N27-square-at-{:g}", height), "N27 7.6g",
+           "A floor this close below a shining square: up to pi, where the square is all it sees.",
+           [=] {
+             SceneKit kit = floor_point(1);
+             shine(kit, RectangleShape{}, translate({0, 0, height}) * rotate_x(180));
+             kit.look({-.9, .1, height / 2}, {0, 0, 0}, 1e-4);
+             kit.scene.sensor.near_clip = 1e-9;
+             return kit;
+           },
+           reflected(4 * x / s * std::atan(x / s)), {.slack = 1e-5});
+  }
+  // The foot of a shining wall, 20 x 10 above the floor: atan(b / c) - c / r atan(b / r), r^2 = c^2 + h^2.
+  constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
+  t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
+         [] {
+           SceneKit kit;
+           kit.shape(RectangleShape{}, translate({1, 0, 0}), kit.diffuse(kReflectance));
+           shine(kit, RectangleShape{}, rotate_y(90) * scale(kSide));
+           kit.scene.integrator.max_depth = kOnce;
+           kit.look({1, 0, 2}, {kFar, 0, 0}, 1e-4);
+           return kit;
+         },
+         reflected(std::atan(kSide / kFar) - kFar / kR * std::atan(kSide / kR)), {.slack = 1e-5});
+}
+
+// Triangles as OBJ, given by the corners of each.
+AssetIndex obj(SceneKit& kit, const std::vector<std::array<Vec3, 3>>& triangles) {
+  static const ScratchFolder folder;
+  std::string text;
+  for (const auto& triangle : triangles)
+    for (const Vec3& p : triangle) text += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    text += fmt::format("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
+  const Asset asset{"lamp.obj", sha256(text), text.size()};
+  const auto path = folder.path() / asset.digest.hex();
+  std::ofstream(path, std::ios::binary) << text;
+  kit.files[asset.digest] = path;
+  return SceneKit::push<AssetTag>(kit.scene.assets, asset);
+}
+
+void of_nothing(Table& t) {
+  // Square of half side .8 at 1.25 as two triangles, with five more that have no area among them.
+  const auto lamp = [](bool degenerate, bool proper) {
+    SceneKit kit = floor_point();
+    std::vector<std::array<Vec3, 3>> triangles;
+    const Vec3 a{-.8, -.8, 1.25}, b{.8, -.8, 1.25}, c{.8, .8, 1.25}, d{-.8, .8, 1.25};
+    if (degenerate) triangles.push_back({a, a, b});
+    if (proper) triangles.push_back({a, c, b});
+    if (degenerate) {
+      triangles.push_back({a, b, {0, -.8, 1.25}});
+      triangles.push_back({c, c, c});
+    }
+    if (proper) triangles.push_back({a, d, c});
+    MeshShape mesh;
+    mesh.file = obj(kit, triangles);
+    shine(kit, mesh, {});
+    return kit;
+  };
+  const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
+  t.mean(
+      "N28-triangles-without-area-among-others", "N28 N40",
+      "They are left out, and the light is what it was.", [=] { return lamp(true, true); },
+      reflected(4 * x / s * std::atan(x / s)));
+  t.exact("N28-no-area-at-all", "N28", "A light of triangles without area: black, and nothing goes wrong.",
+          [=](const Bench& b) { return every_value(b, lamp(true, false), 16, grey(0), 0); });
+  t.exact("N29-light-of-no-power", "N29", "A black light is left out: the same bits as without it.",
+          [](const Bench& b) {
+            SceneKit with = floor_point();
+            with.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
+            const SceneKit without = with;
+            with.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
+            with.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(0)});
+            return same_bits(b, with, without, 16);
+          });
+  t.exact("N29-only-black-lights", "N29", "Lights of no power alone: black.", [](const Bench& b) {
+    SceneKit kit = floor_point();
+    kit.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
+    shine(kit, SphereShape{}, translate({0, 0, 2}) * scale(.5), 0);
+    return every_value(b, kit, 16, grey(0), 0);
+  });
+}
+
+void orders_apart(Table& t) {
+  // A thousand lamps of intensities 1e-20 to 1e20: the sum is that of the brightest few.
+  for (const bool tree : {false, true}) {
+    const int count = tree ? 1000 : 4;
+    double irradiance = 0;
+    std::vector<PointEmitter> lamps;
+    for (int i = 0; i < count; ++i) {
+      const double power = std::pow(10., -20 + 40. * i / (count - 1)), a = 2.4 * i;
+      const Vec3 p{std::cos(a) * .9, std::sin(a) * .9, 1 + .001 * i};
+      const double d2 = .81 + p[2] * p[2];
+      irradiance += power * p[2] / std::pow(d2, 1.5);
+      lamps.push_back({p, rgb(power)});
+    }
+    t.mean(
+        fmt::format("N30-{}-lamps-of-1e-20-to-1e20", count), "N30 N31",
+        "Lamps of powers forty orders apart: the brightest make up the sum, and none is lost.",
+        [=] {
+          SceneKit kit = floor_point();
+          for (const PointEmitter& lamp : lamps) kit.scene.emitters.push_back(lamp);
+          return kit;
+        },
+        reflected(irradiance));
+  }
+  // A delta light seen by way of a delta lobe: no strategy finds it, none divides by a density of 0.
+  t.exact("N32-lamp-in-a-mirror", "N32", "A point light in a mirror is not seen, and nothing goes wrong.",
+          [](const Bench& b) {
+            SceneKit kit;
+            kit.shape(RectangleShape{}, scale(3), kit.mirror());
+            kit.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
+            kit.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+            return every_value(b, kit, 16, grey(0), 0);
+          });
+  for (const double s : {1e-15, 1e15}) {
+    t.same(
+        fmt::format("N32-densities-of-{:g}", 1 / s), "N32",
+        "Lengths whose inverse squares are beyond float32: the weights of strategies stay numbers.",
+        [=] {
+          Way way{false, true};
+          SceneKit kit = lit_cube(way, rgb(1), rgb(1), 0, {0, 0, 0}, s);
+          kit.scene.emitters = {PointEmitter{{0, 4 * s, 0}, rgb(s * s)}};
+          return kit;
+        },
+        [] {
+          SceneKit kit = lit_cube({false, true}, rgb(1), rgb(1));
+          kit.scene.emitters = {PointEmitter{{0, 4, 0}, rgb(1)}};
+          return kit;
+        });
+  }
+}
+
+}  // namespace
+
+void add_light_shapes(Table& t) {
+  tiny(t);
+  huge(t);
+  of_nothing(t);
+  orders_apart(t);
+}
+
+}  // namespace ls::cases

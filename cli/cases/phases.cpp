@@ -1,0 +1,125 @@
+// Phase functions up to |g| = .9999, where others clamp.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cli/cases/case.h"
+#include "cli/cases/checks.h"
+#include "cli/cases/stages.h"
+
+namespace ls::cases {
+namespace {
+
+// Light along the view itself (or against it) in a cube of a medium: p(forward) sigma d e^(-sigma d), or with
+// the light in the back p(backward) (1 - e^(-2 sigma d)) / 2. Parallel rays, so that the angle is 0.
+SceneKit head_on(const Way& way, double g, double sigma, bool backlit) {
+  SceneKit kit = unit_cube(way, rgb(sigma), rgb(1), g);
+  kit.scene.sensor.projection = Projection::orthographic;
+  kit.scene.sensor.to_world = look_at({-3, .5, .5}, {.5, .5, .5}, {0, 0, 1}) * scale(.01, .01, 1);
+  kit.scene.emitters.push_back(DirectionalEmitter{{backlit ? -1. : 1., 0, 0}, rgb(1)});
+  kit.scene.integrator.max_depth = kOnce;
+  return kit;
+}
+
+double peak(double g) { return (1 + g) / ((1 - g) * (1 - g)) / (4 * kPi); }
+
+// Towards a light straight ahead, seen from there: light travels against the view, so that what arrives is
+// scattered by 0 degrees. 4 pi p(0) = (1 + g) / (1 - g)^2, 1.9999e8 at g = .9999.
+void peaks(Table& t) {
+  const auto add = [&](const std::string& id, const char* rows, const Way& way, double g) {
+    t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
+           [=] { return head_on(way, g, .5, g > 0); },
+           grey(peak(std::abs(g)) * (g > 0 ? .5 * std::exp(-.5) : -std::expm1(-1.) / 2)),
+           // 1 - g is known to 2^-24 / (1 - g) of it, and stands there squared.
+           {.band = .003, .slack = 2 * 0x1p-25 / (1 - std::abs(g))});
+  };
+  for (const Way& way : all_ways()) {
+    for (const double g : {.99, .999, .9999, -.99, -.9999})
+      add(fmt::format("N18-peak-g-{:g}{}", g, way.name()), "N18", way, g);
+  }
+  add("bug-g-clamped-to-.99/homogeneous/volpath", "N18 bug", {}, .9995);
+  add("bug-g-clamped-to-.99/homogeneous/volpath-backward", "N18 bug", {}, -.9995);
+}
+
+// Of light scattered once the share that stays within an angle q of its way, where the light is a sun of that
+// radius behind the medium: directions found by the phase function, by the sun, or by both.
+double share_within(double g, double degrees) {
+  const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
+  return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
+}
+
+void cones(Table& t) {
+  struct Cone {
+    double g, degrees;
+  };
+  for (const Way& way : all_ways()) {
+    for (const Cone c : {Cone{.9999, .0115}, Cone{.999, .115}, Cone{.99, .6}}) {
+      const double radius = c.degrees * kPi / 180, x = 2 * std::pow(std::sin(radius / 2), 2);
+      // Radiance 1: irradiance is the projected solid angle. The way through the cube is the same for all
+      // angles to radius^2 / 2, 5.5e-5 at .6 degrees.
+      const double irradiance = 2 * kPi * x * (1 - x / 2);
+      t.mean(fmt::format("N18-cone-g-{:g}{}", c.g, way.name()), "N18 N26",
+             "A sun of a few thousandths of a degree, seen directly and by light scattered into the view.",
+             [=] {
+               SceneKit kit = unit_cube(way, rgb(1), rgb(1), c.g);
+               kit.scene.emitters.push_back(DirectionalEmitter{{-1, 0, 0}, rgb(irradiance), c.degrees});
+               kit.scene.integrator.max_depth = kOnce;
+               kit.look({-3, .5, .5}, {.5, .5, .5}, 1e-5);
+               return kit;
+             },
+             grey(std::exp(-1.) * (1 + share_within(c.g, c.degrees))), {.slack = radius * radius});
+    }
+  }
+}
+
+void small_and_forbidden(Table& t) {
+  for (const Way& way : all_ways()) {
+    for (const double g : {1e-7, -1e-7, 1e-30})
+      t.mean(
+          fmt::format("N18-all-but-isotropic-g-{:g}{}", g, way.name()), "N18",
+          "A g of next to nothing is isotropic scattering: there is no division by it.",
+          [=] {
+            SceneKit kit = lit_cube(way, rgb(1), rgb(1));
+            kit.scene.phases.push_back(HgPhase{g});
+            const PhaseIndex last{static_cast<std::uint32_t>(kit.scene.phases.size() - 1)};
+            std::visit([&](auto& m) { m.phase = last; }, kit.scene.media[0]);
+            return kit;
+          },
+          grey(lit_cube_answer(1, 1)));
+  }
+  for (const double g : {1., -1., .99999999999})
+    t.exact(fmt::format("N19-g-{:g}-is-refused{}", g, g < 1 && g > 0 ? "-too" : ""), "N19",
+            "A phase function that is a delta is refused, saying so.", [g](const Bench& b) {
+              return refused(b, unit_cube({}, rgb(1), rgb(1), g), {"between -1 and 1"});
+            });
+}
+
+// R and T of slabs of Henyey-Greenstein (van de Hulst 1980), and backward scattering.
+void slabs(Table& t) {
+  struct Row {
+    Slab slab;
+    double r, t;
+  };
+  for (const Way& way : two_ways()) {
+    for (const Row& row : {Row{{.9, .75, 2}, .097395, .660958}, Row{{1, .85, 8}, .358432, .641568},
+                           Row{{1, -.5, 2}, .620494, .379506}}) {
+      for (const bool through : {false, true})
+        t.mean(fmt::format("7.2-slab-a{:g}-g{:g}-tau{:g}-{}{}", row.slab.albedo, row.slab.g, row.slab.tau,
+                           through ? "T" : "R", way.name()),
+               "7.2 N18", "A slab of Henyey-Greenstein scattering at normal incidence, tabulated.",
+               [=] { return column(way, row.slab, through); }, grey(through ? row.t : row.r),
+               {.slack = 1e-5, .slow = !through});
+    }
+  }
+}
+
+}  // namespace
+
+void add_phases(Table& t) {
+  peaks(t);
+  cones(t);
+  small_and_forbidden(t);
+  slabs(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,202 @@
+// Multiple scattering in plane-parallel media: tabulated reflectances and transmittances (STABILITY section
+// 7; Chandrasekhar 1950, Giovanelli 1955, van de Hulst 1980).
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cli/cases/case.h"
+#include "cli/cases/checks.h"
+#include "cli/cases/stages.h"
+#include "cli/validate_measure.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kDigits = 5e-6;  // half a unit of the last place that the tables give, at .1
+
+void semi_infinite(Table& t) {
+  struct Row {
+    double albedo, normal, slanted, l_over_e, digits;
+  };
+  for (const Row& row :
+       {Row{.5, .115226, .160144, .031148, 2e-5}, Row{.9, .414947, .507939, .122572, 5e-6}}) {
+    for (const Way& way : two_ways()) {
+      for (const double cosine : {1., .5})
+        t.mean(fmt::format("7.1-semi-infinite-a{:g}-mu{:g}{}", row.albedo, cosine, way.name()), "7.1",
+               "An endless medium in a sky: 1 - sqrt(1 - a) H(mu).",
+               [=] { return half_space(way, row.albedo, 40, cosine); },
+               grey(cosine == 1 ? row.normal : row.slanted), {.slack = kDigits});
+      t.mean(fmt::format("7.1-normal-to-normal-a{:g}{}", row.albedo, way.name()), "7.1",
+             "An endless medium in the sun, both along the normal: L / E = a H(1)^2 / (8 pi).",
+             [=] {
+               SceneKit kit = half_space(way, row.albedo, 40, 1);
+               kit.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
+               return kit;
+             },
+             grey(row.l_over_e), {.slack = row.digits});
+    }
+  }
+  // White, of optical depth 256: the endless medium's .336428 less what gets through,
+  // (4/3) K^2 / (tau + 1.42089) / pi with K = sqrt(3) / 4 H(1).
+  const double k = std::sqrt(3.) / 4 * 2.907811;
+  t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 256.",
+         [] {
+           SceneKit kit = column({}, {1, 0, 256}, false);
+           kit.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
+           return kit;
+         },
+         grey(.336428 - 4. / 3 * k * k / 257.42089 / kPi), {.slack = 1e-5, .slow = true});
+}
+
+struct Row {
+  Slab slab;
+  double r, t, r_diffuse, t_diffuse;
+};
+constexpr Row kIsotropic[] = {{{.5, 0, 1}, .099119, .446058, .134165, .306709},
+                              {{.9, 0, 1}, .267410, .591625, .352712, .474746},
+                              {{.99, 0, 4}, .645047, .275480, .709734, .216634},
+                              {{1, 0, 16}, .903632, .096368, .923464, .076536}};
+
+std::string named(const char* what, const Slab& s, const char* side, const Way& way) {
+  return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, way.name());
+}
+
+void isotropic(Table& t) {
+  for (const Row& row : kIsotropic) {
+    for (const Way& way : two_ways()) {
+      const bool thick = row.slab.tau > 10;
+      t.mean(named("slab", row.slab, "R", way), "7.2", "What an isotropic slab reflects at normal incidence.",
+             [=] { return column(way, row.slab, false); }, grey(row.r),
+             {.slack = kDigits * 10, .slow = row.r < .2});
+      t.mean(named("slab", row.slab, "T", way), "7.2",
+             "What an isotropic slab lets through at normal incidence.",
+             [=] { return column(way, row.slab, true); }, grey(row.t),
+             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = thick});
+    }
+  }
+  t.mean("7.2-slab-split-by-a-boundary/homogeneous/volpath", "7.2 7.7",
+         "A boundary that changes nothing, at a third of it.",
+         [] {
+           return column({}, {.9, 0, 1, 1, true}, false);
+         },
+         grey(.267410), {.slack = kDigits * 10});
+}
+
+// A white plate (1/2) in the column above the slab sees it under the cosine: with R and T the slab's for
+// diffuse light and the sky below, the plate is lit by B = T + R B / 2, and shows B / 2; where it shines 1
+// itself and all is dark below, B = R (1 + B / 2), and it shows 1 + B / 2.
+SceneKit plate_above(const Way& way, const Slab& slab, bool transmitted) {
+  SceneKit kit = column(way, slab, transmitted);
+  Shape& end = kit.scene.shapes.back();  // black, behind what is looked at from above
+  const BsdfIndex white = kit.diffuse(.5);
+  if (transmitted) {
+    end.bsdf = white;
+  } else {
+    kit.scene.emitters.clear();
+    const TextureIndex light = kit.texture(rgb(1));
+    kit.shape(RectangleShape{}, translate({0, 0, slab.tau + 2}) * scale(.6), white).emitter =
+        AreaEmitter{light};
+  }
+  kit.scene.shapes.back().to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(.6);
+  kit.look({.1, .15, slab.tau + 1}, {.1, .15, slab.tau + 2}, 1e-3, {0, 1, 0});
+  return kit;
+}
+
+void diffuse(Table& t) {
+  for (const Row& row : kIsotropic) {
+    for (const Way& way : two_ways()) {
+      const bool thick = row.slab.tau > 10;
+      const double lit = row.t_diffuse / (1 - row.r_diffuse / 2),
+                   back = row.r_diffuse / (1 - row.r_diffuse / 2);
+      t.mean(named("diffuse", row.slab, "T", way), "7.2",
+             "A white plate over a slab that the sky shines through.",
+             [=] { return plate_above(way, row.slab, true); }, grey(lit / 2),
+             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = thick});
+      t.mean(named("diffuse", row.slab, "R", way), "7.2",
+             "A shining white plate over a slab that reflects its light.",
+             [=] { return plate_above(way, row.slab, false); }, grey(1 + back / 2), {.slack = kDigits * 10});
+    }
+  }
+}
+
+void dielectric(Table& t) {
+  for (const Way& way : two_ways()) {
+    t.mean("7.5-glass-semi-infinite" + way.name(), "7.5",
+           "An endless medium of index 1.5 (Giovanelli 1955), its mirror image of the sky included.",
+           [=] {
+             return column(way, {.9, 0, 20, 1.5}, false);
+           },
+           grey(.25992), {.slack = 4e-5});
+    t.mean("7.5-water-slab-R" + way.name(), "7.5", "A slab of water that scatters forward.",
+           [=] {
+             return column(way, {.9, .75, 2, 1.33}, false);
+           },
+           grey(.10931), {.slack = 1e-4});
+    t.mean("7.5-water-slab-T" + way.name(), "7.5", "A slab of water that scatters forward.",
+           [=] {
+             return column(way, {.9, .75, 2, 1.33}, true);
+           },
+           grey(.55168), {.slack = 1e-4});
+  }
+}
+
+// Scattered once only: R_1 = (a/2) int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
+double first_order(double albedo, double tau) {
+  return albedo / 2 *
+         integrate(
+             [tau](double mu) { return mu == 0 ? 0 : mu / (1 + mu) * -std::expm1(-tau * (1 + 1 / mu)); }, 0,
+             1, 20'000);
+}
+
+// The mean that a column shows with paths of so many scatterings, and with one more.
+Figure more_light(const Bench& bench, int order) {
+  double mean[2] = {0, 0};
+  Figure f{.expected = 1};
+  for (const int more : {0, 1}) {
+    SceneKit kit = column({}, {.9, 0, 1}, false);
+    kit.scene.integrator.max_depth = 1 + order + more;
+    kit.scene.integrator.rr_depth = 1000;
+    const auto p = shoot(kit, 64, bench.seed, bench.threads);
+    if (!p) return {.why = p.error().message};
+    f.unhealthy += cli::samples_gone_wrong(p->health);
+    for (std::size_t i = 0; i < p->sums.size() / 6; ++i) mean[more] += p->mean(i, 1);
+  }
+  f.got = mean[1] > mean[0] ? 1 : 0;
+  return f;
+}
+
+void orders(Table& t) {
+  for (const Way& way : two_ways()) {
+    for (const double tau : {1., 4., 60.}) {
+      t.mean(fmt::format("7.6h-once-tau{:g}{}", tau, way.name()), "7.6h",
+             "What a slab reflects of light scattered once: .142015352, .153412899, (1 - ln 2) / 2.",
+             [=] {
+               SceneKit kit = column(way, {1, 0, tau}, false);
+               // The column's mirrors would count as scatterings: as wide as it takes, instead.
+               kit.scene.shapes.erase(kit.scene.shapes.begin(), kit.scene.shapes.begin() + 4);
+               for (Shape& s : kit.scene.shapes) s.to_world = s.to_world * scale(60, 60, 1);
+               kit.scene.integrator.max_depth = kOnce;
+               return kit;
+             },
+             grey(first_order(1, tau)), {.slack = 1e-4});
+    }
+  }
+  // Each order adds something, and all of them are the whole.
+  for (int order = 1; order <= 8; order *= 2) {
+    t.exact(fmt::format("7.6h-order-{}-adds-light/homogeneous/volpath", order), "7.6h",
+            "One more scattering, more light: the same numbers, paths one segment longer.",
+            [order](const Bench& b) { return more_light(b, order); });
+  }
+}
+
+}  // namespace
+
+void add_slabs(Table& t) {
+  semi_infinite(t);
+  isotropic(t);
+  diffuse(t);
+  dielectric(t);
+  orders(t);
+}
+
+}  // namespace ls::cases
