@@ -117,8 +117,11 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
   std::memcpy(&r.tfar, &rest, sizeof rest);
 }
 
-bool traceable(const V3& o, const V3& d) {  // Embree's behaviour on NaN is undefined
-  return is_finite(o) && is_finite(d);
+// Embree's behaviour on NaN is undefined, and Debian's stops the process at rays that begin beyond 1.8e18, in
+// the space of an instance too (kLargestInverse). The world is of unit size: from so far away it is nowhere.
+constexpr float kFarthest = 1e9f;
+bool near_enough(const V3& o) {
+  return std::abs(o.x) <= kFarthest && std::abs(o.y) <= kFarthest && std::abs(o.z) <= kFarthest;
 }
 
 // The scenes over one set of primitives. all == opaque where there is nothing that light passes.
@@ -293,7 +296,7 @@ PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned pri
 
 std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V3& o, const V3& d,
                                  float t_max) {
-  if (!traceable(o, d)) return std::nullopt;
+  if (!near_enough(o) || !is_finite(d)) return std::nullopt;
   RTCRayHit rh;
   set_ray(rh.ray, o, d, t_max);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -377,7 +380,7 @@ Together Accel::between(const V3& a, const V3& b) const {
 }
 
 bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
-  if (!traceable(o, d)) return true;
+  if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
   RTCRay ray;
   set_ray(ray, o, d, t_max);
   RTCIntersectContext context;

@@ -39,6 +39,18 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   }
 }
 
+bool Camera::usable() const {
+  // Positions on the film and the lens enter rays linearly: the corners are the extremes.
+  for (const double fx : {0., 1.})
+    for (const double fy : {0., 1.})
+      for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
+        const CameraRay r = ray(fx / per_pixel_x_, fy / per_pixel_y_, lens);
+        const float length = dot(r.d, r.d);
+        if (!is_finite(r.o) || !(length > .99f && length < 1.01f) || std::isnan(r.t_max)) return false;
+      }
+  return true;
+}
+
 CameraRay Camera::ray(double fx, double fy, V2 lens) const {
   if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
   const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;

@@ -26,6 +26,8 @@ class Camera {
   // fx, fy: position on the whole frame in pixels, (0, 0) its top left corner; lens in [0, 1)^2, unused by a
   // pinhole.
   CameraRay ray(double fx, double fy, V2 lens) const;
+  // Whether all its rays have a beginning and a direction in the range of float32.
+  bool usable() const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 

@@ -234,8 +234,9 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The BVH inverts the map by itself, in float32.
-  const auto in_range = [](double x) { return std::isfinite(static_cast<float>(x)); };
+  // The BVH inverts the map by itself, in float32, and wants no rays from too far away (accel.cpp).
+  constexpr double kLargestInverse = 5e8;
+  const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||
       !std::all_of(out.to_local.a.begin(), out.to_local.a.end(), in_range))
     return fail(Errc::invalid_argument,

@@ -160,6 +160,10 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
   place_camera(scene, settings, w);
+  if (!w.camera.usable())
+    return fail(Errc::invalid_argument,
+                "the rays of the sensor leave the range of single precision: check its to_world, fov, "
+                "principal_point_offset, clip planes, aperture_radius and focus_distance");
   w.filter = PixelFilter(scene.film.filter);
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);

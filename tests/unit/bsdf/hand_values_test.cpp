@@ -123,6 +123,21 @@ TEST(Build, BringsReflectancesIntoRangeAndCountsThem) {
   EXPECT_EQ(b->eval(up, up).f_cos.z, 0);
 }
 
+TEST(Conductor, OfAHugeIndexReflectsEverything) {
+  for (const double huge : {1e6, 1e12, 1e38, 1.7e308}) {
+    for (const bool real : {true, false}) {
+      const Rgb eta = real ? Rgb{huge, huge, huge} : Rgb{1, 1, 1},
+                k = real ? Rgb{1, 1, 1} : Rgb{huge, huge, huge};
+      const auto b = bench(rough_metal(Microfacet::ggx, 1e-4, 1e-4, eta, k));
+      const auto s = b->sample(direction(.8, 1), .5f, {.2f, .7f});
+      ASSERT_TRUE(s);
+      // At a right angle 1 - R is 4 / eta or 4 / k^2, elsewhere no more than 4 / (eta cos).
+      EXPECT_NEAR(s->weight.x, 1, 8e-6) << huge;
+      if (huge > 1e9) EXPECT_NEAR(s->weight.x, 1, 2e-7) << huge;
+    }
+  }
+}
+
 TEST(Roughness, BelowTheSpecularLimitIsAMirror) {
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx}) {
     const auto b = bench(rough_metal(d, 9e-4, 9e-4, kGoldEta, kGoldK));

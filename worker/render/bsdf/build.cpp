@@ -224,10 +224,13 @@ class Builder {
            m.alpha_v.value.x < kSpecularAlpha;
   }
   void metal(Material& m, const Rgb& eta, const Rgb& k, TextureIndex specular) {
+    // A metal of this index reflects all but 4e-9 of the light, which is everything in float32; the fourth
+    // powers in fresnel_conductor must remain numbers.
+    constexpr double kLargestIndex = 1e9;
     for (int c = 0; c < 3; ++c) {
-      m.eta[c] = static_cast<float>(eta[c]);
-      m.k[c] = static_cast<float>(k[c]);
-      if (!(m.eta[c] >= 0) || !(m.k[c] >= 0) || !std::isfinite(m.eta[c]) || !std::isfinite(m.k[c]))
+      m.eta[c] = static_cast<float>(std::min(eta[c], kLargestIndex));
+      m.k[c] = static_cast<float>(std::min(k[c], kLargestIndex));
+      if (!(eta[c] >= 0) || !(k[c] >= 0) || !std::isfinite(eta[c]) || !std::isfinite(k[c]))
         refuse(fmt::format("the conductor's index {} + {} i is not finite and >= 0", eta[c], k[c]));
     }
     m.specular_slot = reflectance(specular);

@@ -1,0 +1,130 @@
+#include "tests/property/draw.h"
+
+#include <algorithm>
+
+namespace ls::test {
+
+Rgb Draw::colour(const scene::Range& range) {
+  if (dice_.chance(.4)) {
+    const double grey = number(range);
+    return {grey, grey, grey};
+  }
+  Rgb c;
+  for (double& x : c) x = number(range);
+  return c;
+}
+
+Transform Draw::placement(double size, bool alike) {
+  Vec3 at, by;
+  for (double& x : at) x = 1.3 * dice_.gauss();
+  const double all = size * dice_.magnitude(.3, 1.5);
+  for (double& x : by) x = alike ? all : size * dice_.magnitude(.3, 1.5);
+  if (dice_.chance(.1)) by[0] = -by[0];
+  if (wild()) {
+    const double k = dice_.extreme({1e-30, 1e30});
+    for (double& x : by) x *= k;
+  }
+  if (wild()) at[dice_.below(3)] = dice_.extreme({-1e12, 1e12});
+  if (!alike && wild()) by[dice_.below(3)] = dice_.extreme({1e-12, 1e12});
+  const Transform turn =
+      dice_.chance(.3) ? Transform{} : rotate_x(dice_.between(0, 360)) * rotate_y(dice_.between(0, 360));
+  return translate(at) * turn * scale(by[0], by[1], by[2]);
+}
+
+TextureIndex Draw::texture(const scene::Range& range, int depth) {
+  Texture t = ConstantTexture{colour(range)};
+  const double kind = dice_.unit();
+  if (kind < .15) {
+    BitmapTexture b;
+    fill(b);
+    b.file = SceneKit::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
+    t = b;
+  } else if (kind < .3 && depth < 3) {
+    CheckerboardTexture c;
+    fill(c);
+    // The fields' own ranges are wider than those of what the texture is for.
+    c.color0 = texture(range, depth + 1);
+    c.color1 = texture(range, depth + 1);
+    t = c;
+  } else if (kind < .34 && depth < 3) {
+    PeakTexture p;
+    fill(p);
+    p.texture = texture(range, depth + 1);
+    t = p;
+  }
+  return SceneKit::push<TextureTag>(scene_.textures, t);
+}
+
+BsdfIndex Draw::bsdf(int depth) {
+  const int outer = std::exchange(depth_, depth);
+  Bsdf b;
+  do {
+    any(b);
+  } while (depth > 2 && scene::nested_bsdfs(b)[0]);
+  const auto diffuse = [&] {
+    return SceneKit::push<BsdfTag>(scene_.bsdfs, DiffuseBsdf{texture(scene::kUnit)});
+  };
+  if (auto* two = std::get_if<TwoSidedBsdf>(&b)) {
+    const auto traits = *scene::bsdf_traits(scene_);
+    for (BsdfIndex* side : {&two->front, &two->back})
+      if (traits[side->value].transmits || traits[side->value].two_sided) *side = diffuse();
+  }
+  if (auto* mask = std::get_if<MaskBsdf>(&b)) {
+    // Of an image its alpha channel may be meant: no other use of it is.
+    if (auto* image = std::get_if<BitmapTexture>(&scene_.textures[mask->opacity.value])) image->alpha = true;
+  }
+  if (auto* p = std::get_if<PrincipledBsdf>(&b); p && p->spec_trans) {
+    // A share of nothing is not given.
+    const auto* share = std::get_if<ConstantTexture>(&scene_.textures[p->spec_trans->value]);
+    if (share && share->value == Rgb{0, 0, 0}) p->spec_trans.reset();
+  }
+  if (auto* bump = std::get_if<BumpMapBsdf>(&b)) {
+    BitmapTexture heights;
+    heights.file = SceneKit::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
+    heights.raw = true;
+    bump->texture = SceneKit::push<TextureTag>(scene_.textures, heights);
+  }
+  depth_ = outer;
+  return SceneKit::push<BsdfTag>(scene_.bsdfs, b);
+}
+
+VolumeIndex Draw::volume(GridKind kind) {
+  const double c = dice_.unit();
+  if (c < .3) {
+    ConstVolume v;
+    v.value = colour(kind == GridKind::share ? scene::kUnit : scene::kNonNegative);
+    if (kind == GridKind::temperature) v.value = Rgb{v.value[0] * 800, v.value[0] * 800, v.value[0] * 800};
+    if (kind == GridKind::density) v.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
+    return SceneKit::push<VolumeTag>(scene_.volumes, v);
+  }
+  GridVolume g;
+  fill(g);
+  const bool bin = c > .85;
+  g.file = SceneKit::push<AssetTag>(scene_.assets, bin ? random_bin(dice_, assets_, choice_.wild, kind)
+                                                       : random_vol(dice_, assets_, choice_.wild, kind));
+  if (!bin) g.order = GridOrder::x_fastest;
+  if (bin) g.raw = true;
+  if (bin || g.node_centred) g.wrap = Wrap::clamp;
+  if (dice_.chance(.7)) g.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
+  return SceneKit::push<VolumeTag>(scene_.volumes, g);
+}
+
+MediumIndex Draw::medium() {
+  Medium m;
+  any(m);
+  if (auto* h = std::get_if<HeterogeneousMedium>(&m)) {
+    // At most one source of light, and none of their factors without it.
+    const std::size_t keep = dice_.below(4);
+    if (keep != 0) h->emission.reset();
+    if (keep != 1) h->source_radiance.reset();
+    if (keep != 2) h->temperature.reset();
+    if (!h->emission && !h->source_radiance && !h->temperature) h->emission_scale = 1;
+    if (!h->temperature) {
+      h->temperature_scale = 1;
+      h->temperature_offset = 0;
+    }
+  }
+  return SceneKit::push<MediumTag>(scene_.media, m);
+}
+
+}  // namespace ls::test

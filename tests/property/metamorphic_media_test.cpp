@@ -1,0 +1,167 @@
+// What must not change an image: how a medium is written down, where nothing is, and which way light goes.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/property/compare.h"
+#include "tests/property/structures.h"
+
+namespace ls::test {
+namespace {
+
+const double kLevel = level_of(30);
+
+void expect_alike(const SceneKit& a, const SceneKit& b, std::uint64_t seed, Looks looks = {256, 4096}) {
+  const Comparison c = look(a, b, seed, kLevel, looks);
+  EXPECT_EQ(c.verdict, Verdict::alike) << c.told;
+}
+
+// A medium in the cube [-1, 1]^3 under the sun, on a floor.
+template <class Make>
+SceneKit sunlit(Make make) {
+  SceneKit kit({12, 12});
+  kit.shape(RectangleShape{}, translate({0, 0, -1.25}) * scale(4), kit.diffuse(.5));
+  kit.container(CubeShape{}, {}, kit.null(), make(kit));
+  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
+  kit.scene.emitters.push_back(PointEmitter{{0, -2, 2}, {3, 2, 1}});
+  kit.look({0, -5, 2}, {0, 0, 0}, 30);
+  kit.scene.integrator.max_depth = 8;
+  return kit;
+}
+
+// Values at the nodes from face to face; twice as many nodes between which the field is the same.
+VolumeIndex nodes(SceneKit& kit, int n, const std::vector<float>& values) {
+  const VolumeIndex v = kit.grid({n, n, n}, values, translate({-1, -1, -1}) * scale(2));
+  std::get<GridVolume>(kit.scene.volumes[v.value]).node_centred = true;
+  return v;
+}
+std::vector<float> refined(int n, const std::vector<float>& v) {
+  const int m = 2 * n - 1;
+  std::vector<float> out;
+  const auto at = [&](int x, int y, int z) { return v[static_cast<std::size_t>((z * n + y) * n + x)]; };
+  for (int z = 0; z < m; ++z)
+    for (int y = 0; y < m; ++y)
+      for (int x = 0; x < m; ++x) {
+        float sum = 0;
+        for (int k = 0; k < 8; ++k) sum += at((x + (k & 1)) / 2, (y + (k >> 1 & 1)) / 2, (z + (k >> 2)) / 2);
+        out.push_back(sum / 8);
+      }
+  return out;
+}
+
+TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
+  std::mt19937 random(4);
+  std::vector<float> values(5 * 5 * 5);
+  for (float& v : values) v = static_cast<float>(random() % 64) / 16;
+  for (const char* integrator : {"volpath", "volpath_distant_mis"}) {
+    const auto with = [&](int n, const std::vector<float>& v) {
+      SceneKit kit = sunlit([&](SceneKit& k) {
+        return k.heterogeneous(nodes(k, n, v), {.9, .8, .7}, 1, .3);
+      });
+      kit.scene.integrator.name = integrator;
+      return kit;
+    };
+    expect_alike(with(5, values), with(9, refined(5, values)), 1);
+  }
+}
+
+// Half the size and twice the density: the same optical depths. Seen from as near, in the same bits.
+TEST(Metamorphic, HalfTheSizeAtTwiceTheDensityIsTheSame) {
+  const auto with = [](double size) {
+    SceneKit kit({12, 12});
+    kit.container(CubeShape{}, scale(size), kit.null(),
+                  kit.homogeneous({.5 / size, 1 / size, 2 / size}, {.9, .8, .7}, .5));
+    kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
+    kit.look({0, -5 * size, 2 * size}, {0, 0, 0}, 30);
+    kit.scene.sensor.near_clip *= size;
+    kit.scene.sensor.far_clip *= size;
+    return kit;
+  };
+  const PixelRect all{0, 0, 12, 12};
+  const auto one = render::render_tile(*world_of(with(1)), all, {0, 4}, nullptr, nullptr);
+  EXPECT_EQ(render::render_tile(*world_of(with(.5)), all, {0, 4}, nullptr, nullptr).sums, one.sums);
+}
+
+// Density beyond the container that no ray meets, in the macro cells that they cross: majorants are four
+// orders of magnitude too large.
+TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
+  for (const char* integrator : {"volpath", "volpath_distant_mis"}) {
+    const auto with = [&](float outside) {
+      std::vector<float> values(12 * 12 * 12, 1);
+      for (int i = 0; i < 12; ++i)
+        for (int j = 0; j < 12; ++j) values[static_cast<std::size_t>((i * 12 + j) * 12 + 11)] = outside;
+      SceneKit kit = sunlit([&](SceneKit& k) {
+        // The last layer of voxels, and what is interpolated towards it, lie beyond x = 1.
+        return k.heterogeneous(k.grid({12, 12, 12}, values, translate({-1, -1, -1}) * scale(2.5, 2, 2)),
+                               {.9, .8, .7});
+      });
+      kit.scene.integrator.name = integrator;
+      return kit;
+    };
+    expect_alike(with(1), with(1e4f), 20, {64, 256});
+  }
+}
+
+TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
+  std::uint64_t seed = 40;
+  for (const NamedScene& s : different_scenes()) {
+    SceneKit more = s.kit;
+    const BsdfIndex null = more.null();
+    // Within the media, across their boundaries, around everything. None of them says what is on its sides.
+    for (const double r : {.25, .7, 1.2, 9.})
+      more.shape(SphereShape{}, translate({.1, .05, 0}) * scale(r), null);
+    more.shape(RectangleShape{}, rotate_x(30) * scale(3), null);
+    expect_alike(s.kit, more, seed += 10, {64, 1024});
+  }
+}
+
+// Radiance towards b of a slab lit from a, by irradiance on the slab, is that towards a lit from b.
+TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
+  const auto direction = [](double degrees) {
+    return Vec3{std::sin(degrees * kPi / 180), 0, std::cos(degrees * kPi / 180)};
+  };
+  const auto seen = [&](double to, double from, bool beyond, const char* integrator) {
+    SceneKit kit({8, 8});
+    kit.container(CubeShape{}, scale(1e4, 1e4, 1), kit.null(),
+                  kit.homogeneous({.3, .6, 1.2}, {.95, .8, .6}, .6));
+    const Vec3 in = direction(from), out = direction(to);
+    // Per irradiance on the slab, which gets the cosine of what faces the light.
+    const double e = 1 / in[2];
+    kit.scene.emitters.push_back(DirectionalEmitter{{-in[0], 0, -in[2]}, {e, e, e}});
+    const double side = beyond ? -1 : 1;
+    kit.look({5 * side * out[0], 0, 5 * side * out[2]}, {0, 0, 0}, 1e-2, {0, 1, 0});
+    kit.scene.integrator.name = integrator;
+    return kit;
+  };
+  std::uint64_t seed = 200;
+  for (const char* integrator : {"volpath", "volpath_distant_mis"})
+    for (const bool beyond : {false, true})
+      expect_alike(seen(20, 65, beyond, integrator), seen(65, 20, beyond, integrator), seed += 10);
+}
+
+// A sample is its own: alone, in any order and in any company it is the same.
+TEST(Metamorphic, SamplesKnowNoOrder) {
+  for (const NamedScene& s : different_scenes()) {
+    const auto world = world_of(s.kit);
+    const auto tile = render::render_tile(*world, {3, 4, 6, 6}, {0, 8}, nullptr, nullptr);
+    for (int y = 5; y >= 4; --y)
+      for (int x = 5; x >= 3; --x) {
+        double sum[2][3] = {}, value[8][3];
+        for (const std::uint64_t n : {7, 0, 3, 6, 1, 2, 5, 4}) {
+          const auto v = render::render_sample(*world, x, y, n);
+          std::copy(std::begin(v.rgb), std::end(v.rgb), value[n]);
+        }
+        for (std::size_t n = 0; n < 8; ++n)
+          for (std::size_t c = 0; c < 3; ++c) sum[n & 1][c] += value[n][c];
+        const auto at = static_cast<std::size_t>((y - 4) * 3 + x - 3);
+        for (std::size_t h = 0; h < 2; ++h)
+          for (std::size_t c = 0; c < 3; ++c)
+            EXPECT_EQ(tile.sums[(3 * h + c) * 6 + at], static_cast<float>(sum[h][c])) << s.name;
+      }
+  }
+}
+
+}  // namespace
+}  // namespace ls::test

@@ -1,0 +1,183 @@
+// What must not change an image: where and how large a scene is, which way it is turned, which channel is
+// which, how its light and its space are divided. Exact where floating point allows it.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/property/compare.h"
+#include "tests/property/moved.h"
+#include "tests/property/random_scene.h"
+#include "tests/property/structures.h"
+#include "tests/property/watch.h"
+
+namespace ls::test {
+namespace {
+
+constexpr std::uint64_t kRandom = 40;  // scenes beside the different ones
+
+// The different scenes and random ones that can be built, with a film of 12 x 12.
+std::vector<NamedScene> scenes() {
+  std::vector<NamedScene> all = different_scenes();
+  const auto [first, count] = scenes_to_try(kRandom);
+  for (std::uint64_t seed = first; seed < first + count; ++seed) {
+    const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
+    SceneKit kit;
+    kit.scene = s.scene;
+    kit.files = s.assets.files();
+    kit.scene.film.size = {12, 12};
+    kit.scene.film.crop_offset = {0, 0};
+    kit.scene.film.crop_size = {0, 0};
+    if (!render::build_world(kit.scene, settings_of(kit.scene), kit.files, 1)) continue;
+    all.push_back({fmt::format("random scene {}", seed), kit});
+  }
+  return all;
+}
+
+std::vector<float> pixels(const SceneKit& kit, std::uint64_t spp) {
+  const FrameSize size = kit.scene.film.image_size();
+  const PixelRect all{0, 0, size.width, size.height};
+  return render::render_tile(*world_of(kit), all, {0, spp}, nullptr, nullptr).sums;
+}
+SceneKit moved(const SceneKit& kit, const Move& m) {
+  SceneKit out = kit;
+  out.scene = moved(kit.scene, m);
+  return out;
+}
+
+// All of the scenes against what `change` makes of them (nothing: not of this one), with one false-positive
+// rate over all.
+template <class Change>
+void expect_alike(const std::vector<NamedScene>& all, Change change, Looks looks = {}) {
+  const double level = level_of(3. * static_cast<double>(all.size()));
+  std::uint64_t compared = 0, undecided = 0, seed = 1000;
+  for (const NamedScene& s : all) {
+    seed += 10;
+    const std::optional<SceneKit> other = change(s.kit);
+    if (!other) continue;
+    ++compared;
+    const Comparison c = look(s.kit, *other, seed, level, looks);
+    undecided += c.verdict == Verdict::undecided;
+    EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
+  }
+  fmt::print("{} scenes compared, {} undecided\n", compared, undecided);
+  EXPECT_GE(compared, 2u);
+  EXPECT_LE(4 * undecided, compared + 4);
+}
+
+// ---- where, how large, which way round
+// The world is recentred and scaled to unit size by a power of two before anything is rounded.
+TEST(Metamorphic, ScalingByPowersOfTwoChangesNoBit) {
+  for (const NamedScene& s : scenes()) {
+    const auto before = pixels(s.kit, 2);
+    for (const int k : {-14, -1, 3, 20})
+      EXPECT_EQ(pixels(moved(s.kit, {{}, std::ldexp(1., k)}), 2), before) << s.name << " times 2^" << k;
+  }
+}
+
+TEST(Metamorphic, ScalingChangesNothing) {
+  int i = 0;
+  expect_alike(scenes(), [&](const SceneKit& kit) {
+    constexpr double kScales[] = {1e-4, 1e-2, 7, 1e3, 1e6};
+    return std::optional(moved(kit, {{}, kScales[i++ % 5]}));
+  });
+}
+
+// Binary fractions of a few digits stay exact in double.
+TEST(Metamorphic, ShiftingByAPowerOfTwoChangesNoBitOfExactCoordinates) {
+  for (const NamedScene& s : different_scenes()) {
+    if (s.name == "coloured fog") continue;  // the directions of its spot light are no short fractions
+    EXPECT_EQ(pixels(moved(s.kit, {{}, 1, {0x1p17, -0x1p16, 0x1p17}}), 2), pixels(s.kit, 2)) << s.name;
+  }
+}
+
+TEST(Metamorphic, ShiftingChangesNothing) {
+  expect_alike(scenes(), [](const SceneKit& kit) {
+    return std::optional(moved(kit, {{}, 1, {1e5, -1e5, 1e5}}));
+  });
+}
+
+TEST(Metamorphic, TurningChangesNothing) {
+  const Transform turn = rotate_x(37) * rotate_y(101) * rotate_x(-15);
+  expect_alike(scenes(), [&](const SceneKit& kit) { return std::optional(moved(kit, {turn})); });
+}
+
+// The hero channel is chosen by position, so it is exact for no scene.
+TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
+  const std::vector<NamedScene> all = scenes();
+  const double level = level_of(3. * static_cast<double>(all.size()));
+  std::uint64_t seed = 5000, compared = 0;
+  for (const NamedScene& s : all) {
+    if (!can_be_permuted(s.kit.scene)) continue;
+    ++compared;
+    SceneKit other = s.kit;
+    other.scene = permuted(s.kit.scene, {1, 2, 0});
+    const auto at = [&](std::uint64_t spp, double alpha) {
+      Estimate a = estimate(s.kit, spp, ++seed);
+      const Estimate b = estimate(other, spp, ++seed);
+      for (auto* list : {&a.mean, &a.standard_error, &a.freedom})
+        *list = {(*list)[1], (*list)[2], (*list)[0]};
+      return compare(a, b, alpha);
+    };
+    Comparison c = at(64, .01);
+    if (c.verdict != Verdict::alike) c = at(1024, level);
+    EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
+  }
+  EXPECT_GE(compared, 4u);
+}
+
+// ---- light
+TEST(Metamorphic, ALightOfTwoHalvesIsTheLight) {
+  expect_alike(scenes(), [](const SceneKit& kit) -> std::optional<SceneKit> {
+    SceneKit out = kit;
+    const std::size_t n = kit.scene.emitters.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!may_stand_twice(kit.scene.emitters[i])) continue;
+      dim(out.scene.emitters[i], .5);
+      out.scene.emitters.push_back(out.scene.emitters[i]);
+    }
+    return out.scene.emitters.size() > n ? std::optional(out) : std::nullopt;
+  });
+}
+
+TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
+  std::uint64_t seed = 9000;
+  const std::vector<NamedScene> all = scenes();
+  const double level = level_of(3. * static_cast<double>(all.size()));
+  for (const NamedScene& s : all) {
+    const Scene& scene = s.kit.scene;
+    if (scene.emitters.size() < 2) continue;
+    const auto at = [&](std::uint64_t spp, double alpha) {
+      Estimate sum;
+      sum.freedom = {1e9, 1e9, 1e9};
+      const auto add = [&](const SceneKit& kit) {
+        const Estimate e = estimate(kit, spp, ++seed);
+        for (std::size_t c = 0; c < 3; ++c) {
+          sum.mean[c] += e.mean[c];
+          sum.standard_error[c] = std::hypot(sum.standard_error[c], e.standard_error[c]);
+          if (e.standard_error[c] > 0) sum.freedom[c] = std::min(sum.freedom[c], e.freedom[c]);
+        }
+      };
+      // What shapes and media give off stays with the first.
+      for (std::size_t i = 0; i < scene.emitters.size(); ++i) {
+        SceneKit one = s.kit;
+        one.scene.emitters = {scene.emitters[i]};
+        if (i > 0) {
+          for (Shape& shape : one.scene.shapes) shape.emitter.reset();
+          for (Medium& m : one.scene.media) {
+            if (auto* h = std::get_if<HomogeneousMedium>(&m)) h->emission = h->source_radiance = {0, 0, 0};
+            if (auto* h = std::get_if<HeterogeneousMedium>(&m)) h->emission_scale = 0;
+          }
+        }
+        add(one);
+      }
+      return compare(sum, estimate(s.kit, spp, ++seed), alpha);
+    };
+    Comparison c = at(64, .01);
+    if (c.verdict != Verdict::alike) c = at(1024, level);
+    EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
+  }
+}
+
+}  // namespace
+}  // namespace ls::test
