@@ -23,6 +23,14 @@ inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 inline constexpr std::uint32_t kMaxGridSide = 1 << 13;
 inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 
+// What a mesh has of one name at each of its vertices, or triangles: one number or three.
+struct MeshAttribute {
+  std::string name;  // "vertex_..." or "face_..."
+  std::uint32_t components = 1;
+  bool bytes = false;         // from 0 to 255 in the file, and so here
+  std::vector<float> values;  // components interleaved
+};
+
 // A triangle mesh. Three floats a vertex in positions and (if the file has any) normals, two in uvs; three
 // indices a triangle, all below vertex_count(). uvs are as in the file.
 struct MeshData {
@@ -31,6 +39,8 @@ struct MeshData {
   bool face_normals = false;  // the file wants its triangles flat
   std::uint64_t dropped_triangles =
       0;  // of zero area or with a vertex that is not finite; none of them in indices
+  std::vector<MeshAttribute> attributes;     // those that were asked for
+  std::vector<std::string> attribute_names;  // all that the file has
 
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t triangle_count() const { return indices.size() / 3; }

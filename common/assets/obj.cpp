@@ -168,11 +168,12 @@ Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> fi
   return ObjReader(name).read(as_text(file));
 }
 
-Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name, int index) {
+Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name, int index,
+                           std::span<const std::string> attributes) {
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   if (is_serialized(*bytes)) return decode_serialized(name, *bytes, index);
-  return as_text(*bytes).starts_with("ply") ? decode_ply(name, *bytes) : decode_obj(name, *bytes);
+  return as_text(*bytes).starts_with("ply") ? decode_ply_with(attributes, name, *bytes) : decode_obj(name, *bytes);
 }
 
 }  // namespace ls

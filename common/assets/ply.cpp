@@ -9,6 +9,7 @@
 
 #include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
+#include "common/assets/ply_attributes.h"
 #include "common/assets/triangles.h"
 
 namespace ls {
@@ -66,7 +67,8 @@ int vertex_slot(std::string_view name) {
 
 class PlyReader {
  public:
-  PlyReader(std::string_view name, std::span<const std::byte> file) : name_(name), file_(file), body_(file) {}
+  PlyReader(std::string_view name, std::span<const std::byte> file, std::span<const std::string> wanted)
+      : name_(name), file_(file), wanted_(wanted), body_(file) {}
 
   Result<MeshData> read() {
     if (!header() || !elements())
@@ -157,6 +159,10 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
+    for (const MeshAttribute& a : mesh_.attributes)  // of several elements 'face', say
+      if (a.values.size() !=
+          a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
+        return complain(fmt::format("not all of it has the attribute '{}'", a.name));
     return true;
   }
 
@@ -242,11 +248,13 @@ class PlyReader {
     if (!has[0] || !has[1] || !has[2]) return complain("its vertices lack x, y or z");
     const bool normals = has[3] && has[4] && has[5], uvs = has[6] && has[7];
     mesh_.positions.reserve(e.count * 3);
+    const auto places = attribute_places(e, "vertex_");
     for (std::uint64_t i = 0; i < e.count; ++i) {
       std::array<float, 8> values{};
+      make_room(places);
       for (std::size_t k = 0; k < slots.size(); ++k) {
         if (slots[k] < 0) {
-          if (!skip_property(e.properties[k])) return broken(e, i);
+          if (!attribute_property(e.properties[k], places[k])) return broken(e, i);
           continue;
         }
         const auto v = number(*e.properties[k].type);
@@ -268,10 +276,14 @@ class PlyReader {
     if (std::ranges::count_if(e.properties, is_list) != 1)
       return complain("its faces need one list 'vertex_indices' or 'vertex_index'");
     std::vector<std::uint32_t> corners;
-    for (std::uint64_t i = 0; i < e.count; ++i)
-      for (const Property& p : e.properties) {
+    const auto places = attribute_places(e, "face_");
+    for (std::uint64_t i = 0; i < e.count; ++i) {
+      const std::size_t before = mesh_.triangle_count();
+      make_room(places);
+      for (std::size_t k_property = 0; k_property < e.properties.size(); ++k_property) {
+        const Property& p = e.properties[k_property];
         if (!is_list(p)) {
-          if (!skip_property(p)) return broken(e, i);
+          if (!attribute_property(p, places[k_property])) return broken(e, i);
           continue;
         }
         const auto n = list_length(p);
@@ -288,11 +300,79 @@ class PlyReader {
           return complain("has too many triangles");
         add_polygon(mesh_, corners);
       }
+      share_among_triangles(places, mesh_.triangle_count() - before);
+    }
     return true;
+  }
+
+  // ---- attributes that are wanted: where each property of an element goes ----
+  struct Place {
+    int attribute = -1;  // of mesh_.attributes; -1 nowhere
+    std::size_t component = 0;
+  };
+  std::vector<Place> attribute_places(const Element& e, std::string_view prefix) {
+    std::vector<std::string_view> names;
+    for (const Property& p : e.properties) names.push_back(p.count ? std::string_view{} : p.name);
+    std::vector<Place> places(names.size());
+    for (const PlyAttribute& a : ply_attributes(names)) {
+      const std::string name = std::string(prefix) + a.name;
+      mesh_.attribute_names.push_back(name);
+      if (std::ranges::find(wanted_, name) == wanted_.end()) continue;
+      for (std::size_t c = 0; c < a.properties.size(); ++c)
+        places[a.properties[c]] = {static_cast<int>(mesh_.attributes.size()), c};
+      mesh_.attributes.push_back({name,
+                                  static_cast<std::uint32_t>(a.properties.size()),
+                                  e.properties[a.properties[0]].type->type == Type::u8,
+                                  {}});
+    }
+    return places;
+  }
+  // For one more vertex or face.
+  void make_room(const std::vector<Place>& places) {
+    for (const Place& p : places)
+      if (p.attribute >= 0 && p.component == 0) {
+        MeshAttribute& a = mesh_.attributes[static_cast<std::size_t>(p.attribute)];
+        a.values.resize(a.values.size() + a.components);
+      }
+  }
+  bool attribute_property(const Property& p, const Place& place) {
+    if (place.attribute < 0) return skip_property(p);
+    const auto v = number(*p.type);
+    if (!v) return false;
+    MeshAttribute& a = mesh_.attributes[static_cast<std::size_t>(place.attribute)];
+    a.values[a.values.size() - a.components + place.component] =
+        static_cast<float>(decoded(p.type->type, *v));
+    return true;
+  }
+  // As Mitsuba 3.9: whole numbers are sRGB codes, all but bytes.
+  static double decoded(Type t, double v) {
+    constexpr std::pair<Type, double> kLargest[] = {{Type::i8, 127},
+                                                    {Type::i16, 32767},
+                                                    {Type::u16, 65535},
+                                                    {Type::i32, 2147483647},
+                                                    {Type::u32, 4294967295.}};
+    for (const auto& [type, largest] : kLargest)
+      if (t == type) {
+        const double x = v / largest;
+        return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4);
+      }
+    return v;
+  }
+  // A face is as many triangles, which may be none.
+  void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
+    for (const Place& p : places) {
+      if (p.attribute < 0 || p.component > 0) continue;
+      MeshAttribute& a = mesh_.attributes[static_cast<std::size_t>(p.attribute)];
+      if (triangles == 0) a.values.resize(a.values.size() - a.components);
+      for (std::size_t i = 1; i < triangles; ++i)
+        for (std::uint32_t c = 0; c < a.components; ++c)
+          a.values.push_back(a.values[a.values.size() - a.components]);
+    }
   }
 
   std::string_view name_;
   std::span<const std::byte> file_;
+  std::span<const std::string> wanted_;
   ByteReader body_;        // what follows the header, binary
   std::string_view rest_;  // the same, ascii
   Coding coding_ = Coding::ascii;
@@ -305,7 +385,12 @@ class PlyReader {
 }  // namespace
 
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) {
-  return PlyReader(name, file).read();
+  return decode_ply_with({}, name, file);
+}
+
+Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
+                                 std::span<const std::byte> file) {
+  return PlyReader(name, file, attributes).read();
 }
 
 }  // namespace ls

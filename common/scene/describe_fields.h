@@ -42,6 +42,12 @@ void describe(V& v, T& t) {
           t.hue);
 }
 
+template <class V, Of<MeshAttributeTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "name", .doc = "of the attribute, with `vertex_` or `face_` in front", .required = true}, t.name);
+  v.field({.name = "scale", .doc = "multiplies it", .range = kNonNegative}, t.scale);
+}
+
 // ---- volumes and media
 // ----------------------------------------------------------------------------------------------
 template <class V, Of<ConstVolume> T>

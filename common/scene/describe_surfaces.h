@@ -5,6 +5,16 @@
 
 namespace ls::scene {
 
+// Of the rough ones.
+template <class V, class T>
+void describe_multiple_scattering(V& v, T& b) {
+  v.field({.name = "multiple_scattering",
+           .doc = "our own: light that microfacets throw onto each other is not lost (see "
+                  "docs/multiple-scattering.md); needs one roughness that is no texture",
+           .elided = true},
+          b.multiple_scattering);
+}
+
 // ---- surfaces
 // -------------------------------------------------------------------------------------------------------
 template <class V, Of<DiffuseBsdf> T>
@@ -25,9 +35,17 @@ void describe(V& v, T& b) {
 template <class V, Of<RoughConductorBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u", .doc = "roughness along u", .range = kPositive, .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
           b.alpha_u);
-  v.field({.name = "alpha_v", .doc = "roughness along v", .range = kPositive, .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
           b.alpha_v);
   v.field(
       {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
@@ -35,6 +53,7 @@ void describe(V& v, T& b) {
   v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
   v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
           b.specular_reflectance);
+  describe_multiple_scattering(v, b);
 }
 template <class V, Of<DielectricBsdf> T>
 void describe(V& v, T& b) {
@@ -50,9 +69,17 @@ void describe(V& v, T& b) {
 template <class V, Of<RoughDielectricBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u", .doc = "roughness along u", .range = kPositive, .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
           b.alpha_u);
-  v.field({.name = "alpha_v", .doc = "roughness along v", .range = kPositive, .fallback = {.1, .1, .1}},
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
           b.alpha_v);
   v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
           b.int_ior);
@@ -62,6 +89,7 @@ void describe(V& v, T& b) {
           b.specular_reflectance);
   v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
           b.specular_transmittance);
+  describe_multiple_scattering(v, b);
 }
 template <class V, Of<ThinDielectricBsdf> T>
 void describe(V& v, T& b) {
@@ -101,6 +129,7 @@ void describe(V& v, T& b) {
           b.diffuse_reflectance);
   v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
           b.specular_reflectance);
+  describe_multiple_scattering(v, b);
 }
 template <class V, Of<NullBsdf> T>
 void describe(V&, T&) {}
@@ -120,7 +149,8 @@ void describe(V& v, T& b) {
            .doc = "1: nothing passes. Of an image its alpha channel, if that falls below 1/2 somewhere; "
                   "else the luminance",
            .range = kUnit,
-           .fallback = {.5, .5, .5}},
+           .fallback = {.5, .5, .5},
+           .number = true},
           b.opacity);
   v.field({.name = "bsdf", .doc = "of the opaque share", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
 }
@@ -129,7 +159,8 @@ void describe(V& v, T& b) {
   v.field({.name = "weight",
            .doc = "share of the second bsdf; the luminance of a colour",
            .range = kUnit,
-           .fallback = {.5, .5, .5}},
+           .fallback = {.5, .5, .5},
+           .number = true},
           b.weight);
   v.field({.name = "first", .doc = "where the weight is 0", .derived = true, .given_as = "<bsdf>"}, b.first);
   v.field({.name = "second", .doc = "where the weight is 1", .derived = true, .given_as = "<bsdf>"},
@@ -168,33 +199,59 @@ template <class V, Of<PrincipledBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "base_color", .doc = "the colour", .range = kUnit, .fallback = {.5, .5, .5}},
           b.base_color);
-  v.field({.name = "roughness", .doc = "its square is GGX's alpha", .range = kUnit, .fallback = {.5, .5, .5}},
+  v.field({.name = "roughness",
+           .doc = "its square is GGX's alpha",
+           .range = kUnit,
+           .fallback = {.5, .5, .5},
+           .number = true},
           b.roughness);
+  v.field({.name = "anisotropic",
+           .doc = "stretches highlights along u",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.anisotropic);
   v.field(
-      {.name = "anisotropic", .doc = "stretches highlights along u", .range = kUnit, .fallback = {0, 0, 0}},
-      b.anisotropic);
-  v.field({.name = "metallic", .doc = "share of metal", .range = kUnit, .fallback = {0, 0, 0}}, b.metallic);
+      {.name = "metallic", .doc = "share of metal", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
+      b.metallic);
   v.field({.name = "spec_trans",
            .doc = "share of glass in what is not metal; not given, or 0, it has one side",
-           .range = kUnit},
+           .range = kUnit,
+           .number = true},
           b.spec_trans);
   v.field({.name = "eta", .doc = "index of refraction inside over that outside", .range = kPositive}, b.eta);
   v.field({.name = "spec_tint",
            .doc = "how far the colour tints the reflection",
            .range = kUnit,
-           .fallback = {0, 0, 0}},
+           .fallback = {0, 0, 0},
+           .number = true},
           b.spec_tint);
-  v.field({.name = "sheen", .doc = "of cloth, at grazing angles", .range = kUnit, .fallback = {0, 0, 0}},
+  v.field({.name = "sheen",
+           .doc = "of cloth, at grazing angles",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
           b.sheen);
-  v.field({.name = "sheen_tint", .doc = "how far the colour tints it", .range = kUnit, .fallback = {0, 0, 0}},
+  v.field({.name = "sheen_tint",
+           .doc = "how far the colour tints it",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
           b.sheen_tint);
   v.field({.name = "flatness",
            .doc = "from diffuse to an imitation of light that scatters below",
            .range = kUnit,
-           .fallback = {0, 0, 0}},
+           .fallback = {0, 0, 0},
+           .number = true},
           b.flatness);
-  v.field({.name = "clearcoat", .doc = "of a thin coat", .range = kUnit, .fallback = {0, 0, 0}}, b.clearcoat);
-  v.field({.name = "clearcoat_gloss", .doc = "of the coat", .range = kUnit, .fallback = {0, 0, 0}},
+  v.field(
+      {.name = "clearcoat", .doc = "of a thin coat", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
+      b.clearcoat);
+  v.field({.name = "clearcoat_gloss",
+           .doc = "of the coat",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
           b.clearcoat_gloss);
 }
 

@@ -41,6 +41,7 @@ class Writer {
  public:
   template <class T>
   void field(const Field& f, T& value) {
+    if (f.elided && value == std::remove_const_t<T>{}) return;
     write(members_[std::string(f.name)], value);
   }
   void type(std::string_view name) { write_string(members_["type"], name); }

@@ -16,7 +16,7 @@ unsigned type_of(const Element& e) {
   static constexpr std::pair<std::string_view, unsigned> kTags[] = {
       {"float", kFloat},     {"integer", kInteger}, {"boolean", kBoolean}, {"string", kString},
       {"color", kColor},     {"point", kPoint},     {"vector", kVector},   {"transform", kTransform},
-      {"texture", kTexture}, {"volume", kVolume}};
+      {"texture", kTexture}, {"volume", kVolume},   {"bsdf", kBsdf}};
   for (const auto& [tag, type] : kTags)
     if (tag == e.tag) return type;
   return 0;

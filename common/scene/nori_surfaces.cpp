@@ -170,6 +170,37 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
   return out;
 }
 
+// Kombu's. Its parts have names, its weight may be a texture without one.
+std::optional<Element> blend(Object& o, const Mesh& mesh, Report& report) {
+  Element out = bsdf_of("blendbsdf", o.element());
+  const Element* fresnel = o.take("fresnel");
+  if (fresnel && parse_boolean(fresnel->get("value")) == true)
+    report.error(
+        fresnel->at,
+        "a blendbsdf whose weight follows the angle (fresnel) is not supported: choose principled with a "
+        "clearcoat, or a microfacet");
+  const Element* image = o.has("weight") ? nullptr : o.only("texture");
+  if (image) {
+    auto t = texture(*image, "weight", mesh, report);
+    if (!t) return std::nullopt;
+    add(out, std::move(*t));
+  } else {
+    add_texture(out, o, "weight", "weight", .5, mesh, report);
+  }
+  for (const char* name : {"bsdf1", "bsdf2"}) {
+    const bool given = o.has(name);
+    const Element* part = o.take(name);
+    if (!given) {
+      add(out, bsdf_of("diffuse", o.element()));  // of .5
+      continue;
+    }
+    auto inner = part ? bsdf(*part, mesh, report) : std::nullopt;
+    if (!inner) return std::nullopt;
+    add(out, std::move(*inner));
+  }
+  return out;
+}
+
 std::optional<Element> bsdf_in_words(Object& o, const Mesh& mesh, Report& report) {
   const std::string_view type = o.type();
   const Element& e = o.element();
@@ -181,6 +212,7 @@ std::optional<Element> bsdf_in_words(Object& o, const Mesh& mesh, Report& report
   if (type == "mirror") return bsdf_of("conductor", e);
   if (type == "dielectric") return dielectric(o);
   if (type == "microfacet" || type == "microfacet_tex") return microfacet(o, mesh, report);
+  if (type == "blendbsdf") return blend(o, mesh, report);
   if (type == "conductor" || type == "roughconductor") return metal(o, mesh, report);
   if (type == "principled") return principled(o, mesh, report);
   return bsdf_of("null", e);  // transparent, null

@@ -132,6 +132,13 @@ std::vector<Plugin> surfaces() {
       {"bsdf", "microfacet_tex", "as `microfacet`, with a texture in the place of kd",
        microfacet(kAnyColor | kTexture)},
       {"bsdf", "conductor", "`conductor`", metal(false)},
+      {"bsdf",
+       "blendbsdf",
+       "`blendbsdf`: (1 - weight) bsdf1 + weight bsdf2",
+       {{"weight", kAnyColor | kTexture, "0.5", "share of bsdf2; of a colour its luminance", kUnit},
+        {"bsdf1", kBsdf, "diffuse, 0.5", "where the weight is 0"},
+        {"bsdf2", kBsdf, "diffuse, 0.5", "where the weight is 1"},
+        {"fresnel", kBoolean, "false", "only false is read: a weight that follows the angle is not"}}},
       {"bsdf", "principled", "`principled`", principled()},
       {"bsdf", "roughconductor", "`roughconductor`", metal(true)},
       {"texture", "constant_color", "a colour", {{"value", kAnyColor, "0", "the colour", kNonNegative}}},
@@ -267,13 +274,21 @@ constexpr Refused kRefused[] = {
     {"integrator", "ao", kNoLight},
     {"integrator", "simple", kNoLight},
     {"integrator", "path_mis_testenvmap", "it is a test of its authors' own; choose path_mis"},
-    {"mesh", "instance", "instances of Kombu are not read; write the mesh again where it stands"},
+    {"mesh", "instance",
+     "instances of Kombu are not read: its scene, not the file, joins them with their meshes; write the mesh "
+     "again where it stands"},
     {"mesh", "reference", "instances of Kombu are not read; write the mesh where it stands"},
-    {"bsdf", "disneyglass", "it is not known here; choose dielectric"},
-    {"bsdf", "blendbsdf", "blends are read in files of Mitsuba alone"},
-    {"bsdf", "bumpmap", "bump maps are not read in files of Nori"},
+    {"mesh", "ref", "instances of Kombu are not read; write the mesh where it stands"},
+    {"bsdf", "disneyglass",
+     "its formula is its author's own, not Burley's; choose principled with spec_trans, or dielectric"},
+    {"bsdf", "disney", "each author's has other lobes; choose principled, which is Mitsuba's"},
+    {"bsdf", "bumpmap",
+     "each author's image textures have slopes of their own; write the scene in Mitsuba's language (lightshaft "
+     "convert) and put its bumpmap around the bsdf"},
     {"bsdf", "emissive", "put an <emitter type=\"area\"> into the mesh instead"},
-    {"emitter", "environment", "write it as an emitter \"envmap\" with a filename"},
+    {"emitter", "environment",
+     "which direction its image's edges mean differs between authors; write it as an emitter \"envmap\" with a "
+     "filename, whose top row is +z"},
     {"emitter", "spotlight",
      "each author's falls off otherwise; write it as an emitter \"spot\", which is linear in the angle"},
     {"texture", "checkerboard_float", "no number here may vary; use checkerboard_color"},
@@ -289,7 +304,7 @@ std::string text_of(unsigned types) {
   static constexpr std::pair<unsigned, std::string_view> kTags[] = {
       {kColor, "color"},     {kFloat, "float"},  {kInteger, "integer"}, {kBoolean, "boolean"},
       {kString, "string"},   {kPoint, "point"},  {kVector, "vector"},   {kTransform, "transform"},
-      {kTexture, "texture"}, {kVolume, "volume"}};
+      {kTexture, "texture"}, {kVolume, "volume"}, {kBsdf, "bsdf"}};
   if ((types & kNumber) == kNumber) types &= ~unsigned{kInteger};  // where a float will do, an integer does
   std::string out;
   for (const auto& [type, tag] : kTags)

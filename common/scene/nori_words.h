@@ -23,7 +23,8 @@ enum Types : unsigned {
   kVector = 64,
   kTransform = 128,
   kTexture = 256,
-  kVolume = 512
+  kVolume = 512,
+  kBsdf = 1024
 };
 // Elements of these types, as "<float> or <color>".
 std::string text_of(unsigned types);

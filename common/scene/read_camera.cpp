@@ -47,6 +47,7 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
     describe_perspective(binder, s);
     if (e.get("type") == "thinlens") {
       describe_lens(binder, s);
+      if (s.aperture_scale) refuse_attributes(e, *s.aperture_scale, "aperture_scale");
       if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
       if (!has_focus) s.focus_distance = s.far_clip;
     }

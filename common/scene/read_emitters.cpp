@@ -73,6 +73,7 @@ void Reader::read_projector(const Element& e) {
   emitter.fov_axis = lens.fov_axis;
   if (!p.has("irradiance")) report_.error(e.at, "emitter \"projector\" needs 'irradiance': what it projects");
   bind(p, emitter);
+  refuse_attributes(e, emitter.irradiance, "irradiance");
   p.finish();
   if (!is_rigid(emitter.to_world))
     report_.error(e.at,
@@ -91,6 +92,7 @@ void Reader::read_spot(const Element& e) {
   if (emitter.beam_width > emitter.cutoff_angle)
     report_.error(e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", emitter.beam_width,
                                     emitter.cutoff_angle));
+  if (emitter.texture) refuse_attributes(e, *emitter.texture, "texture");
   if (emitter.texture && std::holds_alternative<ConstantTexture>(scene_.textures[emitter.texture->value]))
     report_.error(e.at,
                   "'texture' of emitter \"spot\" wants an image; a single colour belongs into 'intensity'");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/mesh_attributes.h"
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
 #include "common/scene/transform.h"
@@ -99,6 +100,7 @@ void Reader::read_geometry(const Element& e, T geometry) {
   read_shape_parts(p, shape);
   p.finish();
   check_placement(e, shape);
+  check_attributes(e, shape);
   scene_.shapes.push_back(std::move(shape));
 }
 
@@ -192,6 +194,20 @@ bool stays_cylinder(const CylinderShape& c, const Transform& t) {
 }
 
 }  // namespace
+
+// Whether the file has them shows when the mesh is loaded.
+void Reader::check_attributes(const Element& e, const Shape& shape) {
+  const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
+  if (mesh && mesh->format == MeshFormat::ply) return;
+  if (report_.has_errors()) return;  // its materials may be missing
+  for (const AttributeUse& use : attribute_uses(scene_, shape))
+    report_.error(
+        e.at,
+        fmt::format("this {} has no attribute \"{}\", which its {} reads: only a \"ply\" mesh "
+                    "has attributes",
+                    e.get("type"), std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name,
+                    use.in_light ? "emitter" : "bsdf"));
+}
 
 void Reader::check_placement(const Element& e, const Shape& shape) {
   if (!invertible(shape.to_world))

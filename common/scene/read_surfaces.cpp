@@ -8,6 +8,7 @@
 #include "common/scene/known.h"
 #include "common/scene/limits.h"
 #include "common/scene/materials.h"
+#include "common/scene/mesh_attributes.h"
 #include "common/scene/plugin_error.h"
 #include "common/scene/reader.h"
 #include "common/scene/suggest.h"
@@ -22,6 +23,7 @@ std::optional<TextureIndex> Reader::read_texture(const Element& e) {
   if (type == "bitmap" && e.tag == "texture") return read_plain_texture<BitmapTexture>(e);
   if (type == "checkerboard" && e.tag == "texture") return read_plain_texture<CheckerboardTexture>(e);
   if (type == "peak" && e.tag == "texture") return read_plain_texture<PeakTexture>(e);
+  if (type == "mesh_attribute" && e.tag == "texture") return read_mesh_attribute(e);
   unknown_plugin(e, report_);
   return std::nullopt;
 }
@@ -34,6 +36,25 @@ std::optional<TextureIndex> Reader::read_plain_texture(const Element& e) {
   p.finish();
   scene_.textures.emplace_back(texture);
   return TextureIndex{static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+}
+
+std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
+  const auto index = read_plain_texture<MeshAttributeTexture>(e);
+  const std::string& name = std::get<MeshAttributeTexture>(scene_.textures[index->value]).name;
+  if (!name.empty() && !is_attribute_name(name))
+    report_.error(e.at, fmt::format("a mesh has no attribute \"{}\": their names begin with \"vertex_\" or "
+                                    "\"face_\"",
+                                    name));
+  return index;
+}
+
+// Where it is read is no mesh.
+void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
+  for (const AttributeUse& use : attribute_uses(scene_, t))
+    report_.error(e.at, fmt::format("'{}' of {} \"{}\" can't be the mesh attribute \"{}\": there is no mesh "
+                                    "here that has it",
+                                    parameter, e.tag, e.get("type"),
+                                    std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name));
 }
 
 std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::string_view parameter) {
@@ -106,6 +127,23 @@ std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
   return add_bsdf(e, b);
 }
 
+// Its table is of one roughness.
+void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v) {
+  const std::size_t n = scene_.textures.size();
+  if (alpha_u.value >= n || alpha_v.value >= n) return;  // reported
+  const auto* u = std::get_if<ConstantTexture>(&scene_.textures[alpha_u.value]);
+  const auto* v = std::get_if<ConstantTexture>(&scene_.textures[alpha_v.value]);
+  if (!u || !v)
+    report_.error(e.at, fmt::format("multiple_scattering of bsdf \"{}\" needs a roughness that is a number, "
+                                    "not a texture: give alpha a number, or leave multiple_scattering out",
+                                    e.get("type")));
+  else if (u->value != v->value)
+    report_.error(e.at, fmt::format("multiple_scattering of bsdf \"{}\" needs the same roughness both ways: "
+                                    "give alpha instead of alpha_u and alpha_v, or leave multiple_scattering "
+                                    "out",
+                                    e.get("type")));
+}
+
 template <class T>
 std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
   Params p(*this, e);
@@ -113,6 +151,7 @@ std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
   bind_with_alpha(p, b, report_);
   b.alpha_u = old_number(e, b.alpha_u);
   b.alpha_v = old_number(e, b.alpha_v);
+  if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
   p.finish();
   return add_bsdf(e, b);
 }
@@ -127,6 +166,7 @@ std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
     bind_with_alpha(p, b, report_);
     b.alpha_u = old_number(e, b.alpha_u);
     b.alpha_v = old_number(e, b.alpha_v);
+    if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
   } else {
     bind(p, b);
   }

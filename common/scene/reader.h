@@ -55,6 +55,9 @@ class Reader {
   std::optional<TextureIndex> read_texture(const Element& e);
   template <class T>
   std::optional<TextureIndex> read_plain_texture(const Element& e);
+  std::optional<TextureIndex> read_mesh_attribute(const Element& e);
+  void refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter);
+  void check_attributes(const Element& e, const Shape& shape);
   std::optional<TextureIndex> read_uniform_texture(const Element& e, std::string_view parameter);
   std::optional<BsdfIndex> read_bsdf(const Element& e);
   template <class T>
@@ -65,6 +68,7 @@ class Reader {
   std::optional<BsdfIndex> read_rough(const Element& e);
   std::optional<BsdfIndex> read_twosided(const Element& e);
   TextureIndex old_number(const Element& e, TextureIndex t);
+  void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
   std::optional<BsdfIndex> read_mask(const Element& e);
   std::optional<BsdfIndex> read_blend(const Element& e);
   std::optional<BsdfIndex> read_normal_map(const Element& e);

@@ -52,11 +52,21 @@ struct PeakTexture {
   bool hue = false;
   bool operator==(const PeakTexture&) const = default;
 };
-using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture>;
+// What a mesh carries of this name, "vertex_..." (interpolated) or "face_...": one number, or three. Of a PLY
+// file; on other shapes it means nothing and is refused (mesh_attributes.h).
+struct MeshAttributeTexture {
+  std::string name;
+  double scale = 1;
+  bool operator==(const MeshAttributeTexture&) const = default;
+};
+using Texture =
+    std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture, MeshAttributeTexture>;
 
 // ---- surfaces
 // -------------------------------------------------------------------------------------------------------
 enum class Microfacet { beckmann, ggx };
+// Rough surfaces with multiple_scattering also send on the light that microfacets throw onto each other, which
+// the model leaves out (docs/multiple-scattering.md). Their roughness is one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -72,6 +82,7 @@ struct RoughConductorBsdf {
   TextureIndex alpha_u, alpha_v;
   Rgb eta{0, 0, 0}, k{1, 1, 1};
   TextureIndex specular_reflectance;
+  bool multiple_scattering = false;
   bool operator==(const RoughConductorBsdf&) const = default;
 };
 struct DielectricBsdf {
@@ -84,6 +95,7 @@ struct RoughDielectricBsdf {
   TextureIndex alpha_u, alpha_v;
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
+  bool multiple_scattering = false;
   bool operator==(const RoughDielectricBsdf&) const = default;
 };
 struct ThinDielectricBsdf {  // both sides of a sheet in one surface: light passes without being bent
@@ -103,6 +115,7 @@ struct RoughPlasticBsdf {
   double int_ior = 1.49, ext_ior = 1.000277;
   bool nonlinear = false;
   TextureIndex diffuse_reflectance, specular_reflectance;
+  bool multiple_scattering = false;
   bool operator==(const RoughPlasticBsdf&) const = default;
 };
 struct NullBsdf {  // index-matched boundary: light passes unchanged

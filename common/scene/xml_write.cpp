@@ -139,6 +139,8 @@ class Writer {
   template <class T>
   void field(const Field& f, const T& value) {
     if (f.derived && f.given_as.empty()) return;  // follows from something else
+    if constexpr (std::equality_comparable<T>)
+      if (f.elided && value == T{}) return;
     const std::string_view name = f.given_as.starts_with('<') ? "" : f.name;
     constexpr bool is_object = requires { nested(name, value); };
     constexpr bool is_property = requires { property(f, value); };

@@ -26,9 +26,6 @@
 
 namespace ls::render {
 
-// The share of points in a grid that are proposed evenly over the depth, in units of 2^-32: the mean density
-// of the cells may be far above what a ray meets of them.
-inline constexpr std::uint32_t kEvenShare = 429496730;  // a tenth
 // Ratios of densities are cut here, so that no product with them is 0 times infinity.
 inline constexpr float kMaxRatio = 1e30f;
 
@@ -103,18 +100,14 @@ class SegmentLight {
   template <class Path>
   static float depth_pdf(const Path& path, const Medium& medium, const Plan& plan, float x) {
     const float total = plan.stretch.total();
-    constexpr float kEven = static_cast<float>(kEvenShare) * 0x1p-32f;
     return over_channels(path, medium, [&](float sigma) {
-      const float exponential = truncated_pdf(sigma, total, x);
-      return medium.grid ? (1 - kEven) * exponential + kEven / total : exponential;
+      return medium.grid ? mixed_depth_pdf(sigma, total, x) : truncated_pdf(sigma, total, x);
     });
   }
   static float depth_sample(const Medium& medium, const Plan& plan, int hero, std::uint32_t bits) {
     const float total = plan.stretch.total();
     if (!medium.grid) return truncated_sample(medium.sigma_t[hero], total, (bits + .5) * 0x1p-32);
-    if (bits < kEvenShare) return static_cast<float>((bits + .5) / kEvenShare * total);
-    const double v = (bits - kEvenShare + .5) / (0x1p32 - kEvenShare);
-    return truncated_sample(medium.sigma_t[hero], total, v);
+    return mixed_depth_sample(medium.sigma_t[hero], total, bits);
   }
 
   template <class Path>

@@ -67,6 +67,8 @@ bool complete_triangle(const Geometry& g, std::uint32_t i, const V3d& o, const V
   hit.ng = V3(n * (s.orientation / twice_area));
   const auto u = static_cast<float>(b.u), v = static_cast<float>(b.v), w = 1 - u - v;
   hit.uv = {u, v};
+  if (s.wants_attributes) [[unlikely]]
+    hit.face = {hit.surface, i, u, v};
   if (s.uvs && s.wants_uv) hit.uv = g.uvs[idx[0]] * w + g.uvs[idx[1]] * u + g.uvs[idx[2]] * v;
   V3 ns = hit.ng;
   if (s.normals) {
@@ -320,7 +322,7 @@ std::uint64_t Geometry::bytes() const {
   return positions.size() * sizeof(V3) + normals.size() * sizeof(V3) + uvs.size() * sizeof(V2) +
          indices.size() * sizeof(std::uint32_t) + triangle_surface.size() * sizeof(std::uint32_t) +
          spheres.size() * sizeof(Sphere) + disks.size() * sizeof(Disk) + cylinders.size() * sizeof(Cylinder) +
-         instances.size() * sizeof(PlacedInstance) + surfaces.size() * sizeof(SurfaceInfo);
+         instances.size() * sizeof(PlacedInstance) + attributes.bytes() + surfaces.size() * sizeof(SurfaceInfo);
 }
 
 }  // namespace ls::render

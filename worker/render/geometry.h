@@ -13,6 +13,7 @@
 #include "common/scene/scene.h"
 #include "worker/render/asset_loader.h"
 #include "worker/render/math.h"
+#include "worker/render/texture/surface_attributes.h"
 #include "worker/render/texture/uv_point.h"
 #include "worker/render/transform.h"
 
@@ -33,9 +34,10 @@ struct SurfaceInfo {  // one per scene shape
   // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
   // frame.
   bool wants_uv = true, wants_tangent = true;
-  bool wants_slopes = false;  // hits carry dp/du and dp/dv (bump maps); wants_tangent is true then, too
-  bool smooth = true;         // of its material: next-event estimation makes sense
-  float orientation = 1;      // -1: normals are flipped against winding or the outward direction
+  bool wants_slopes = false;      // hits carry dp/du and dp/dv (bump maps); wants_tangent is true then, too
+  bool wants_attributes = false;  // hits carry their place on the mesh (mesh_attribute textures)
+  bool smooth = true;             // of its material: next-event estimation makes sense
+  float orientation = 1;          // -1: normals are flipped against winding or the outward direction
   // Of surfaces that coincide somewhere with another, one of the two null: the largest reach of those (see
   // SurfaceHit), so that a ray steps over all of them at once. 0: none does.
   float together = 0;
@@ -104,8 +106,9 @@ struct SurfaceHit {
   // The largest coordinate that the meeting was computed with: p, and the distances that the BVH finds across
   // the surface, are good to a few units in the last place of it (see offset_point).
   float reach = 1;
+  FacePoint face;  // where SurfaceInfo::wants_attributes
 
-  UvPoint uv_point() const { return {uv, du, dv}; }
+  UvPoint uv_point() const { return {uv, du, dv, &face}; }
   // From dp/du and dp/dv in the world; `scale` is the geometry's.
   void set_slopes(const V3& dpdu, const V3& dpdv, double scale) {
     const auto k = static_cast<float>(1 / scale);
@@ -133,6 +136,7 @@ class Geometry {
   std::vector<PrimitiveSet> groups;  // seen through instances only
   std::vector<PlacedInstance> instances;
   std::vector<SurfaceInfo> surfaces;
+  SurfaceAttributes attributes;  // of the meshes, those that textures read
 
   V3d center{0, 0, 0};                  // world = (scene - center) * scale
   double scale = 1;                     // a power of two

@@ -7,6 +7,7 @@
 
 #include "common/scene/bsdf_traits.h"
 #include "worker/render/geometry.h"
+#include "worker/render/geometry_attributes.h"
 #include "worker/render/geometry_place.h"
 
 namespace ls::render {
@@ -104,6 +105,8 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     g.uvs.resize(base);
     g.uvs.insert(g.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
   }
+  const std::uint32_t first_triangle = g.triangle_count();
+  std::vector<std::uint32_t> kept;  // only for attributes
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
     const std::uint32_t a = base + mesh.indices[i], b = base + mesh.indices[i + 1],
                         c = base + mesh.indices[i + 2];
@@ -114,7 +117,10 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     }
     g.indices.insert(g.indices.end(), {a, b, c});
     g.triangle_surface.push_back(surface);
+    if (info.wants_attributes) kept.push_back(static_cast<std::uint32_t>(i / 3));
   }
+  for (const MeshAttribute& a : mesh.attributes)
+    add_channel(g.attributes, a, surface, a.name.starts_with("face_") ? first_triangle : base, kept);
 }
 
 void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& space) {
@@ -179,7 +185,8 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   parts.groups.resize(scene.groups.size());
   std::uint64_t vertices = 0;
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    auto p = place(scene.shapes[i], files);
+    const auto uses = scene::attribute_uses(scene, scene.shapes[i]);
+    auto p = place(scene.shapes[i], files, uses);
     if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
     vertices += p->mesh.positions.size();
     if (vertices > kMaxVertices)
@@ -266,8 +273,11 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
                 "emits light in a group");
   const auto parts = place_all(scene, files);
   if (!parts) return tl::unexpected(parts.error());
-  for (std::size_t i = 0; i < scene.shapes.size(); ++i)
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
     g.surfaces.push_back(surface_info(scene, *traits, scene.shapes[i], parts->shapes[i].normals_given));
+    g.surfaces.back().wants_attributes = !parts->shapes[i].mesh.attributes.empty();
+  }
+  g.attributes = attributes_of(scene);
   const Space world = unit_space(parts->world);
   g.center = world.center;
   g.scale = world.scale;

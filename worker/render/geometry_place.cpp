@@ -6,6 +6,7 @@
 
 #include "common/assets/mesh.h"
 #include "common/base/overloaded.h"
+#include "worker/render/geometry_attributes.h"
 
 namespace ls::render {
 namespace {
@@ -39,12 +40,16 @@ LocalMesh cube() {
   return m;
 }
 
-Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files) {
+Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
+                       const std::vector<scene::AttributeUse>& uses) {
   auto path = files.path(shape.file);
   if (!path) return tl::unexpected(path.error());
-  auto data = load_mesh(*path, files.name(shape.file), shape.shape_index);
+  auto data = load_mesh(*path, files.name(shape.file), shape.shape_index, attribute_names(files.scene, uses));
   if (!data) return tl::unexpected(data.error());
+  if (auto ok = check_attributes(*data, files.name(shape.file), files.scene, uses); !ok)
+    return tl::unexpected(ok.error());
   LocalMesh m;
+  m.attributes = std::move(data->attributes);
   m.indices = std::move(data->indices);
   m.face_normals = data->face_normals;
   const std::size_t n = data->vertex_count();
@@ -132,9 +137,14 @@ void smooth(LocalMesh& m) {
 
 }  // namespace
 
-Result<Placed> place(const Shape& shape, const AssetLoader& files) {
+Result<Placed> place(const Shape& shape, const AssetLoader& files,
+                     const std::vector<scene::AttributeUse>& uses) {
   const Affine m(shape.to_world);
   if (!m.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
+  if (!uses.empty() && !std::holds_alternative<MeshShape>(shape.geometry))
+    return fail(Errc::invalid_argument,
+                fmt::format("a texture reads its attribute \"{}\", but only meshes have attributes",
+                            attribute_names(files.scene, uses).front()));
   Placed out;
   auto ok = std::visit(
       overloaded{
@@ -168,7 +178,7 @@ Result<Placed> place(const Shape& shape, const AssetLoader& files) {
             return {};
           },
           [&](const MeshShape& s) -> Result<void> {
-            auto r = load(s, files);
+            auto r = load(s, files, uses);
             if (!r) return tl::unexpected(r.error());
             out.mesh = std::move(*r);
             return {};

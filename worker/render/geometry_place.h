@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "common/assets/data.h"
+#include "common/scene/mesh_attributes.h"
 #include "worker/render/geometry.h"
 
 namespace ls::render {
@@ -16,6 +18,7 @@ struct LocalMesh {
   std::vector<V2> uvs;
   std::vector<std::uint32_t> indices;
   bool face_normals = false;  // the file wants its triangles flat
+  std::vector<MeshAttribute> attributes;
 };
 struct Placed {
   LocalMesh mesh;
@@ -36,8 +39,10 @@ struct Bounds {
   bool empty() const { return !(lo.x <= hi.x); }
 };
 
-// Reads and places one shape by its to_world. Fails on files and transforms that no surface can be made of.
-Result<Placed> place(const Shape& shape, const AssetLoader& files);
+// Reads and places one shape by its to_world, with the attributes that are used of it. Fails on files and
+// transforms that no surface can be made of, and on attributes that the mesh does not have as they are used.
+Result<Placed> place(const Shape& shape, const AssetLoader& files,
+                     const std::vector<scene::AttributeUse>& uses = {});
 void add_bounds(const Placed& placed, Bounds& bounds);
 
 }  // namespace ls::render

@@ -59,21 +59,22 @@ Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) co
   const V2 u(unit_float(numbers.x), unit_float(numbers.y));
   if (l.kind == Kind::cylinder) return cylinder_point(l, u);
   if (l.kind == Kind::parallelogram) {
-    return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y};
+    return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y, {}};
   }
   const V2 q = concentric_disk(u);
   float angle = std::atan2(q.y, q.x);
   if (angle < 0) angle += kTwoPi;
   return {l.position + l.axis_u * q.x + l.axis_v * q.y,
           l.normal,
-          {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi}};
+          {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi},
+          {}};
 }
 
 Lights::Point Lights::cylinder_point(const Light& l, V2 u) const {
   const Cylinder& c = geometry_->cylinders[l.primitive];
   const V2 q = unit_circle(u.y);
   const V3d n = c.u * double{q.x} + c.v * double{q.y};
-  return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * l.sign, {u.y, u.x}};
+  return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * l.sign, {u.y, u.x}, {}};
 }
 
 // The first number chooses the triangle and is stretched to be used again.
@@ -93,6 +94,7 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
   const V3d n = V3d(v1 - v0).cross(V3d(v2 - v0));
   y.n = V3(n * (l.sign / n.length()));
   y.uv = {b1, b2};
+  y.face = {geometry_->triangle_surface[tri], tri, b1, b2};
   if (!geometry_->uvs.empty() && geometry_->surfaces[geometry_->triangle_surface[tri]].uvs) {
     y.uv = geometry_->uvs[idx[0]] * b0 + geometry_->uvs[idx[1]] * b1 + geometry_->uvs[idx[2]] * b2;
   }
@@ -112,7 +114,7 @@ std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, c
   s.target = target;
   const float cosine = -dot(s.direction, y.n);
   if (!(cosine > 0)) return std::nullopt;
-  s.radiance = area_radiance(l, y.uv, cosine);
+  s.radiance = area_radiance(l, y.uv, &y.face, cosine);
   if (l.beam && is_black(s.radiance)) return std::nullopt;
   s.pdf = static_cast<float>(d2 / (cosine * l.area)) * p;
   if (!std::isfinite(s.pdf)) return std::nullopt;
@@ -146,7 +148,7 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   s.target = target;
   s.pdf = p / (kTwoPi * cone);
   const float facing = l.beam ? -l.sign * dot(V3(n), s.direction) : 1.f;
-  s.radiance = area_radiance(l, l.textured ? sphere_uv(sphere, n) : V2(0, 0), facing);
+  s.radiance = area_radiance(l, l.textured ? sphere_uv(sphere, n) : V2(0, 0), nullptr, facing);
   if (!(s.distance > 0) || !std::isfinite(s.pdf) || (l.beam && is_black(s.radiance))) return std::nullopt;
   return s;
 }
@@ -203,7 +205,7 @@ C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
   const std::uint32_t i = geometry_->surfaces[hit.surface].light;
   if (i == kNone || !(dot(hit.ng, w) > 0)) return {0, 0, 0};
   return area_radiance(lights_[i],
-                       lights_[i].kind == Kind::sphere && !lights_[i].textured ? V2(0, 0) : hit.uv,
+                       lights_[i].kind == Kind::sphere && !lights_[i].textured ? V2(0, 0) : hit.uv, &hit.face,
                        dot(hit.ng, w));
 }
 

@@ -140,6 +140,7 @@ class Lights {
   struct Point {  // on an area light
     V3 p, n;
     V2 uv;
+    FacePoint face;
   };
 
   // Where the primitives of a shape lie in Geometry's lists: each shape's are together.
@@ -184,8 +185,8 @@ class Lights {
   C3 spot_radiance(const Light& light, const V3& towards) const;
   C3 projected(const Light& light, const V3& towards) const;
   // Towards a viewer at an angle of this cosine > 0 from the normal.
-  C3 area_radiance(const Light& light, V2 uv, float cosine) const {
-    const C3 value = textures_->eval(light.radiance, uv);
+  C3 area_radiance(const Light& light, V2 uv, const FacePoint* face, float cosine) const {
+    const C3 value = textures_->eval(light.radiance, uv, face);
     return light.beam ? value * beam_share(light, cosine) : value;
   }
   static float beam_share(const Light& light, float cosine);

@@ -31,4 +31,17 @@ inline float truncated_sample(float sigma, float length, double v) {
   return std::min(x / sigma, length);
 }
 
+// The same with a share of points that lie evenly over the length, in units of 2^-32: for grids, where the
+// mean density of the cells may be far above what a ray meets of them.
+inline constexpr std::uint32_t kEvenShare = 429496730;  // a tenth
+
+inline float mixed_depth_pdf(float sigma, float length, float x) {
+  constexpr float kEven = static_cast<float>(kEvenShare) * 0x1p-32f;
+  return (1 - kEven) * truncated_pdf(sigma, length, x) + kEven / length;
+}
+inline float mixed_depth_sample(float sigma, float length, std::uint32_t bits) {
+  if (bits < kEvenShare) return static_cast<float>((bits + .5) / kEvenShare * length);
+  return truncated_sample(sigma, length, (bits - kEvenShare + .5) / (0x1p32 - kEvenShare));
+}
+
 }  // namespace ls::render

@@ -127,11 +127,16 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!geometry) return tl::unexpected(geometry.error());
   w.geometry = std::move(*geometry);
   w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
-  auto textures = TextureTable::build(scene, [&](const Asset& a) -> Result<ImageData> {
-    const auto it = files.find(a.digest);
-    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
-    return load_image(it->second, a.name);
-  });
+  w.inputs.add(HealthCause::negative_texel, w.geometry.attributes.clamped);
+  auto textures =
+      TextureTable::build(scene,
+                          [&](const Asset& a) -> Result<ImageData> {
+                            const auto it = files.find(a.digest);
+                            if (it == files.end())
+                              return fail(Errc::internal, "no file was given for '" + a.name + "'");
+                            return load_image(it->second, a.name);
+                          },
+                          {&w.geometry.attributes, w.geometry.indices});
   if (!textures) return tl::unexpected(textures.error());
   w.textures = std::move(*textures);
   auto bsdfs = BsdfTable::build(scene, w.textures);

@@ -129,6 +129,31 @@ TEST(NoriScene, MicrofacetIsAllGlossOrAllDiffuseAtTheEndsOfItsRange) {
   EXPECT_EQ(std::get<ConstantTexture>(s.textures[blend.weight.value]).value, (Rgb{1, 1, 1}));
 }
 
+TEST(NoriScene, BlendsAreMitsubas) {
+  const std::string mitsuba_parts =
+      R"(<bsdf type="conductor"/><bsdf type="diffuse"><rgb name="reflectance" value="0.2 0.4 0.6"/></bsdf>)";
+  const std::string nori_parts =
+      R"(<bsdf name="bsdf2" type="diffuse"><color name="albedo" value="0.2 0.4 0.6"/></bsdf><bsdf name="bsdf1" type="mirror"/>)";
+  const auto nori = [&](const std::string& weight) {
+    return "<mesh type=\"sphere\"><bsdf type=\"blendbsdf\">" + weight + nori_parts + "</bsdf></mesh>";
+  };
+  const auto mitsuba = [&](const std::string& weight) {
+    return "<shape type=\"sphere\"><bsdf type=\"blendbsdf\">" + weight + mitsuba_parts + "</bsdf></shape>";
+  };
+  expect_same_objects(nori(R"(<float name="weight" value="0.3"/>)"),
+                      mitsuba(R"(<float name="weight" value="0.3"/>)"));
+  expect_same_objects(nori(R"(<boolean name="fresnel" value="false"/>)"), mitsuba(""));
+  expect_same_objects(
+      nori(R"(<texture type="constant_color"><color name="value" value="0.1 0.2 0.3"/></texture>)"),
+      mitsuba(R"(<rgb name="weight" value="0.1 0.2 0.3"/>)"));
+  expect_same_objects("<mesh type=\"sphere\"><bsdf type=\"blendbsdf\"/></mesh>",
+                      "<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/><bsdf "
+                      "type=\"diffuse\"/></bsdf></shape>");
+  const ReadResult r = read(nori_scene(nori(R"(<boolean name="fresnel" value="true"/>)")));
+  EXPECT_FALSE(r.scene);
+  EXPECT_THAT(messages(r), ::testing::HasSubstr("weight follows the angle (fresnel) is not supported"));
+}
+
 TEST(NoriScene, ReadsTheThreeNotationsOfMedia) {
   const auto same = [](const std::string& nori, const std::string& mitsuba) {
     expect_same_objects(

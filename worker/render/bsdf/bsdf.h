@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,8 @@
 #include "worker/render/texture/uv_point.h"
 
 namespace ls::render {
+
+struct MicrofacetEnergy;
 
 struct BsdfEval {
   C3 f_cos{0, 0, 0};  // f |cos wi| [1/sr]; delta lobes give 0
@@ -86,6 +89,7 @@ class BsdfTable {
 
   std::vector<Material> materials_;
   std::vector<Principled> principled_;  // what those materials have beyond the others
+  std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;  // of those with multiple_scattering
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;
 };

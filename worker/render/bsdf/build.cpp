@@ -30,6 +30,7 @@ class Builder {
   std::optional<Error> error;
   std::uint64_t clamped = 0;
   std::vector<BsdfTable::Principled> principled;
+  std::vector<std::unique_ptr<const MicrofacetEnergy>> energies;
 
   Material operator()(const DiffuseBsdf& b) {
     Material m = make(MaterialKind::diffuse);
@@ -47,7 +48,12 @@ class Builder {
     m.distribution = b.distribution;
     m.alpha_u = roughness(b.alpha_u);
     m.alpha_v = roughness(b.alpha_v);
-    if (mirror(m)) m.kind = MaterialKind::conductor;
+    if (mirror(m)) {
+      m.kind = MaterialKind::conductor;
+    } else if (b.multiple_scattering) {
+      m.energy = energy(EnergyOf::conductor, m, alpha_of(m), 1);
+      m.mean_fresnel = mean_fresnel(m.eta, m.k);
+    }
     return m;
   }
   Material operator()(const DielectricBsdf& b) {
@@ -67,7 +73,10 @@ class Builder {
     m.second_slot = reflectance(b.specular_transmittance);
     // Facets of slope t bend light by about (ior - 1) t: nothing to be seen, but a lobe too narrow for
     // float32.
-    if (mirror(m) || std::abs(m.ior - 1) < kSpecularAlpha) m.kind = MaterialKind::dielectric;
+    if (mirror(m) || std::abs(m.ior - 1) < kSpecularAlpha)
+      m.kind = MaterialKind::dielectric;
+    else if (b.multiple_scattering)
+      m.energy = energy(EnergyOf::dielectric, m, alpha_of(m), index(b.int_ior, b.ext_ior));
     return m;
   }
   Material operator()(const ThinDielectricBsdf& b) {
@@ -101,7 +110,14 @@ class Builder {
     m.alpha_u = m.alpha_v = Slot{C3(static_cast<float>(b.alpha)), {}, true};
     coat_and_base(m, b.diffuse_reflectance, b.specular_reflectance);
     if (error) return m;
-    m.coat = coat(b.distribution, b.alpha, eta);
+    if (b.multiple_scattering) {
+      m.energy = energy(EnergyOf::coat, m, b.alpha, eta);
+      // What does not get out again: by reciprocity 1 / eta^2 of what gets in leaves.
+      if (m.energy)
+        m.coat.internal_reflectance = static_cast<float>(1 - m.energy->through.mean() / (eta * eta));
+    } else {
+      m.coat = coat(b.distribution, b.alpha, eta);
+    }
     return m;
   }
   Material operator()(const NullBsdf&) { return make(MaterialKind::null); }
@@ -192,6 +208,22 @@ class Builder {
     if (fresh) it->second = make_rough_plastic_table(type, alpha, eta);
     return it->second;
   }
+  // Integrated once for all materials alike, too.
+  enum class EnergyOf { conductor, dielectric, coat };
+  const MicrofacetEnergy* energy(EnergyOf of, const Material& m, double alpha, double eta) {
+    if (error) return nullptr;
+    if (!m.alpha_u.constant || !m.alpha_v.constant || m.alpha_u.value.x != m.alpha_v.value.x) {
+      refuse("multiple_scattering needs one roughness that is a number, not a texture");
+      return nullptr;
+    }
+    const auto [it, fresh] = energies_.try_emplace({of, m.distribution, alpha, eta});
+    if (!fresh) return it->second;
+    energies.push_back(std::make_unique<MicrofacetEnergy>(
+        of == EnergyOf::conductor    ? conductor_energy(m.distribution, alpha)
+        : of == EnergyOf::dielectric ? dielectric_energy(m.distribution, alpha, eta)
+                                     : coat_energy(m.distribution, alpha, eta)));
+    return it->second = energies.back().get();
+  }
   float mean(const Slot& s) const {
     return std::min(1.f, mean_component(s.constant ? s.value : textures_.mean(s.texture)));
   }
@@ -219,6 +251,7 @@ class Builder {
       refuse(fmt::format("roughness alpha = {} is not a number >= 0", s.value.x));
     return s;
   }
+  static double alpha_of(const Material& m) { return double{m.alpha_u.value.x}; }
   static bool mirror(const Material& m) {
     return m.alpha_u.constant && m.alpha_v.constant && m.alpha_u.value.x < kSpecularAlpha &&
            m.alpha_v.value.x < kSpecularAlpha;
@@ -257,6 +290,7 @@ class Builder {
   const TextureTable& textures_;
   const std::vector<scene::BsdfTraits>& traits_;
   std::map<std::tuple<Microfacet, double, double>, RoughPlasticTable> coats_;
+  std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> energies_;
 };
 
 // Whether it holds for a part that the material consists of.
@@ -297,12 +331,15 @@ Result<BsdfTable> BsdfTable::build(const Scene& scene, const TextureTable& textu
   }
   table.clamped_ = builder.clamped;
   table.principled_ = std::move(builder.principled);
+  table.energies_ = std::move(builder.energies);
   return table;
 }
 
 std::size_t BsdfTable::size() const { return materials_.size(); }
 std::uint64_t BsdfTable::bytes() const {
-  return materials_.size() * sizeof(Material) + principled_.size() * sizeof(Principled);
+  std::uint64_t energies = 0;
+  for (const auto& e : energies_) energies += e->bytes();
+  return materials_.size() * sizeof(Material) + principled_.size() * sizeof(Principled) + energies;
 }
 std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 

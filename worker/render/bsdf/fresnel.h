@@ -52,12 +52,12 @@ inline double internal_diffuse_reflectance(double eta) {
 // Complex index eta + i k relative to the outside; cos_i in [0, 1]. (0, k) reflects everything.
 inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
-  const float t1 = eta * eta - k * k - s2;
+  const float t1 = (eta - 1) * (eta + 1) - k * k + c2;  // eta^2 - k^2 - s2, where it is all but 0 as well
   const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
   const float a = safe_sqrt(.5f * (a2b2 + t1));
   const float p = a2b2 + c2, q = 2 * cos_i * a;
   if (!(p + q > 0)) return 1;
-  const float rs = (p - q) / (p + q);
+  const float rs = std::max(0.f, p - q) / (p + q);  // an index of 1 leaves a rounding of either sign
   const float u = a2b2 * c2 + s2 * s2, v = q * s2;
   if (!(u + v > 0)) return rs;  // eta = k = 0 at normal incidence
   return .5f * (rs + rs * (u - v) / (u + v));

@@ -12,14 +12,16 @@ namespace ls::render {
 struct Lookup {
   const TextureTable& textures;
   V2 uv;  // of the surface
+  const FacePoint* face;
 
+  Lookup(const TextureTable& table, const UvPoint& at) : textures(table), uv(at.uv), face(at.face) {}
   C3 reflectance(const Slot& s) const {
     if (!kBuilt.textures || s.constant) return s.value;
-    const C3 c = textures.eval(s.texture, uv);
+    const C3 c = textures.eval(s.texture, uv, face);
     return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
   }
   float scalar(const Slot& s) const {
-    if (kBuilt.textures && !s.constant) return textures.number(s.texture, uv);
+    if (kBuilt.textures && !s.constant) return textures.number(s.texture, uv, face);
     const C3& c = s.value;
     return c.x == c.y && c.y == c.z ? c.x : luminance(c);
   }

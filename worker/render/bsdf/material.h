@@ -3,6 +3,7 @@
 
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/microfacet_energy.h"
 #include "worker/render/bsdf/rough_plastic_table.h"
 
 namespace ls::render {
@@ -52,6 +53,8 @@ struct BsdfTable::Material {
   float ior = 1;                // inside over outside
   float specular_weight = 1;    // plastics: how often the coat is sampled, before Fresnel; bump_map: scale
   RoughPlasticTable coat;       // of plastic only its internal reflectance
+  const MicrofacetEnergy* energy = nullptr;  // rough kinds, if they have multiple_scattering
+  C3 mean_fresnel{1, 1, 1};                  // of a conductor with that
 };
 
 }  // namespace ls::render

@@ -69,7 +69,8 @@ struct Plastic {
   }
 
   static float through(const Material& m, float cos) {
-    return kSmooth ? 1 - coat_reflectance(cos, m.ior) : m.coat.at(cos);
+    if (kSmooth) return 1 - coat_reflectance(cos, m.ior);
+    return m.energy ? m.energy->through.at(cos) : m.coat.at(cos);
   }
   // Light that entered, was scattered any number of times below the coat, and left.
   C3 diffuse_f_cos(const V3& wi) const {
@@ -85,7 +86,9 @@ BsdfEval eval_plastic(const Plastic<kSmooth>& p, const V3& wo, const V3& wi) {
   if (p.m.specular) return e;
   const V3 h = normalize(wo + wi);
   const float D = p.facets.D(h), G = p.facets.G1_over_cos(wo) * p.facets.G1_over_cos(wi) * wi.z;
-  e.f_cos += p.tint * (coat_reflectance(dot(wo, h), p.m.ior) * .25f * D * G);
+  C3 coat = p.tint * (coat_reflectance(dot(wo, h), p.m.ior) * .25f * D * G);
+  if (p.m.energy) coat *= p.m.energy->factor(wo.z, true);
+  e.f_cos += coat;
   e.pdf += p.p_specular * D * p.facets.pdf_over_D(wo);
   return e;
 }
@@ -137,7 +140,10 @@ BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3&
     case MaterialKind::rough_conductor: {
       const auto rough = look.roughness(*m);
       if (rough.mirror) return {};
-      return eval_rough_metal({m->eta, m->k, look.reflectance(m->specular_slot)}, rough.facets, o, in);
+      const Metal metal{m->eta, m->k, look.reflectance(m->specular_slot)};
+      BsdfEval e = eval_rough_metal(metal, rough.facets, o, in);
+      if (m->energy) e.f_cos *= m->energy->factor(o.z, metal.tint * m->mean_fresnel);
+      return e;
     }
     case MaterialKind::rough_plastic:
       return eval_plastic(Plastic<false>(*m, look, o), o, in);
@@ -185,6 +191,7 @@ std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, const UvPoint& uv, cons
       const auto rough = look.roughness(*m);
       s = rough.mirror ? sample_mirror(metal().reflectance(o.z), o)
                        : sample_rough_metal(metal(), rough.facets, o, u);
+      if (s && m->energy) s->weight *= m->energy->factor(o.z, metal().tint * m->mean_fresnel);
       break;
     }
     case MaterialKind::rough_plastic:

@@ -113,7 +113,10 @@ BsdfEval BsdfTable::eval_wide(const Material& m, const UvPoint& uv, const V3& wo
       const auto rough = look.roughness(m);
       const bool outside = wo.z > 0;
       if (rough.mirror || wo.z == 0) return {};
-      return RoughDielectric(m, look, rough.facets, outside).eval(to_side(wo, outside), to_side(wi, outside));
+      BsdfEval e =
+          RoughDielectric(m, look, rough.facets, outside).eval(to_side(wo, outside), to_side(wi, outside));
+      if (m.energy) e.f_cos *= m.energy->factor(std::abs(wo.z), outside);
+      return e;
     }
     case MaterialKind::mask: {
       BsdfEval e = eval({m.front}, uv, wo, wi);
@@ -161,6 +164,7 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoin
       const bool outside = wo.z > 0;
       auto s = RoughDielectric(m, look, rough.facets, outside).sample(to_side(wo, outside), u_lobe, u);
       if (s) s->wi = to_side(s->wi, outside);
+      if (s && m.energy) s->weight *= m.energy->factor(std::abs(wo.z), outside);
       return s;
     }
     case MaterialKind::mask: {

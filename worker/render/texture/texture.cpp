@@ -35,15 +35,17 @@ Result<UvAffine> affine(const UvTransform& t) {
   return UvAffine{m(0), m(1), m(2), m(3), m(4), m(5)};
 }
 
-enum class Kind : std::uint8_t { constant, bitmap, checkerboard, peak, hue };
+enum class Kind : std::uint8_t { constant, bitmap, checkerboard, peak, hue, attribute };
 
 struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  std::uint32_t first = 0, second = 0;  // texels, the two textures of a checkerboard, the one of a peak
+  std::uint32_t first = 0, second = 0;  // texels, the two textures of a checkerboard, the one of a peak, the
+                                        // name of an attribute
   C3 value{0, 0, 0};                    // of a constant; else the mean
   UvAffine to_uv;
+  float scale = 1;  // of an attribute
 };
 
 }  // namespace
@@ -52,6 +54,7 @@ struct TextureTable::Data {
   std::vector<Entry> entries;
   std::vector<Texels> texels;
   std::uint64_t clamped = 0;
+  TextureTable::MeshData meshes;
 };
 
 namespace {
@@ -73,6 +76,22 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
   data.clamped += texels->clamped;
   data.texels.push_back(std::move(*texels));
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
+}
+
+// What no mesh has is read nowhere: Geometry::build has refused all else.
+Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
+  Entry e;
+  e.kind = Kind::attribute;
+  e.scale = static_cast<float>(t.scale);
+  if (!(e.scale >= 0) || !std::isfinite(e.scale))
+    return fail(Errc::invalid_argument,
+                fmt::format("the scale {} of mesh attribute \"{}\" is not a number >= 0", t.scale, t.name));
+  if (!attributes) return e;
+  const auto it = std::find(attributes->names.begin(), attributes->names.end(), t.name);
+  if (it == attributes->names.end()) return Entry{};
+  e.first = static_cast<std::uint32_t>(it - attributes->names.begin());
+  e.value = attributes->mean(e.first) * e.scale;
+  return e;
 }
 
 C3 peak_of(const C3& c) {
@@ -125,9 +144,14 @@ const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv, 
 }
 
 // Of what is no checkerboard. As deep as textures nest: kMaxReferenceDepth at most.
-C3 value_of(const TextureTable& table, const Entry& t, const V2& uv) {
-  if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv));
-  if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv));
+C3 value_of(const TextureTable& table, const Entry& t, const V2& uv, const FacePoint* face) {
+  if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv, face));
+  if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv, face));
+  if (t.kind == Kind::attribute) {
+    const TextureTable::MeshData& meshes = table.data().meshes;
+    return face && meshes.attributes ? meshes.attributes->value(t.first, *face, meshes.corners) * t.scale
+                                     : C3(0);
+  }
   return t.kind == Kind::constant ? t.value
                                   : table.data().texels[t.first].lookup(t.to_uv(uv), t.filter, t.wrap);
 }
@@ -139,9 +163,10 @@ TextureTable::~TextureTable() = default;
 TextureTable::TextureTable(TextureTable&&) noexcept = default;
 TextureTable& TextureTable::operator=(TextureTable&&) noexcept = default;
 
-Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& load) {
+Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& load, MeshData meshes) {
   TextureTable table;
   Data& data = *table.data_;
+  data.meshes = meshes;
   std::map<TexelsKey, std::uint32_t> loaded;
   const auto constant = [](const ConstantTexture& t) -> Result<Entry> {
     Entry e;
@@ -170,8 +195,9 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
       return fail(Errc::invalid_argument, "a texture \"peak\" names a texture that does not exist");
     return Entry{t.hue ? Kind::hue : Kind::peak, {}, {}, t.texture.value, 0, {0, 0, 0}, {}};
   };
+  const auto attribute = [&](const MeshAttributeTexture& t) { return attribute_entry(t, meshes.attributes); };
   for (const Texture& t : scene.textures) {
-    auto entry = std::visit(overloaded{constant, bitmap, checkerboard, peak}, t);
+    auto entry = std::visit(overloaded{constant, bitmap, checkerboard, peak, attribute}, t);
     if (!entry) return tl::unexpected(entry.error());
     data.entries.push_back(*entry);
   }
@@ -179,14 +205,14 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
   return table;
 }
 
-C3 TextureTable::eval(TextureIndex i, V2 uv) const {
+C3 TextureTable::eval(TextureIndex i, V2 uv, const FacePoint* face) const {
   const Entry* e = &data_->entries[i.value];
   if (!kBuilt.textures || e->kind == Kind::constant) return e->value;
-  return value_of(*this, leaf(*data_, e, uv, Read::colour), uv);
+  return value_of(*this, leaf(*data_, e, uv, Read::colour), uv, face);
 }
 
-float TextureTable::number(TextureIndex i, V2 uv) const {
-  const C3 c = value_of(*this, leaf(*data_, &data_->entries[i.value], uv, Read::number), uv);
+float TextureTable::number(TextureIndex i, V2 uv, const FacePoint* face) const {
+  const C3 c = value_of(*this, leaf(*data_, &data_->entries[i.value], uv, Read::number), uv, face);
   return c.x == c.y && c.y == c.z ? c.x : luminance(c);
 }
 

@@ -1,9 +1,17 @@
 // A place on a surface as textures see it, and what moving about in (u, v) does there.
 #pragma once
 
+#include <cstdint>
+
 #include "worker/render/math.h"
 
 namespace ls::render {
+
+// Where on which triangle: what attributes of meshes are read by. Its corners weigh 1 - b1 - b2, b1, b2.
+struct FacePoint {
+  std::uint32_t surface = 0, triangle = 0;
+  float b1 = 0, b2 = 0;
+};
 
 struct UvPoint {
   V2 uv;
@@ -11,11 +19,15 @@ struct UvPoint {
   // asks for them (SurfaceInfo::wants_slopes).
   V3 du{1, 0, 0}, dv{0, 1, 0};
 
+  // Of the surfaces that have attributes (SurfaceInfo::wants_attributes), else nothing; it must outlive this.
+  const FacePoint* face = nullptr;
+
   UvPoint(float u, float v) : uv(u, v) {}
   UvPoint(V2 at) : uv(at) {}  // NOLINT: most surfaces are places alone
-  UvPoint(V2 at, V3 along_u, V3 along_v) : uv(at), du(along_u), dv(along_v) {}
+  UvPoint(V2 at, V3 along_u, V3 along_v, const FacePoint* on = nullptr)
+      : uv(at), du(along_u), dv(along_v), face(on) {}
   operator V2() const { return uv; }
-  UvPoint seen_in(const Frame& frame) const { return {uv, frame.to_local(du), frame.to_local(dv)}; }
+  UvPoint seen_in(const Frame& frame) const { return {uv, frame.to_local(du), frame.to_local(dv), face}; }
 };
 
 }  // namespace ls::render

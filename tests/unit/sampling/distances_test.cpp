@@ -1,0 +1,179 @@
+// Distances along rays: the samplers of a medium's collisions, and of points for next-event estimation.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "tests/support/chi_square.h"
+#include "tests/support/jacobian.h"
+#include "tests/unit/render/grids.h"
+#include "worker/render/equiangular.h"
+#include "worker/render/medium.h"
+#include "worker/render/truncated.h"
+#include "worker/render/variant.h"
+
+namespace ls::render {
+namespace {
+
+constexpr int kCells = 64, kSamples = 100000;
+
+// Samples by cells between these edges, and a last one for what lies in none; `mass(a, b)` is the density's
+// integral.
+void compare(test::ChiSquareBook& book, const std::string& name, const std::vector<double>& edges,
+             const std::function<double(double, double)>& mass,
+             const std::function<double(RandomStream&)>& sample) {
+  std::vector<double> expected, got(edges.size(), 0);
+  double inside = 0;
+  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
+    expected.push_back(mass(edges[i], edges[i + 1]) * kSamples);
+    inside += expected.back();
+  }
+  expected.push_back(std::max(0., kSamples - inside));
+  EXPECT_LE(inside, kSamples * (1 + 1e-5)) << name;
+  RandomStream r(41);
+  for (int i = 0; i < kSamples; ++i) {
+    const double x = sample(r);
+    const auto it = std::upper_bound(edges.begin(), edges.end(), x);
+    const bool in = it != edges.begin() && it != edges.end();
+    ++got[in ? static_cast<std::size_t>(it - edges.begin()) - 1 : got.size() - 1];
+  }
+  book.expect(name, expected, got);
+}
+
+// Of a density: Simpson's rule in 64 parts.
+std::function<double(double, double)> integral_of(const std::function<double(double)>& f) {
+  return [f](double a, double b) {
+    constexpr int kParts = 64;
+    double sum = 0;
+    const double h = (b - a) / kParts;
+    for (int i = 0; i < kParts; ++i) sum += f(a + i * h) + 4 * f(a + (i + .5) * h) + f(a + (i + 1) * h);
+    return sum * h / 6;
+  };
+}
+std::vector<double> even(double lo, double hi, int cells = kCells) {
+  std::vector<double> e;
+  for (int i = 0; i <= cells; ++i) e.push_back(lo + (hi - lo) * i / cells);
+  return e;
+}
+
+void exponentials(test::ChiSquareBook& book) {
+  const auto mass = [](double a, double b) { return std::exp(-a) - std::exp(-b); };
+  compare(book, "exponential of 32 bits", even(0, 8), mass,
+          [](RandomStream& r) { return exponential(r.bits()); });
+  compare(book, "exponential of a stream", even(0, 8), mass, [](RandomStream& r) { return r.exponential(); });
+  for (const float depth : {1e-30f, 1e-7f, .1f, 3.f, 50.f, 1e5f})
+    for (const float length : {1e-3f, 10.f}) {
+      const float sigma = depth / length;
+      const double reach = std::min<double>(length, 8. * length / std::max(depth, 1e-30f));
+      compare(book, fmt::format("truncated to depth {}, length {}", depth, length), even(0, reach),
+              integral_of([=](double x) { return truncated_pdf(sigma, length, static_cast<float>(x)); }),
+              [=](RandomStream& r) { return truncated_sample(sigma, length, (r.bits() + .5) * 0x1p-32); });
+      compare(book, fmt::format("mixed, depth {}, length {}", depth, length), even(0, length),
+              integral_of([=](double x) { return mixed_depth_pdf(sigma, length, static_cast<float>(x)); }),
+              [=](RandomStream& r) { return mixed_depth_sample(sigma, length, r.bits()); });
+    }
+}
+
+struct Segment {
+  float a, b, distance;
+};
+const Segment kSegments[] = {{-3, 3, .5f}, {-3, 3, .01f}, {100, 101, .01f},   {-2, -1, .3f},
+                             {0, 1, 1},    {0, 4, .05f},  {-.5f, .25f, 1e4f}, {5, 5.01f, 2}};
+EquiAngular angles(const Segment& s) { return {V3(s.a, 0, 0), V3(1, 0, 0), s.b - s.a, V3(0, s.distance, 0)}; }
+
+// Cells of equal angle about the foot: between them the density varies by orders of magnitude.
+void equiangular(test::ChiSquareBook& book) {
+  for (const Segment& s : kSegments) {
+    const double a = std::atan2(double{s.a}, double{s.distance}),
+                 b = std::atan2(double{s.b}, double{s.distance});
+    std::vector<double> edges = even(a, b);
+    for (double& e : edges) e = std::clamp(s.distance * std::tan(e) - s.a, 0., double{s.b} - s.a);
+    edges.back() *= 1 + 1e-6;  // rounding may put the last ones at the end itself
+    compare(book, fmt::format("equi-angular {} {} at {}", s.a, s.b, s.distance), edges,
+            integral_of([&](double t) { return angles(s).pdf(static_cast<float>(t)); }),
+            [&](RandomStream& r) { return angles(s).sample(r.uniform()).t; });
+  }
+}
+
+// First collisions of delta tracking in a grid: the hero's exact optical depth by quadrature of the voxels.
+void flights(test::ChiSquareBook& book) {
+  struct Field {
+    const char* name;
+    Grid grid;
+    C3 sigma;
+  };
+  const auto values = [](unsigned seed, bool sparse = false) {
+    return random_values({9, 9, 9}, seed, sparse);
+  };
+  std::vector<Field> fields;
+  fields.push_back({"dense grid", unit_grid({9, 9, 9}, values(5)), C3(.3f)});
+  fields.push_back({"sparse grid", unit_grid({9, 9, 9}, values(6, true)), C3(2)});
+  fields.push_back({"opaque grid", unit_grid({9, 9, 9}, values(8)), C3(40)});  // followed exactly
+  fields.push_back({"chromatic grid", unit_grid({9, 9, 9}, values(7)), C3(.1f, .2f, .6f)});
+  fields.push_back({"nearest grid", voxel_grid({9, 9, 9}, values(11), kNearest, Wrap::clamp), C3(.3f)});
+  fields.push_back({"repeated grid", voxel_grid({9, 9, 9}, values(13), kTrilinear, Wrap::repeat), C3(.3f)});
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  for (const Field& f : fields)
+    for (const int hero : {0, 2}) {
+      Medium m;
+      m.grid = true;
+      m.density = &f.grid;
+      m.sigma_t = f.sigma;
+      const auto depth = [&](double t) {
+        return double{f.sigma[hero]} * f.grid.exact_integral(V3d(o), V3d(d), 0, t);
+      };
+      MediumCounters counters;
+      const double reach = f.sigma.x > 10 ? 2.5 : 14;
+      compare(
+          book, fmt::format("{}, hero {}", f.name, hero), even(1, reach),
+          [&](double a, double b) { return std::exp(-depth(a)) - std::exp(-depth(b)); },
+          [&](RandomStream& r) {
+            const std::uint32_t bits = r.bits();
+            const Flight flight =
+                free_flight<kEverything>(m, hero, bits, o, d, 30, RandomStream(r.next()), counters);
+            return flight.scattered ? double{flight.t} : 1e9;
+          });
+      EXPECT_EQ(counters.majorant_violations, 0u) << f.name;
+    }
+  Medium fog;
+  fog.sigma_t = C3(.2f, .5f, 2);
+  for (const int hero : {0, 1, 2})
+    compare(
+        book, fmt::format("homogeneous, hero {}", hero), even(0, 4),
+        [&](double a, double b) {
+          return std::exp(-fog.sigma_t[hero] * a) - std::exp(-fog.sigma_t[hero] * b);
+        },
+        [&](RandomStream& r) {
+          MediumCounters counters;
+          const std::uint32_t bits = r.bits();
+          const Flight f =
+              free_flight<kEverything>(fog, hero, bits, o, d, 4, RandomStream(r.next()), counters);
+          return f.scattered ? double{f.t} : 1e9;
+        });
+}
+
+TEST(Distances, FallAsTheirDensitySays) {
+  test::ChiSquareBook book("sampling/distances");
+  exponentials(book);
+  equiangular(book);
+  flights(book);
+  book.close();
+}
+
+TEST(Distances, GrowByOneOverTheDensity) {
+  for (const float depth : {1e-30f, .1f, 3.f, 50.f})
+    test::expect_slope(
+        fmt::format("truncated to depth {}", depth),
+        [=](double u) { return truncated_sample(depth / 2, 2, u); },
+        [=](double x) { return truncated_pdf(depth / 2, 2, static_cast<float>(x)); }, 2 * 0x1p-24);
+  for (const Segment& s : kSegments)
+    test::expect_slope(
+        fmt::format("equi-angular {} {} at {}", s.a, s.b, s.distance),
+        [&](double u) { return angles(s).sample(static_cast<float>(u)).t; },
+        [&](double t) { return angles(s).pdf(static_cast<float>(t)); },
+        // Of the number, half a unit in its last place of 1 turns into a share of the length.
+        0x1p-23 * std::max(std::abs(s.a), std::abs(s.b)));
+}
+
+}  // namespace
+}  // namespace ls::render

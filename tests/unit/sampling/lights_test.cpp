@@ -1,0 +1,113 @@
+// Lights: the directions that they are sampled in against the density that a ray claims which finds them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/chi_square.h"
+#include "tests/support/jacobian.h"
+#include "tests/support/sphere_cells.h"
+#include "tests/unit/render/light_bench.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneKit;
+using test::translate;
+using test::operator*;
+
+constexpr int kSamples = 100000;
+
+struct Case {
+  std::string name;
+  SceneKit kit;
+  V3d from;      // in the scene
+  V3d towards;   // the cells' axis
+  double reach;  // of the cells: 1 - cos
+};
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  const auto add = [&](std::string name, SceneKit kit, V3d from, V3d to, double reach) {
+    all.push_back({std::move(name), std::move(kit), from, to - from, reach});
+  };
+  add("rectangle", area(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1},
+      {0, 0, 2}, .2);
+  add("near rectangle", area(RectangleShape{}, test::rotate_x(180)), {.9, .2, -.1}, {.9, .2, 0}, 1);
+  add("slanted parallelogram", area(RectangleShape{}, {{1, .7, 0, 0, 0, 1, 0, .3, 0, 0, -1, 2, 0, 0, 0, 1}}),
+      {0, 0, 0}, {0, .3, 2}, .3);
+  add("disk", area(DiskShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1}, {0, 0, 2}, .1);
+  add("ellipse", area(DiskShape{}, translate({0, 0, 1}) * test::rotate_x(180) * test::scale(1, .3, 1)),
+      {0, 0, 0}, {0, 0, 1}, .4);
+  add("sphere", area(SphereShape{}, translate({0, 0, 3})), {.3, .2, -1}, {0, 0, 3}, .05);
+  add("sphere at hand", area(SphereShape{}, {}), {0, 0, -1.001}, {0, 0, 0}, 1);
+  add("distant sphere", area(SphereShape{}, translate({0, 0, 500})), {.3, .2, -1}, {0, 0, 500}, 3e-6);
+  add("inside of a sphere", area(SphereShape{}, {}, true), {.3, .2, -.4}, {0, 0, 0}, 2);
+  add("inside of a sphere, at its wall", area(SphereShape{}, {}, true), {0, 0, -.9999}, {0, 0, 0}, 2);
+  add("cylinder", area(CylinderShape{}, translate({0, 0, 3}) * test::rotate_x(70)), {.3, .2, -1},
+      {0, -.5, 3.2}, .15);
+  add("inside of a cylinder", area(CylinderShape{}, {}, true), {.3, .2, .4}, {.3, .2, 1}, 2);
+  add("cube", area(CubeShape{}, translate({0, 0, 3}) * test::rotate_x(30)), {.3, .2, -1}, {0, 0, 3}, .2);
+  add("inside of a cube", area(CubeShape{}, {}, true), {.3, .2, -.4}, {0, 0, 0}, 2);
+  for (const double angle : {.3, 5., 60., 89.}) {
+    SceneKit kit;
+    kit.shape(RectangleShape{}, translate({0, 0, -5}), kit.diffuse(.5));
+    DirectionalEmitter sun{{.3, .2, -1}, {1, 1, 1}};
+    sun.angular_radius = angle;
+    kit.scene.emitters.push_back(sun);
+    add(fmt::format("sun of {} degrees", angle), kit, {0, 0, 0}, {-.3, -.2, 1},
+        1.2 * (1 - std::cos(angle * M_PI / 180)));
+  }
+  return all;
+}
+
+// Per steradian, of the scene's one light in this direction; by a ray that finds it.
+double density(const LightBench& b, const V3& x, const V3& d) {
+  const World& w = *b.world;
+  SurfaceHit hit;
+  const auto id = w.accel.nearest(x, d, kInfinity);
+  if (id && w.geometry.complete(*id, x, d, hit) && w.geometry.surfaces[hit.surface].light != kNone)
+    return is_black(w.lights.emitted(hit, -d)) ? 0 : double{w.lights.pdf(hit, x, d)};
+  // With a density of 1 of its own a ray that leaves is weighted by 1 / (1 + p), which tells p.
+  const C3 alone = w.lights.environment(d, kInfinity), shared = w.lights.environment(d, 1);
+  return alone.x > 0 ? double{alone.x} / double{shared.x} - 1 : 0;
+}
+
+TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
+  test::ChiSquareBook book("sampling/lights");
+  for (const Case& c : cases()) {
+    const LightBench b(c.kit);
+    const V3 x = b.at(c.from);
+    const test::SphereCells cells(V3(c.towards), c.reach, 12, 24);
+    const auto p = cells.masses([&](const V3& d) { return density(b, x, d); }, 16);
+    // Of the cells' points about 3 per mille lie in cells that an edge of the light cuts.
+    EXPECT_LE(cells.total(), 1 + 3e-3) << c.name;
+    std::vector<double> got(cells.size(), 0);
+    RandomStream r(31);
+    for (int i = 0; i < kSamples; ++i) {
+      const float l = r.uniform(), u = r.uniform(), v = r.uniform();
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(l, u, v)), x);
+      ++got[s ? cells.of(s->direction) : cells.size() - 1];
+    }
+    book.expect(c.name, test::counts(p, kSamples), got);
+  }
+  book.close();
+}
+
+TEST(LightSampling, StretchesTheSquareByOneOverTheDensity) {
+  for (const Case& c : cases()) {
+    const LightBench b(c.kit);
+    const V3 x = b.at(c.from);
+    if (c.name == "distant sphere" || c.name.starts_with("sun of 0.3"))
+      continue;  // smaller than float32's steps
+    // Meshes choose a face by the first number: a kink at each of their ends.
+    if (c.name.find("cube") != c.name.npos) continue;
+    test::expect_jacobian(c.name, [&](const V2& u) -> std::optional<test::Mapped> {
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(.5f, u.x, u.y)), x);
+      if (!s) return std::nullopt;
+      return test::Mapped{V3d(s->direction), double{s->pdf}};
+    });
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

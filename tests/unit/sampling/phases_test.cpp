@@ -1,0 +1,61 @@
+// Phase functions: samples by chi-square, the map by its Jacobian.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/chi_square.h"
+#include "tests/support/jacobian.h"
+#include "worker/render/hash.h"
+#include "worker/render/phase.h"
+
+namespace ls::render {
+namespace {
+
+const float kAnisotropies[] = {-.9999f, -.9f, -.5f, -1e-7f, 0, 1e-7f, .3f, .75f, .99f, .9999f};
+const V3 kWays[] = {normalize(V3(.3f, -.5f, .8f)), V3(0, 0, -1)};
+
+// Probability that 1 - cos of the angle to the peak is below x.
+double distribution(double g, double x) {
+  const double a = std::abs(g);
+  if (a < 1e-6) return x / 2;  // to first order in a, 1e-6 here
+  const double root = std::sqrt((1 - a) * (1 - a) + 2 * a * x);
+  return (1 - a) * (1 + a) / (2 * a) * (1 / (1 - a) - 1 / root);
+}
+
+// In cells of equal probability, by the closed form of the polar angle's distribution and by azimuth.
+TEST(Phases, SamplesFallAsTheDensitySays) {
+  test::ChiSquareBook book("sampling/phases");
+  constexpr int kRows = 16, kColumns = 12, kSamples = 100000;
+  for (const V3& w : kWays)
+    for (const float g : kAnisotropies) {
+      const V3d peak = V3d(w) * (g >= 0 ? 1. : -1.);
+      const Frame frame(w);
+      std::vector<double> expected(kRows * kColumns, double{kSamples} / (kRows * kColumns)),
+          got(expected.size(), 0);
+      RandomStream r(7);
+      for (int i = 0; i < kSamples; ++i) {
+        const float u = r.uniform(), v = r.uniform();
+        const V3 s = HenyeyGreenstein{g}.sample(w, {u, v}).w;
+        const V3d chord = V3d(s) - peak;
+        const int row =
+            std::min(kRows - 1, static_cast<int>(distribution(double{g}, .5 * chord.dot(chord)) * kRows));
+        const double turn = std::atan2(chord.dot(V3d(frame.t)), chord.dot(V3d(frame.s))) / (2 * M_PI);
+        const int column = std::min(kColumns - 1, static_cast<int>((turn < 0 ? turn + 1 : turn) * kColumns));
+        ++got[static_cast<std::size_t>(row * kColumns + column)];
+      }
+      book.expect(fmt::format("g {} about ({}, {}, {})", g, w.x, w.y, w.z), expected, got);
+    }
+  book.close();
+}
+
+TEST(Phases, StretchTheSquareByOneOverTheDensity) {
+  for (const V3& w : kWays)
+    for (const float g : {-.9f, -.3f, 0.f, .5f, .95f})
+      test::expect_jacobian(fmt::format("g {}", g), [&](const V2& u) -> std::optional<test::Mapped> {
+        const PhaseSample s = HenyeyGreenstein{g}.sample(w, u);
+        return test::Mapped{V3d(s.w), double{s.pdf}};
+      });
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,125 @@
+#include "worker/render/bsdf/microfacet_energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/visible_normals.h"
+
+namespace ls::render {
+namespace {
+
+// Intervals start at powers of two, as what happens near grazing angles does so on the scale of alpha, which
+// is 1/1024 at least; 2^12 parts of each is where float32 ends.
+constexpr int kOctaves = 16, kDeepest = 12;
+
+const Quadrature& quadrature(double eta) {
+  static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
+  return eta >= 1 ? kSmooth : kKinked;  // below 1 total reflection has a kink
+}
+
+// The masking of the viewer in the value over that in the density of the visible normals: not 1 for Beckmann,
+// whose value is a fit (microfacet.h).
+double fit(Microfacet type, double alpha, double mu) {
+  if (type == Microfacet::ggx || alpha < kSpecularAlpha) return 1;
+  const V3 w(static_cast<float>(std::sqrt((1 - mu) * (1 + mu))), 0, static_cast<float>(mu));
+  const auto a = static_cast<float>(alpha);
+  return double{beckmann::G1_over_cos(w, a, a)} / double{beckmann::exact_G1_over_cos(w, a, a)};
+}
+
+double share(Way way, Microfacet type, double alpha, double eta, double mu) {
+  const double safe = std::max(mu, 1e-6);
+  return fit(type, alpha, safe) * rough_share(way, type, alpha, eta, safe, quadrature(eta));
+}
+double both_ways(Microfacet type, double alpha, double eta, double mu) {
+  return share(Way::reflected, type, alpha, eta, mu) + share(Way::refracted, type, alpha, eta, mu);
+}
+double lacking(double E) { return (1 - E) / E; }
+
+}  // namespace
+
+CosineTable::CosineTable(const std::function<double(double)>& f, double tolerance) {
+  double x0 = 0, y0 = f(0);
+  x_.push_back(0);
+  y_.push_back(static_cast<float>(y0));
+  for (int i = kOctaves; i >= 0; --i) {
+    const double x1 = std::ldexp(1., -i), y1 = f(x1);
+    refine(f, x0, y0, x1, y1, tolerance, 0);
+    x0 = x1;
+    y0 = y1;
+  }
+}
+
+void CosineTable::refine(const std::function<double(double)>& f, double x0, double y0, double x1, double y1,
+                         double tolerance, int depth) {
+  double y[3];
+  bool fine = depth > 0;  // no interval is taken for straight by its three points alone
+  for (int i = 0; i < 3; ++i) {
+    const double t = .25 * (i + 1);
+    y[i] = f(x0 + (x1 - x0) * t);
+    fine = fine && std::abs(y[i] - (y0 + (y1 - y0) * t)) <= tolerance;
+  }
+  if (fine || depth == kDeepest) {
+    x_.push_back(static_cast<float>(x1));
+    y_.push_back(static_cast<float>(y1));
+    return;
+  }
+  const double middle = .5 * (x0 + x1);
+  refine(f, x0, y0, middle, y[1], tolerance, depth + 1);
+  refine(f, middle, y[1], x1, y1, tolerance, depth + 1);
+}
+
+double CosineTable::mean() const {
+  double sum = 0;
+  for (std::size_t i = 1; i < x_.size(); ++i) {
+    const double a = double{x_[i - 1]}, b = double{x_[i]}, p = double{y_[i - 1]}, q = double{y_[i]};
+    // Of the product of two lines: Simpson's rule is exact.
+    sum += (b - a) / 6 * (a * p + 4 * (.5 * (a + b)) * (.5 * (p + q)) + b * q);
+  }
+  return 2 * sum;
+}
+
+MicrofacetEnergy conductor_energy(Microfacet type, double alpha) {
+  MicrofacetEnergy e;
+  e.missing = CosineTable([&](double mu) { return lacking(share(Way::mirrored, type, alpha, 1, mu)); },
+                          kEnergyTolerance);
+  const CosineTable E([&](double mu) { return 1 / (1 + e.missing.at(static_cast<float>(mu))); },
+                      kEnergyTolerance);
+  e.mean = static_cast<float>(E.mean());
+  return e;
+}
+
+MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta) {
+  MicrofacetEnergy e;
+  e.missing =
+      CosineTable([&](double mu) { return lacking(both_ways(type, alpha, eta, mu)); }, kEnergyTolerance);
+  e.missing_behind =
+      CosineTable([&](double mu) { return lacking(both_ways(type, alpha, 1 / eta, mu)); }, kEnergyTolerance);
+  return e;
+}
+
+MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta) {
+  MicrofacetEnergy e;
+  e.missing =
+      CosineTable([&](double mu) { return lacking(both_ways(type, alpha, eta, mu)); }, kEnergyTolerance);
+  e.through = CosineTable(
+      [&](double mu) {
+        const double in = share(Way::refracted, type, alpha, eta, mu);
+        return in / (in + share(Way::reflected, type, alpha, eta, mu));
+      },
+      kEnergyTolerance);
+  return e;
+}
+
+C3 mean_fresnel(const C3& eta, const C3& k) {
+  constexpr int kSteps = 1024;
+  V3d sum(0, 0, 0);
+  for (int i = 0; i < kSteps; ++i) {
+    const double mu = (i + .5) / kSteps;
+    sum += V3d(fresnel_conductor(static_cast<float>(mu), eta, k)) * (2 * mu / kSteps);
+  }
+  return C3(sum);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,48 @@
+// What meshes carry at their vertices or faces for textures to read (`mesh_attribute`), by surface: filled in
+// where the meshes are loaded, looked up only where such a texture is evaluated.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "worker/render/math.h"
+#include "worker/render/texture/uv_point.h"
+
+namespace ls::render {
+
+struct SurfaceAttributes {
+  static constexpr std::uint32_t kNoChannel = 0xffffffffu;
+
+  struct Channel {  // one attribute of one mesh
+    bool per_face = false;
+    std::uint32_t base = 0;  // the mesh's first vertex, or triangle, in the world's lists
+    std::uint32_t count = 0;
+    std::size_t first = 0;  // in values
+  };
+  std::vector<std::string> names;  // what the scene's textures read, none twice
+  std::size_t surfaces = 0;
+  std::vector<std::uint32_t> channel_of;  // by name and surface: names.size() times surfaces
+  std::vector<Channel> channels;
+  std::vector<C3> values;     // a lone number thrice
+  std::uint64_t clamped = 0;  // negative ones, made 0
+
+  bool empty() const { return channels.empty(); }
+  std::uint64_t bytes() const { return values.size() * sizeof(C3); }
+  // Of all values under this name: for sampling weights.
+  C3 mean(std::uint32_t name) const;
+  // `corners`: three vertices a triangle. Black where the surface has nothing of this name.
+  C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
+    const std::uint32_t i = channel_of[name * surfaces + at.surface];
+    if (i == kNoChannel) return C3(0);
+    const Channel& c = channels[i];
+    if (c.per_face) return values[c.first + (at.triangle - c.base)];
+    const std::uint32_t* v = &corners[std::size_t{3} * at.triangle];
+    const C3 *first = &values[c.first], a = first[v[0] - c.base], b = first[v[1] - c.base],
+             d = first[v[2] - c.base];
+    return a * (1 - at.b1 - at.b2) + b * at.b1 + d * at.b2;
+  }
+};
+
+}  // namespace ls::render
