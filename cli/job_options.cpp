@@ -103,14 +103,15 @@ void JobOptions::add_to(CLI::App& app) {
   app.add_option("--time", time, "stop after this many seconds, counted from the first ray")
       ->type_name("SECONDS");
   app.add_option("--seed", seed, "default 0")->type_name("N");
-  app.add_option("--frames", frames,
-                 "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
-                 "$frame is it, too")
+  app.add_option(
+         "--frames", frames,
+         "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
+         "$frame is it, too")
       ->type_name("A-B");
   app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
   app.add_option("--integrator", integrator, "volpath, volpath_distant_mis or path instead of the scene's")
       ->type_name("NAME");
-  app.add_option("--aov", aov, "further outputs; this version has none")
+  app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/aovs.md)")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAME,...");
@@ -148,11 +149,8 @@ Result<JobSpec> JobOptions::parse() const {
     if (spec.defines.contains("frame"))
       return wrong("-D frame: with --frames the scene's $frame is the number of the frame");
   }
-  if (!aov.empty())
-    return wrong(
-        fmt::format("--aov {}: there is no such output in this version; an image has its colour, stderr.R, "
-                    "stderr.G, stderr.B and spp",
-                    aov.front()));
+  if (const auto known = parse_aovs(aov); !known) return wrong("--aov: " + known.error().message);
+  spec.aov = aov;
   spec.priority = priority_value.value_or(0);
   spec.float_output = float_output;
   spec.tags = tags;

@@ -124,9 +124,10 @@ tl::expected<SceneReader, coordinator::Rejected> SceneReader::open(const std::st
                                                     RecordedFolder(fs::path(path).parent_path())}));
 }
 
-tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<std::uint32_t> frame) {
+tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<std::uint32_t> frame,
+                                                                  bool labels) {
   Impl& in = *impl_;
-  ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame});
+  ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame, labels});
   const std::string included = in.folder.take_included_texts();
   auto files = in.folder.take_files();
   if (!read.scene)
@@ -168,10 +169,10 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const Fram
 
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
     const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
-    std::optional<std::uint32_t> frame) {
+    std::optional<std::uint32_t> frame, bool labels) {
   auto reader = SceneReader::open(path, defines, strict);
   if (!reader) return tl::unexpected(std::move(reader.error()));
-  return reader->read(frame);
+  return reader->read(frame, labels);
 }
 
 tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict) {

@@ -40,9 +40,10 @@ struct LocalScene {
 bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file);
 
 // File names are relative to the scene's folder. `strict`: warnings are errors. `frame`: of a sequence.
+// `labels`: with the names of things, which belong to the scene of a job that has mattes.
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
     const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
-    std::optional<std::uint32_t> frame = {});
+    std::optional<std::uint32_t> frame = {}, bool labels = false);
 
 // A scene that is read once per frame; its files are looked at once.
 class SceneReader {
@@ -53,7 +54,8 @@ class SceneReader {
   SceneReader(SceneReader&&) noexcept;
   ~SceneReader();
 
-  tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame);
+  tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame,
+                                                       bool labels = false);
   // All frames, or what is wrong with them: every file that is missing, up to 20. The scene is the first
   // frame's, the files are those of all frames, warnings are told once.
   tl::expected<LocalScene, coordinator::Rejected> read_all(const FrameRange& frames);

@@ -26,6 +26,8 @@ Result<TrueError> TrueError::make(TileGrid grid, RgbImage reference) {
 
 Result<void> TrueError::add(TileIndex tile, RoundIndex round, Partial partial) {
   if (round < film_.rounds_folded(tile)) return {};
+  partial.aovs = {};  // the error is that of the colour
+  partial.sums.resize(static_cast<std::size_t>(kPartialChannels * partial.header.tile.pixels()));
   waiting_.insert_or_assign(std::pair(tile, round), std::move(partial));
   for (auto next = waiting_.find({tile, film_.rounds_folded(tile)}); next != waiting_.end();
        next = waiting_.find({tile, film_.rounds_folded(tile)})) {

@@ -18,6 +18,7 @@
 #include "common/scene/integrators.h"
 #include "common/scene/prune.h"
 #include "common/scene/serialize.h"
+#include "coordinator/mattes.h"
 #include "coordinator/store/files.h"
 #include "worker/machine.h"
 #include "worker/render/thread_limit.h"
@@ -135,7 +136,8 @@ int run(const Flags& flags) {
   if (!defines) return say_error(defines.error());
   const auto image = open_image(flags.image);
   if (!image) return say_error(image.error());
-  auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame);
+  auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
+                                coordinator::wants_labels(image->settings));
   if (!scene) return say_rejected(scene.error());
   // What a job of it renders.
   scene->scene = scene::pruned(scene->scene, scene::sees_media(image->settings.integrator)).scene;

@@ -31,7 +31,8 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
     return out;
   }
   out.spp = *spp;
-  Film film(image.grid());
+  const AovSet aovs = aovs_of(image.settings);
+  Film film(image.grid(), aovs);
   const Digest settings = digest_of(image.settings);
   for (RoundIndex k = 0; *spp > 0 && k < round_count(*spp); ++k) {
     const SampleRange samples = cut_range(k, *spp);
@@ -40,8 +41,8 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
       out.problem = "told to stop before it was rendered";
       return out;
     }
-    const Partial partial{{image.scene, settings, image.numeric_class, out.rect, samples},
-                          std::move(rendered.sums)};
+    const Partial partial{
+        {image.scene, settings, image.numeric_class, out.rect, samples}, std::move(rendered.sums), aovs};
     if (const auto folded = film.fold(tile, k, partial); !folded) {
       out.problem = folded.error().message;
       return out;

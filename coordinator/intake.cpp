@@ -15,6 +15,7 @@
 #include "coordinator/analysis.h"
 #include "coordinator/intake_scene.h"
 #include "coordinator/limits.h"
+#include "coordinator/mattes.h"
 
 namespace ls::coordinator {
 namespace {
@@ -65,9 +66,21 @@ Result<void> check_spec(const JobSpec& spec) {
                 fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
   if (std::abs(spec.priority) > limits::kMaxPriority)
     return tl::unexpected(invalid(fmt::format("priority must be within +-{}", limits::kMaxPriority)));
-  if (!spec.aov.empty())
-    return tl::unexpected(invalid(fmt::format(
-        "there is no output \"{}\"; this version writes colour, stderr and spp", spec.aov.front())));
+  if (const auto aovs = parse_aovs(spec.aov); !aovs) return tl::unexpected(aovs.error());
+  return {};
+}
+
+// What the job asks for and what the scene does.
+Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
+  std::vector<std::string> names = spec.aov;
+  for (std::string_view rest = scene.aovs; !rest.empty();) {
+    const auto end = std::min(rest.find(','), rest.size());
+    names.emplace_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  const auto aovs = parse_aovs(names);
+  if (!aovs) return tl::unexpected(aovs.error());
+  settings.aov = names_of(*aovs);
   return {};
 }
 
@@ -78,6 +91,7 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
   if (auto ok = check_size(settings.size); !ok) return tl::unexpected(ok.error());
   settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = choose_aovs(scene, spec, settings); !ok) return tl::unexpected(ok.error());
   return settings;
 }
 
@@ -124,6 +138,10 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return refuse(settings.error());
   job.settings = std::move(*settings);
+  if (!wants_labels(job.settings)) {  // then what things are called is no part of the scene
+    read->scene.shape_labels.clear();
+    read->scene.instance_labels.clear();
+  }
   job.spec = request.spec;
   job.spp = request.spec.spp;
   if (!job.spp && !request.spec.target_error && !request.spec.time) job.spp = read->scene.sample_count;

@@ -82,7 +82,7 @@ tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request
                                                     std::optional<std::uint32_t> frame, bool strict) {
   UploadedAssets assets(request.assets, blobs, strict);
   ReadResult read =
-      read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame});
+      read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame, true});
   if (!read.scene)
     return tl::unexpected(
         Rejected{{Errc::invalid_argument, fmt::format("the scene {} cannot be read", request.scene_name)},

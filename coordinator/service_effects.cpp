@@ -63,7 +63,7 @@ Result<WaitingPartial> Service::partial_for_locked(JobEntry& entry, const Fold& 
   const UnitHeader expected{entry.stored.scene, entry.settings_digest,
                             entry.stored.numeric_class.value_or(Digest{}), entry.grid.rect(e.unit.tile),
                             e.samples};
-  auto partial = decode_partial(*exr, expected, entry.grid.frame);
+  auto partial = decode_partial(*exr, expected, entry.grid.frame, aovs_of(entry.stored.settings));
   if (!partial) return tl::unexpected(partial.error());
   waiting->partial = std::move(*partial);
   return std::move(*waiting);

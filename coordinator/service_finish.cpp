@@ -7,6 +7,8 @@
 #include "common/base/log.h"
 #include "common/image/final_image.h"
 #include "coordinator/intake.h"
+#include "common/scene/serialize.h"
+#include "coordinator/mattes.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -19,6 +21,7 @@ std::span<const std::byte> bytes_of(const std::string& text) { return std::as_by
 
 }  // namespace
 
+// Not under the lock: mattes need the scene's names.
 Provenance Service::provenance_of(const StoredJob& job) const {
   const Health& health = job.totals.health;
   return {job.scene,
@@ -27,7 +30,20 @@ Provenance Service::provenance_of(const StoredJob& job) const {
           job.numeric_class.value_or(Digest{}),
           job.settings.seed,
           job.totals.render_seconds,
-          health.clean() ? "clean" : canonical_json(health)};
+          health.clean() ? "clean" : canonical_json(health),
+          mattes_of(job)};
+}
+
+MatteManifests Service::mattes_of(const StoredJob& job) const {
+  if (!wants_labels(job.settings)) return {};
+  const auto size = blobs_->size(job.scene);
+  const auto json = size ? blobs_->read(job.scene, 0, *size)
+                         : Result<std::vector<std::byte>>(fail(Errc::not_found, "its scene is not stored"));
+  const auto scene = json ? deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()})
+                          : Result<Scene>(tl::unexpected(json.error()));
+  if (scene) return manifests_of(*scene, job.settings);
+  log_warn(fmt::format("job={}", job.id.value), "mattes without names: " + scene.error().message);
+  return {};
 }
 
 // All but the digest of the pixels, which takes its time.
@@ -86,8 +102,9 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
 void Service::load_folded(JobEntry& entry) const {
   const bool keep = entry.stored.spec.target_error.has_value();
   const auto bytes = read_file(folder(entry.stored.id) / "film.snap", std::uint64_t{1} << 40);
-  if (bytes) entry.assembly = load_snapshot(*bytes, entry.grid, keep, snapshot_format());
-  if (!entry.assembly) entry.assembly.emplace(entry.grid, keep);
+  const AovSet aovs = aovs_of(entry.stored.settings);
+  if (bytes) entry.assembly = load_snapshot(*bytes, entry.grid, keep, snapshot_format(), aovs);
+  if (!entry.assembly) entry.assembly.emplace(entry.grid, keep, aovs);
 }
 
 void Service::finish(const EntryPtr& entry, std::uint64_t number) {

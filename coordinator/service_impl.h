@@ -55,10 +55,10 @@ struct JobEntry {
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
   JobState last_state = JobState::queued;  // as published
-  std::optional<TimePoint> clock_zero;   // of the job's seconds, while it runs
-  std::optional<TimePoint> still_since;  // paused: its clock stands
-  double fold_seconds = 0;               // job seconds at the last fold
-  std::string trouble;                   // why it waits
+  std::optional<TimePoint> clock_zero;     // of the job's seconds, while it runs
+  std::optional<TimePoint> still_since;    // paused: its clock stands
+  double fold_seconds = 0;                 // job seconds at the last fold
+  std::string trouble;                     // why it waits
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;  // for people
   // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
   std::vector<std::pair<double, double>> replay;
@@ -231,6 +231,7 @@ class Service final : public Coordinator {
   Result<void> write_snapshot_now(const EntryPtr& entry);
   ReportFacts facts_locked(const JobEntry& entry) const;
   Provenance provenance_of(const StoredJob& job) const;
+  MatteManifests mattes_of(const StoredJob& job) const;
 
   // ---- results (service_results.cpp) ----
   void receive_result(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
@@ -272,9 +273,9 @@ class Service final : public Coordinator {
   mutable std::condition_variable ended_;
   Farm farm_;
   std::map<JobId, EntryPtr> entries_;
-  std::map<JobId, Sequence> sequences_;     // by their own id; their frames are in entries_
-  std::vector<JobId> order_;                // of submission; a sequence stands for its frames
-  std::set<EntryPtr>* unsaved_ = nullptr;   // while jobs change together: those to be stored after it
+  std::map<JobId, Sequence> sequences_;    // by their own id; their frames are in entries_
+  std::vector<JobId> order_;               // of submission; a sequence stands for its frames
+  std::set<EntryPtr>* unsaved_ = nullptr;  // while jobs change together: those to be stored after it
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
   std::string store_trouble_;     // the last result that could not be stored

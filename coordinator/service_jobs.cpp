@@ -46,7 +46,8 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
     if (!log) return tl::unexpected(rejected(log.error()));
     entry->log = std::move(*log);
   }
-  entry->assembly.emplace(entry->grid, entry->stored.spec.target_error.has_value());
+  entry->assembly.emplace(entry->grid, entry->stored.spec.target_error.has_value(),
+                          aovs_of(entry->stored.settings));
   if (const auto put = store_->put_job(entry->stored); !put) return tl::unexpected(rejected(put.error()));
   const JobId id = entry->stored.id;
   register_locked(entry);

@@ -44,7 +44,8 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
 void Service::verify_loop(const std::stop_token& token) {
   while (!token.stop_requested())
     for (Arrived& a : arrived_.pop(1, token)) {
-      Verified verified = verify_result(a.result, a.expected, a.job->grid.frame);
+      Verified verified =
+          verify_result(a.result, a.expected, a.job->grid.frame, aovs_of(a.job->stored.settings));
       checked_.push({std::move(a), std::move(verified)});
     }
 }

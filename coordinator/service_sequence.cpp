@@ -64,7 +64,8 @@ tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& requ
     entries.push_back(make_entry(std::move(jobs[i])));
     JobEntry& entry = *entries.back();
     entry.log = std::move(logs[i]);
-    entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value());
+    entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(),
+                           aovs_of(entry.stored.settings));
     register_locked(entries.back());
   }
   log_info(fmt::format("job={} frames={}", id.value, to_string(*request.spec.frames)), "submitted");

@@ -87,6 +87,7 @@ class InProcessBackend final : public LocalBackend {
     const JobBrief& brief = job.brief;
     out.partial.header = {brief.scene, brief.settings_digest, numeric_class(), unit.rect, unit.samples};
     out.partial.sums = std::move(tile.sums);
+    out.partial.aovs = aovs_of(brief.settings);
     out.cpu_seconds = thread_cpu_seconds() - start;
     out.wall_seconds = seconds(clock_.now() - begin);
     out.health = std::move(tile.health);

@@ -22,11 +22,13 @@ Result<void> check(const Partial& partial, FrameSize frame) {
   if (t.pixels() > kMaxPartialPixels)
     return fail(Errc::invalid_argument,
                 fmt::format("partial: tile of {} pixels, the limit is {}", t.pixels(), kMaxPartialPixels));
-  const auto want = static_cast<std::uint64_t>(t.pixels()) * kPartialChannels;
+  const auto want =
+      static_cast<std::uint64_t>(t.pixels()) * (kPartialChannels + planes_of(partial.aovs).count());
   if (partial.sums.size() != want)
     return fail(Errc::invalid_argument,
                 fmt::format("partial: {} sums, the tile needs {}", partial.sums.size(), want));
-  if (const auto finite = all_finite(partial); !finite) return tl::unexpected(finite.error());
+  if (const auto finite = all_finite(partial); !finite) return finite;
+  if (const auto possible = counts_possible(partial); !possible) return possible;
   return {};
 }
 
@@ -42,12 +44,14 @@ Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize 
                        {0, 0}, 1, Imf::INCREASING_Y, Imf::NO_COMPRESSION);
     header.insert(kUnitAttribute, Imf::StringAttribute(canonical_json(partial.header)));
     Imf::FrameBuffer buffer;
-    for (int c = 0; c < kPartialChannels; ++c) {
-      header.channels().insert(kPartialChannelNames[c], Imf::Channel(Imf::FLOAT));
-      const float* plane = partial.sums.data() + c * t.pixels();
-      buffer.insert(kPartialChannelNames[c],
-                    Imf::Slice::Make(Imf::FLOAT, plane, {t.x0, t.y0}, t.width(), t.height()));
-    }
+    const float* plane = partial.sums.data();
+    const auto add = [&](const char* name) {
+      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+      buffer.insert(name, Imf::Slice::Make(Imf::FLOAT, plane, {t.x0, t.y0}, t.width(), t.height()));
+      plane += t.pixels();
+    };
+    for (const char* name : kPartialChannelNames) add(name);
+    for (const std::string& name : planes_of(partial.aovs).names) add(name.c_str());
     exr::MemoryWriter out;
     out.reserve(partial.sums.size() * sizeof(float) + static_cast<std::size_t>(t.height()) * 16 + 2048);
     {

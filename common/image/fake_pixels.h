@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/image/id_slots.h"
 #include "common/image/partial.h"
 
 namespace ls {
@@ -42,10 +43,23 @@ inline std::array<float, 3> fake_sample(std::uint64_t seed, int x, int y, std::u
   return rgb;
 }
 
-inline Partial fake_partial(const UnitHeader& header) {
-  Partial partial{header, {}};
+// The AOVs of a pixel: sums of the samples' red, every sample a hit, of one thing.
+inline void fake_aovs(Partial& partial, std::size_t pixel, std::size_t pixels) {
+  const AovPlanes planes = planes_of(partial.aovs);
+  const float red = partial.sums[pixel] + partial.sums[3 * pixels + pixel];
+  const auto count = static_cast<float>(partial.header.samples.count());
+  for (std::size_t p = 0; p < planes.sums.size(); ++p)
+    partial.sums[(kPartialChannels + p) * pixels + pixel] = p == planes.hits ? count : red;
+  for (std::size_t p = 0; p < planes.ids.size(); ++p)
+    store_slots(ranked({{1.f, count}}),
+                &partial.sums[(kPartialChannels + planes.sums.size() + p * kIdPlanes) * pixels + pixel],
+                pixels);
+}
+
+inline Partial fake_partial(const UnitHeader& header, AovSet aovs = {}) {
+  Partial partial{header, {}, aovs};
   const auto pixels = static_cast<std::size_t>(header.tile.pixels());
-  partial.sums.assign(pixels * kPartialChannels, 0.f);
+  partial.sums.assign(pixels * (kPartialChannels + planes_of(aovs).count()), 0.f);
   const std::uint64_t seed = fake_seed(header);
   std::size_t i = 0;
   for (int y = header.tile.y0; y < header.tile.y1; ++y)
@@ -54,6 +68,7 @@ inline Partial fake_partial(const UnitHeader& header) {
         const auto rgb = fake_sample(seed, x, y, s);
         for (std::size_t c = 0; c < 3; ++c) partial.sums[((s & 1) * 3 + c) * pixels + i] += rgb[c];
       }
+  for (i = 0; i < pixels && !aovs.empty(); ++i) fake_aovs(partial, i, pixels);
   return partial;
 }
 

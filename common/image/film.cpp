@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/image/id_slots.h"
 
 namespace ls {
 namespace {
@@ -18,9 +19,18 @@ Digest chained(const Digest& chain, const Digest& unit) {
   return hash.finish();
 }
 
+// Adds the identifiers of `from` to those in `to`, both planar.
+void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pixels) {
+  for (std::size_t first = 0; first < to.size(); first += kIdPlanes * pixels)
+    for (std::size_t i = first; i < first + pixels; ++i)
+      store_slots(load_slots(&to[i], pixels) + load_slots(&from[i], pixels), &to[i], pixels);
+}
+
 }  // namespace
 
-Film::Film(TileGrid grid) : grid_(grid) {
+Film::Film(TileGrid grid, AovSet aovs) : grid_(grid), aovs_(aovs) {
+  const AovPlanes planes = planes_of(aovs);
+  planes_ = {kPartialChannels + planes.sums.size(), kIdPlanes * planes.ids.size()};
   CHECK(grid.frame.width > 0 && grid.frame.height > 0 && grid.tile > 0, "a film of {} x {} in tiles of {}",
         grid.frame.width, grid.frame.height, grid.tile);
   tiles_.resize(grid.count());
@@ -37,8 +47,11 @@ Result<void> Film::accepts(TileIndex index, RoundIndex round, const Partial& par
                 fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
   const PixelRect rect = grid_.rect(index);
   const SampleRange full = round_range(round), got = partial.header.samples;
+  if (partial.aovs != aovs_)
+    return fail(Errc::invalid_argument,
+                fmt::format("the partial of tile {} has other AOVs than the film", index));
   if (partial.header.tile != rect ||
-      partial.sums.size() != static_cast<std::size_t>(rect.pixels()) * kPartialChannels)
+      partial.sums.size() != static_cast<std::size_t>(rect.pixels()) * (planes_.sums + planes_.ids))
     return fail(Errc::invalid_argument,
                 fmt::format("the partial's rectangle or size is not that of tile {}", index));
   if (got.s0 != full.s0 || got.s1 <= got.s0 || got.s1 > full.s1 || got.s1 % 2 != 0)
@@ -63,16 +76,20 @@ Result<TileError> Film::fold(TileIndex tile, RoundIndex round, const Partial& pa
 Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& partial,
                              const Digest& digest) {
   if (const auto ok = accepts(index, round, partial); !ok) return tl::unexpected(ok.error());
+  const auto pixels = static_cast<std::size_t>(grid_.rect(index).pixels());
   auto next = std::make_shared<Tile>();
   if (const Tile* old = tiles_[index].get()) {
     next->full_rounds = old->full_rounds;
     next->chain = old->chain;
     next->sums = old->sums;
+    next->ids = old->ids;
   } else {
-    next->sums.resize(partial.sums.size());
+    next->sums.resize(planes_.sums * pixels);
+    next->ids.resize(planes_.ids * pixels);
   }
   if (partial.header.samples == round_range(round)) {
-    for (std::size_t i = 0; i < partial.sums.size(); ++i) next->sums[i] += partial.sums[i];
+    for (std::size_t i = 0; i < next->sums.size(); ++i) next->sums[i] += partial.sums[i];
+    add_ids(next->ids, std::span(partial.sums).subspan(next->sums.size()), pixels);
     next->chain = chained(next->chain, digest);
     ++next->full_rounds;
   } else {
@@ -84,8 +101,8 @@ Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& p
   return error;
 }
 
-std::array<std::vector<double>, 2> Film::halves(const Tile& tile) {
-  const std::size_t n = tile.sums.size() / 2;
+std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pixels) {
+  const std::size_t n = kPartialChannels / 2 * pixels;
   std::array<std::vector<double>, 2> out;
   for (std::size_t h = 0; h < 2; ++h) {
     out[h].assign(tile.sums.begin() + static_cast<std::ptrdiff_t>(h * n),
@@ -97,7 +114,7 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile) {
 }
 
 TileError Film::estimate(const Tile& tile, const PixelRect& rect) {
-  auto means = halves(tile);
+  auto means = halves(tile, static_cast<std::size_t>(rect.pixels()));
   const std::uint64_t spp = tile.spp();
   const double samples = static_cast<double>(spp / 2);  // of each half: counts are even
   for (auto& half : means)
@@ -133,7 +150,7 @@ TilePixels Film::pixels(TileIndex index) const {
   out.mean.resize(3 * n);
   out.standard_error.resize(3 * n);
   if (!out.spp) return out;
-  const auto sums = halves(*tiles_[index]);
+  const auto sums = halves(*tiles_[index], n);
   const auto samples = static_cast<double>(out.spp), half = static_cast<double>(out.spp / 2);
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t p = 0; p < n; ++p) {
@@ -142,6 +159,21 @@ TilePixels Film::pixels(TileIndex index) const {
       out.standard_error[3 * p + c] = 0.5 * std::abs(a / half - b / half);
     }
   }
+  return out;
+}
+
+TileAovs Film::aov_pixels(TileIndex index) const {
+  TileAovs out{.rect = grid_.rect(index), .spp = spp(index)};
+  const auto n = static_cast<std::size_t>(out.rect.pixels()), colour = kPartialChannels * n;
+  out.sums.resize(planes_.sums * n - colour);
+  out.ids.resize(planes_.ids * n);
+  if (!out.spp) return out;
+  const Tile& tile = *tiles_[index];
+  std::copy(tile.sums.begin() + static_cast<std::ptrdiff_t>(colour), tile.sums.end(), out.sums.begin());
+  out.ids = tile.ids;
+  if (!tile.tail) return out;
+  for (std::size_t i = 0; i < out.sums.size(); ++i) out.sums[i] += tile.tail->sums[colour + i];
+  add_ids(out.ids, std::span(tile.tail->sums).subspan(tile.sums.size()), n);
   return out;
 }
 
@@ -156,7 +188,8 @@ std::uint64_t Film::memory_bytes() const {
   std::uint64_t sum = 0;
   for (const auto& tile : tiles_)
     if (tile)
-      sum += tile->sums.size() * sizeof(double) + (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0);
+      sum += tile->sums.size() * sizeof(double) + tile->ids.size() * sizeof(float) +
+             (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0);
   return sum;
 }
 
@@ -167,7 +200,7 @@ TileError Film::error() const {
 }
 
 bool Film::operator==(const Film& other) const {
-  if (grid_ != other.grid_) return false;
+  if (grid_ != other.grid_ || aovs_ != other.aovs_) return false;
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
     const Tile *a = tiles_[i].get(), *b = other.tiles_[i].get();
     if (a != b && (!a || !b || !(*a == *b))) return false;

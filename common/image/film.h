@@ -6,6 +6,8 @@
 // the sums, counts in everything that is read, and is replaced when a longer range of the same round comes.
 // So an N-sample film that is continued to 2N has the bits of a 2N film rendered at once.
 //
+// AOVs are folded alike: sums in double, identifiers by the rule of id_slots.h.
+//
 // Not thread-safe: the caller locks. Copies are cheap (tiles are immutable and shared; a fold makes a new
 // one): copy under the lock, read or write files outside it.
 #pragma once
@@ -35,11 +37,20 @@ struct TilePixels {
   std::vector<double> standard_error;  // |A - B| / 2 of the half means
 };
 
+// One tile's AOVs as they stand.
+struct TileAovs {
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  std::vector<double> sums;  // planes_of(aovs).sums, planar; zero if spp is 0
+  std::vector<float> ids;    // kIdPlanes planes of each of planes_of(aovs).ids
+};
+
 class Film {
  public:
-  explicit Film(TileGrid grid);
+  explicit Film(TileGrid grid, AovSet aovs = {});
 
   const TileGrid& grid() const { return grid_; }
+  AovSet aovs() const { return aovs_; }
 
   // Folds round `round` of tile `tile`. Rounds come in order 0, 1, 2, ... per tile; a cut round only as the
   // last.
@@ -64,10 +75,11 @@ class Film {
   // bytes.
   Digest tile_digest(TileIndex tile) const;
   TilePixels pixels(TileIndex tile) const;
+  TileAovs aov_pixels(TileIndex tile) const;
 
   // ---- the image ----
   std::uint64_t samples() const;       // over all pixels
-  std::uint64_t memory_bytes() const;  // of the sums
+  std::uint64_t memory_bytes() const;  // of the sums and identifiers
   TileError error() const;             // over all tiles, in tile order
 
   // ---- restart ----
@@ -78,7 +90,7 @@ class Film {
   std::vector<std::byte> save_tile(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 
-  bool operator==(const Film& other) const;  // same grid, same bits in every tile
+  bool operator==(const Film& other) const;  // same grid, AOVs, and bits in every tile
 
  private:
   struct Tail {
@@ -90,20 +102,28 @@ class Film {
   struct Tile {
     RoundIndex full_rounds = 0;
     Digest chain;              // over the full rounds
-    std::vector<double> sums;  // six planes as in Partial, of the full rounds
+    std::vector<double> sums;  // planes as in Partial, but for identifiers, of the full rounds
+    std::vector<float> ids;    // those, likewise
     std::optional<Tail> tail;
     TileError error;  // with the tail
     std::uint64_t spp() const;
     bool operator==(const Tile&) const = default;
   };
-  static std::array<std::vector<double>, 2> halves(
-      const Tile& tile);  // sums with the tail; R, G, B planes of A and of B
+  // Sums with the tail; R, G, B planes of A and of B.
+  static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels);
   static TileError estimate(const Tile& tile, const PixelRect& rect);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
   std::vector<std::byte> tile_bytes(TileIndex tile) const;
   Result<std::shared_ptr<const Tile>> parse_tile(TileIndex tile, std::span<const std::byte> bytes) const;
 
+  // How many planes are sums and identifiers, those of the colour among them.
+  struct Planes {
+    std::size_t sums, ids;
+  };
+
   TileGrid grid_;
+  AovSet aovs_;
+  Planes planes_;
   std::vector<std::shared_ptr<const Tile>> tiles_;  // null: nothing folded yet
 };
 

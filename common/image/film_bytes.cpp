@@ -3,9 +3,12 @@
 //   record; SHA-256 tile: "LSTILE01", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0:
 //   none), 32 bytes tail digest,
 //         6 planes of doubles, with a tail 6 planes of floats; SHA-256 of all that stands before
+//   With AOVs: "LSFILM02", a u32 more after the tile's side, which AOVs; the planes of their sums stand after
+//   the six, then those of identifiers in floats.
 // Little endian. The error figures are computed anew.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -18,7 +21,7 @@ namespace ls {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kFilmMagic = "LSFILM01", kTileMagic = "LSTILE01";
+constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE01";
 
 class Writer {
  public:
@@ -83,7 +86,7 @@ class Reader {
 template <class T>
 bool read_finite(Reader& in, std::vector<T>& out, std::size_t count) {
   const auto raw = in.take(count * sizeof(T));
-  if (raw.empty()) return false;
+  if (raw.empty()) return count == 0;
   out.resize(count);
   std::memcpy(out.data(), raw.data(), raw.size());
   for (const T v : out)
@@ -97,7 +100,7 @@ std::vector<std::byte> Film::tile_bytes(TileIndex index) const {
   const Tile* tile = tiles_[index].get();
   if (!tile) return {};
   Writer out(kTileMagic);
-  out.reserve(256 + tile->sums.size() * sizeof(double) +
+  out.reserve(256 + tile->sums.size() * sizeof(double) + tile->ids.size() * sizeof(float) +
               (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0));
   const Tail tail = tile->tail.value_or(Tail{});
   out.value(index);
@@ -107,6 +110,7 @@ std::vector<std::byte> Film::tile_bytes(TileIndex index) const {
   out.value(tail.samples.s1);
   out.value(tail.digest.bytes);
   out.put(std::as_bytes(std::span(tile->sums)));
+  out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
   return out.close();
 }
@@ -126,9 +130,10 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   tail.digest.bytes = in.value<decltype(Digest::bytes)>();
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
-  const auto sums = static_cast<std::size_t>(rect.pixels()) * kPartialChannels;
-  if (!in.ok() || !read_finite(in, tile->sums, sums) || (has_tail && !read_finite(in, tail.sums, sums)) ||
-      in.left() != 0)
+  const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
+             ids = pixels * planes_.ids;
+  if (!in.ok() || !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
+      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
   const SampleRange full = round_range(tile->full_rounds);
   if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
@@ -156,13 +161,14 @@ Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) 
 }
 
 std::vector<std::byte> Film::save() const {
-  Writer out(kFilmMagic);
+  Writer out(aovs_.empty() ? kFilmMagic : kAovFilmMagic);
   std::uint32_t present = 0;
   for (const auto& tile : tiles_) present += tile != nullptr;
   out.reserve(static_cast<std::size_t>(memory_bytes()) + 64 + std::size_t{256} * present);
   out.value(grid_.frame.width);
   out.value(grid_.frame.height);
   out.value(grid_.tile);
+  if (!aovs_.empty()) out.value(aovs_.bits());
   out.value(present);
   for (TileIndex i = 0; i < tiles_.size(); ++i) {
     if (!tiles_[i]) continue;
@@ -175,18 +181,21 @@ std::vector<std::byte> Film::save() const {
 }
 
 Result<Film> Film::load(std::span<const std::byte> bytes) {
-  auto opened = Reader::open(bytes, kFilmMagic);
+  const auto magic = std::as_bytes(std::span(kAovFilmMagic));
+  const bool further = bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+  auto opened = Reader::open(bytes, further ? kAovFilmMagic : kFilmMagic);
   if (!opened) return tl::unexpected(opened.error());
   Reader& in = *opened;
   TileGrid grid;
   grid.frame.width = in.value<int>();
   grid.frame.height = in.value<int>();
   grid.tile = in.value<int>();
+  const AovSet aovs(further ? in.value<std::uint32_t>() : 0);
   const auto present = in.value<std::uint32_t>();
   for (const int side : {grid.frame.width, grid.frame.height, grid.tile})
     if (side < 1 || side > kMaxFrameSide) return damaged("its size is impossible");
   if (present > grid.count()) return damaged("it has more tiles than its frame");
-  Film film(grid);
+  Film film(grid, aovs);
   for (std::uint32_t i = 0; i < present; ++i) {
     const auto index = in.value<TileIndex>();
     const auto raw = in.take(in.value<std::uint64_t>());

@@ -12,8 +12,6 @@
 namespace ls {
 namespace {
 
-constexpr float kLargestHalf = 65504;
-
 // -0 + 0 is +0 when rounding to nearest; everything else is unchanged.
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
@@ -47,16 +45,6 @@ Planes gather(const Film& film) {
     }
   }
   return out;
-}
-
-std::uint64_t clamp_to_half(std::vector<float>& plane) {
-  std::uint64_t clamped = 0;
-  for (float& v : plane) {
-    if (std::abs(v) <= kLargestHalf) continue;
-    v = std::copysign(kLargestHalf, v);
-    ++clamped;
-  }
-  return clamped;
 }
 
 std::string tile_digests(const Film& film) {
@@ -125,6 +113,7 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool floa
                      {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
                      {"lightshaft:tiles", tile_digests(film)}};
   if (!from.health.empty()) picture.strings["lightshaft:health"] = from.health;
+  out.clamped += add_aov_layers(film, from.manifests, float_output, picture);
   auto exr = write_exr(picture);
   if (!exr) return tl::unexpected(exr.error());
   out.exr = std::move(*exr);

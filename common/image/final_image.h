@@ -11,6 +11,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
+#include "common/image/aov_layers.h"
 #include "common/image/film.h"
 
 namespace ls {
@@ -29,12 +30,14 @@ struct Provenance {
   double seconds = 0;  // render time
   // "clean", or canonical_json() of the Health; empty: not known, and not written.
   std::string health;
+  MatteManifests manifests = {};
 };
 struct FinalImage {
   std::vector<std::byte> exr;
   std::uint64_t clamped = 0;  // values whose magnitude was above 65504, the largest half
 };
-// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp. Works on an unfinished film, too.
+// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers. Works
+// on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
 
 // How many values of R, G and B it clamps in a half image.

@@ -40,7 +40,7 @@ class Merger {
       if (const auto ok = index(i); !ok) return tl::unexpected(ok.error());
     const auto grid = tiling();
     if (!grid) return tl::unexpected(grid.error());
-    Merged out{Film(*grid), first_->scene, first_->settings, first_->numeric_class};
+    Merged out{Film(*grid, aovs_), first_->scene, first_->settings, first_->numeric_class};
     for (TileIndex t = 0; t < grid->count(); ++t) {
       const auto it = tiles_.find(grid->rect(t));
       if (it == tiles_.end())
@@ -68,6 +68,7 @@ class Merger {
     if (!first_) {
       first_ = h;
       frame_ = file->frame;
+      aovs_ = file->partial.aovs;
     }
     const auto other = [&](std::string_view what) {
       return refuse(fmt::format("{} is of another {} than {}", sources_[i].name, what, sources_[0].name));
@@ -77,6 +78,7 @@ class Merger {
     if (h.numeric_class != first_->numeric_class)
       return other("numeric class (its machine or build computes otherwise)");
     if (file->frame != frame_) return other("frame size");
+    if (file->partial.aovs != aovs_) return other("set of AOVs");
     tile_side_ = std::max({tile_side_, h.tile.width(), h.tile.height()});
     tiles_[h.tile].push_back({i, h.samples, unit_digest(file->partial)});
     return {};
@@ -148,6 +150,7 @@ class Merger {
   const std::vector<PartialSource>& sources_;
   std::optional<UnitHeader> first_;
   FrameSize frame_;
+  AovSet aovs_;
   int tile_side_ = 0;
   Tiles tiles_;
   std::uint64_t duplicates_ = 0;

@@ -25,9 +25,9 @@ struct Merged {
 };
 
 // Groups by tile, orders by s0. Refuses, naming the files: partials of different scenes, settings or numeric
-// classes; frames that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's samples;
-// duplicates that differ; tiles of the frame without a partial. Of a cut round and its full one the full one
-// is taken. Holds one partial's pixels at a time.
+// classes; frames or AOVs that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's
+// samples; duplicates that differ; tiles of the frame without a partial. Of a cut round and its full one the
+// full one is taken. Holds one partial's pixels at a time.
 Result<Merged> merge_partials(const std::vector<PartialSource>& sources);
 
 }  // namespace ls

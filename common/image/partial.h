@@ -10,6 +10,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
+#include "common/image/aov.h"
 #include "common/image/frame.h"
 #include "common/image/rounds.h"
 
@@ -33,24 +34,28 @@ Result<UnitHeader> parse_unit_header(std::string_view json);
 
 struct Partial {
   UnitHeader header;
-  // Planar: six planes of tile.pixels() floats each, row by row. Sums, never averages; how many samples each
-  // half has follows from the range. Every value is finite (a non-finite sample is counted and contributes
-  // zero).
+  // Planar: six planes of tile.pixels() floats each, row by row, then those of planes_of(aovs). Sums, never
+  // averages; how many samples each half has follows from the range, and AOVs are sums over both halves.
+  // Every value is finite (a non-finite sample is counted and contributes zero).
   std::vector<float> sums;
+  AovSet aovs;  // what the settings ask for
   bool operator==(const Partial&) const = default;
 };
 
-// SHA-256 over the header's canonical JSON followed by the six planes (little endian); not over file bytes.
+// SHA-256 over the header's canonical JSON followed by all planes (little endian); not over file bytes.
 Digest unit_digest(const Partial& partial);
 
 // The EXR of the contract: scanline, uncompressed, FLOAT, dataWindow the tile, displayWindow the frame.
+// Without AOVs it has exactly the six channels; with them also those of planes_of(aovs).
 Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
 
 // Refuses, with what is wrong, anything but exactly such a file: other windows, channels, compression, part
-// counts, sizes, non-finite sums, trailing data. `expected` is compared with the header inside.
-Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame);
+// counts, sizes, non-finite sums, identifiers and counts that no renderer makes, trailing data. `expected` is
+// compared with the header inside; `aovs` says which channels there must be.
+Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
+                               AovSet aovs = {});
 
-// For `lightshaft merge`: the header comes from the file.
+// For `lightshaft merge`: the header and the AOVs come from the file.
 struct PartialFile {
   Partial partial;
   FrameSize frame;

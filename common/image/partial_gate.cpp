@@ -1,24 +1,28 @@
 // Reading partials: they come from machines we don't control. A partial has exactly one shape (uncompressed
-// scanlines of six float channels under a known header), so it is read here, byte by byte against that shape,
-// instead of by a library that understands every EXR there is. Nothing is allocated before the sizes are
-// known to be those of the tile.
+// scanlines of known float channels under a known header), so it is read here, byte by byte against that
+// shape, instead of by a library that understands every EXR there is. Nothing is allocated before the sizes
+// are known to be those of the tile.
 #include "common/image/partial_gate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <string_view>
 
 #include "common/image/byte_cursor.h"
+#include "common/image/id_slots.h"
 #include "common/image/render_limits.h"
 
 namespace ls {
 namespace {
 
 constexpr std::int32_t kMaxUnitJson = 1024;
-constexpr std::size_t kMaxNameBytes = 31;  // the format's limit without the long-names flag
+constexpr std::int32_t kMaxChannelList = 8192;  // all AOVs together need about 2700
+constexpr std::size_t kMaxNameBytes = 31;       // the format's limit without the long-names flag
 
 tl::unexpected<Error> refuse(std::string what) {
   return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
@@ -28,6 +32,7 @@ struct Shape {
   std::optional<PixelRect> data, display;
   std::optional<std::string_view> unit;
   std::size_t pixels_at = 0;  // byte offset of the line table
+  AovSet aovs;                // whose channels there are
 };
 
 struct Attribute {
@@ -52,25 +57,59 @@ Result<void> check_magic(ByteCursor& in) {
   return {};
 }
 
-Result<void> check_channels(std::span<const std::byte> raw) {
+std::vector<std::string> file_channels(AovSet aovs) {
+  std::vector<std::string> names;
+  for (const int plane : kFileOrder)
+    names.emplace_back(kPartialChannelNames[static_cast<std::size_t>(plane)]);
+  for (std::string& name : planes_of(aovs).names) names.push_back(std::move(name));
+  return names;
+}
+
+// The names of all channels, each of them of FLOAT at every pixel.
+Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> raw) {
   ByteCursor in(raw);
-  for (const int plane : kFileOrder) {
-    const std::string_view want = kPartialChannelNames[static_cast<std::size_t>(plane)];
+  std::vector<std::string_view> names;
+  while (true) {
     const auto name = in.name(kMaxNameBytes);
-    if (!name || *name != want)
-      return refuse(fmt::format("channel '{}' stands where '{}' belongs (A.B A.G A.R B.B B.G B.R, no others)",
-                                name.value_or("?"), want));
+    if (!name) return refuse("the channel list is cut off");
+    if (name->empty()) break;
     const auto type = in.value<std::int32_t>(), linear = in.value<std::int32_t>(),
                xs = in.value<std::int32_t>(), ys = in.value<std::int32_t>();
     if (!type || !linear || !xs || !ys) return refuse("the channel list is cut off");
-    if (*type != 2) return refuse(fmt::format("channel '{}' is not of type FLOAT", want));
+    if (*type != 2) return refuse(fmt::format("channel '{}' is not of type FLOAT", *name));
     if (*xs != 1 || *ys != 1)
-      return refuse(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", want, *xs, *ys));
+      return refuse(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", *name, *xs, *ys));
+    names.push_back(*name);
   }
-  const auto end = in.name(kMaxNameBytes);
-  if (!end || !end->empty() || in.left() != 0)
-    return refuse("more than the six channels A.B A.G A.R B.B B.G B.R");
-  return {};
+  if (in.left() != 0) return refuse("the channel list has more bytes than channels");
+  return names;
+}
+
+// The AOVs of which there is any channel.
+AovSet aovs_among(std::span<const std::string_view> names) {
+  AovSet set;
+  for (const AovRow& row : aov_rows()) {
+    const std::string prefix = fmt::format("{}.{}.", row.kind == AovKind::ids ? "id" : "aov", row.name);
+    for (const std::string_view name : names)
+      if (name.starts_with(prefix)) set = set.with(row.aov);
+  }
+  return set;
+}
+
+Result<AovSet> check_channels(std::span<const std::byte> raw) {
+  const auto names = channel_names(raw);
+  if (!names) return tl::unexpected(names.error());
+  const AovSet aovs = aovs_among(*names);
+  const auto want = file_channels(aovs);
+  for (std::size_t i = 0; i < std::max(want.size(), names->size()); ++i) {
+    const std::string_view is = i < names->size() ? (*names)[i] : "nothing",
+                           should = i < want.size() ? std::string_view(want[i]) : "nothing";
+    if (is != should)
+      return refuse(fmt::format(
+          "channel '{}' stands where '{}' belongs (A.B A.G A.R B.B B.G B.R and those of AOVs, no others)", is,
+          should));
+  }
+  return aovs;
 }
 
 Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> raw) {
@@ -84,7 +123,11 @@ Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> 
 }
 
 Result<void> read_attribute(const Attribute& attribute, std::span<const std::byte> raw, Shape& shape) {
-  if (attribute.name == "channels") return check_channels(raw);
+  if (attribute.name == "channels") {
+    const auto aovs = check_channels(raw);
+    if (!aovs) return tl::unexpected(aovs.error());
+    shape.aovs = *aovs;
+  }
   if (attribute.name == "compression" && raw[0] != std::byte{0})
     return refuse("it is compressed; partials are not");
   if (attribute.name == "lineOrder" && raw[0] != std::byte{0})
@@ -104,7 +147,8 @@ Result<const Attribute*> find_attribute(std::string_view name, std::string_view 
     if (a.name != name) continue;
     if (a.type != type)
       return refuse(fmt::format("attribute '{}' has type '{}', expected '{}'", name, type, a.type));
-    if (size < 0 || size > kMaxUnitJson || (a.size && size != a.size))
+    if (size < 0 || size > (name == "channels" ? kMaxChannelList : kMaxUnitJson) ||
+        (a.size && size != a.size))
       return refuse(fmt::format("attribute '{}' has {} bytes", name, size));
     return &a;
   }
@@ -143,18 +187,24 @@ Result<Shape> read_shape(std::span<const std::byte> exr) {
 
 std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]", r.x0, r.y0, r.x1, r.y1); }
 
+std::string pixel_name(const PixelRect& t, std::size_t i) {
+  const auto p = static_cast<int>(i);
+  return fmt::format("pixel ({}, {})", t.x0 + p % t.width(), t.y0 + p / t.width());
+}
+
 Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Shape& shape) {
   const PixelRect& t = *shape.data;
   if (t.pixels() > kMaxPartialPixels)
     return refuse(
         fmt::format("tile {} has {} pixels, the limit is {}", show(t), t.pixels(), kMaxPartialPixels));
   const auto width = static_cast<std::size_t>(t.width()), height = static_cast<std::size_t>(t.height());
-  const std::size_t line = width * kPartialChannels * sizeof(float);
+  const std::size_t further = planes_of(shape.aovs).count(), channels = kPartialChannels + further;
+  const std::size_t line = width * channels * sizeof(float);
   const std::size_t want = shape.pixels_at + height * (8 + 8 + line);
   if (exr.size() != want)
     return refuse(fmt::format("{} bytes, but tile {} needs exactly {}", exr.size(), show(t), want));
 
-  std::vector<float> sums(width * height * kPartialChannels);
+  std::vector<float> sums(width * height * channels);
   ByteCursor table(exr.subspan(shape.pixels_at, height * 8)),
       lines(exr.subspan(shape.pixels_at + height * 8));
   for (std::size_t y = 0; y < height; ++y) {
@@ -163,10 +213,10 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
     if (lines.value<std::int32_t>() != t.y0 + static_cast<std::int32_t>(y) ||
         lines.value<std::int32_t>() != static_cast<std::int32_t>(line))
       return refuse(fmt::format("line {}: wrong number or size", y));
-    for (const int plane : kFileOrder) {
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::size_t plane = c < kFileOrder.size() ? static_cast<std::size_t>(kFileOrder[c]) : c;
       const auto row = lines.take(width * sizeof(float));  // there: the size was checked
-      std::memcpy(sums.data() + (static_cast<std::size_t>(plane) * height + y) * width, row->data(),
-                  row->size());
+      std::memcpy(sums.data() + (plane * height + y) * width, row->data(), row->size());
     }
   }
   return sums;
@@ -203,8 +253,9 @@ Result<void> check_unit(const UnitHeader& got, const UnitHeader& want) {
 Result<Partial> finish(std::span<const std::byte> exr, const Shape& shape, UnitHeader header) {
   auto sums = read_pixels(exr, shape);
   if (!sums) return tl::unexpected(sums.error());
-  Partial partial{std::move(header), std::move(*sums)};
+  Partial partial{std::move(header), std::move(*sums), shape.aovs};
   if (const auto finite = all_finite(partial); !finite) return tl::unexpected(finite.error());
+  if (const auto possible = counts_possible(partial); !possible) return tl::unexpected(possible.error());
   return partial;
 }
 
@@ -215,16 +266,44 @@ Result<void> all_finite(const Partial& partial) {
   const auto pixels = static_cast<std::size_t>(t.pixels());
   for (std::size_t i = 0; i < partial.sums.size(); ++i) {
     if (std::isfinite(partial.sums[i])) continue;
-    const auto p = static_cast<int>(i % pixels);
-    return refuse(fmt::format("channel {} of pixel ({}, {}) is {}", kPartialChannelNames[i / pixels],
-                              t.x0 + p % t.width(), t.y0 + p / t.width(), partial.sums[i]));
+    const std::size_t plane = i / pixels;
+    const std::string name = plane < kPartialChannels
+                                 ? kPartialChannelNames[plane]
+                                 : planes_of(partial.aovs).names[plane - kPartialChannels];
+    return refuse(fmt::format("channel {} of {} is {}", name, pixel_name(t, i % pixels), partial.sums[i]));
   }
   return {};
 }
 
-Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame) {
+Result<void> counts_possible(const Partial& partial) {
+  if (partial.aovs.empty()) return {};
+  const AovPlanes planes = planes_of(partial.aovs);
+  const PixelRect& t = partial.header.tile;
+  const auto pixels = static_cast<std::size_t>(t.pixels());
+  const std::uint64_t samples = partial.header.samples.count();
+  const float* ids = partial.sums.data() + (kPartialChannels + planes.sums.size()) * pixels;
+  for (const Aov aov : planes.ids) {
+    for (std::size_t i = 0; i < pixels; ++i)
+      if (const std::string wrong = wrong_with(load_slots(ids + i, pixels), samples); !wrong.empty())
+        return refuse(fmt::format("{} of {}: {}", row_of(aov).name, pixel_name(t, i), wrong));
+    ids += kIdPlanes * pixels;
+  }
+  if (planes.hits == SIZE_MAX) return {};
+  const float* hits = partial.sums.data() + (kPartialChannels + planes.hits) * pixels;
+  for (std::size_t i = 0; i < pixels; ++i)
+    if (!(hits[i] >= 0 && hits[i] <= static_cast<float>(samples) && hits[i] == std::floor(hits[i])))
+      return refuse(
+          fmt::format("channel aov.hits of {} is {}, of {} samples", pixel_name(t, i), hits[i], samples));
+  return {};
+}
+
+Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
+                               AovSet aovs) {
   const auto shape = read_shape(exr);
   if (!shape) return tl::unexpected(shape.error());
+  if (shape->aovs != aovs)
+    return refuse(fmt::format("it has the AOVs [{}], expected [{}]", fmt::join(names_of(shape->aovs), ", "),
+                              fmt::join(names_of(aovs), ", ")));
   const PixelRect& display = *shape->display;
   if (display.x1 != frame.width || display.y1 != frame.height)
     return refuse(

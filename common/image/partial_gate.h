@@ -10,7 +10,7 @@ namespace ls {
 
 inline constexpr char kUnitAttribute[] = "lightshaft:unit";
 // In the order of the planes. A file sorts them by name: kFileOrder[i] is the plane of the file's i-th
-// channel.
+// channel. The channels of AOVs follow in both, in their own order.
 inline constexpr std::array<const char*, kPartialChannels> kPartialChannelNames = {"A.R", "A.G", "A.B",
                                                                                    "B.R", "B.G", "B.B"};
 inline constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};
@@ -18,5 +18,7 @@ inline constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // the largest til
 
 // Names the first pixel, channel and value that is not finite.
 Result<void> all_finite(const Partial& partial);
+// Names the first pixel and AOV whose counts or identifiers are impossible.
+Result<void> counts_possible(const Partial& partial);
 
 }  // namespace ls

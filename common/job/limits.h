@@ -12,6 +12,8 @@ inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels a side
 inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
 // Tiles x rounds. 2^24 samples are fine for one small tile (262 thousand rounds), not for a whole frame.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
+// Of a film's sums: all AOVs of a UHD frame take about 5 GB, colour alone of the largest frame 3.2.
+inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
 inline constexpr double kMaxSeconds = 1e9;  // of a time budget
 inline constexpr double kMaxTargetError = 1e6;
 inline constexpr int kMaxPriority = 1'000'000;                      // either sign

@@ -1,6 +1,7 @@
 #include "common/job/settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -65,6 +66,8 @@ std::string canonical_json(const RenderSettings& s) {
                    {"tile", s.tile}});
 }
 
+AovSet aovs_of(const RenderSettings& settings) { return parse_aovs(settings.aov).value_or(AovSet{}); }
+
 Digest digest_of(const RenderSettings& settings) { return sha256(canonical_json(settings)); }
 
 Result<RenderSettings> parse_render_settings(std::string_view text) {
@@ -82,8 +85,10 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
   s.seed = fields.whole("seed", 0, UINT64_MAX).value_or(0);
   s.size = fields.size("size").value_or(FrameSize{});
   s.tile = static_cast<int>(fields.whole("tile", kMinTile, kMaxTile).value_or(32));
-  if (std::adjacent_find(s.aov.begin(), s.aov.end(), std::greater_equal<>()) != s.aov.end())
-    fields.wrong("aov", "must be sorted, each name once");
+  const auto aovs = parse_aovs(s.aov);
+  if (!aovs) fields.wrong("aov", "is not possible: " + aovs.error().message);
+  if (aovs && names_of(*aovs) != s.aov)
+    fields.wrong("aov", "must be sorted, each name once, as it is called");
   if (fields.error()) return tl::unexpected(*fields.error());
   return s;
 }
@@ -98,6 +103,14 @@ Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
                     s.size.width, s.size.height, kMaxFrameSide, kMaxFramePixels));
   if (s.tile < kMinTile || s.tile > kMaxTile)
     return refuse(fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
+  const AovSet aovs = aovs_of(s);
+  const std::uint64_t film = film_bytes_per_pixel(aovs) * static_cast<std::uint64_t>(pixels);
+  if (film > kMaxFilmBytes)
+    return refuse(
+        fmt::format("{} x {} pixels with the AOVs {} take {} bytes each, {} in all; the limit is {}: ask for "
+                    "fewer AOVs or a smaller frame",
+                    s.size.width, s.size.height, fmt::join(s.aov, ", "), film_bytes_per_pixel(aovs), film,
+                    kMaxFilmBytes));
   if (spp < 1 || spp > kMaxSpp)
     return refuse(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
   const std::uint64_t tiles = TileGrid{s.size, s.tile}.count(), units = tiles * round_count(spp);

@@ -12,6 +12,7 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/base/frame_range.h"
+#include "common/image/aov.h"
 #include "common/image/frame.h"
 
 namespace ls {
@@ -24,9 +25,10 @@ struct RenderSettings {
   std::string integrator;        // as IntegratorSettings::name: resolved, never empty
   int max_depth = -1;            // -1: unlimited; as in the dialect: number of path segments
   int rr_depth = 5;              // first depth at which Russian roulette may act
-  std::vector<std::string> aov;  // sorted names; empty: colour only
+  std::vector<std::string> aov;  // sorted names, as of names_of(AovSet); empty: colour only
   bool operator==(const RenderSettings&) const = default;
 };
+AovSet aovs_of(const RenderSettings& settings);
 
 // The request, as in the HTTP contract's `spec` and the command line's options. Absent means: as the scene
 // says.

@@ -129,9 +129,10 @@ LS_TYPE(SphereShape, "shape", "sphere", "",
         "a ball's surface; `center` and `radius` act before `to_world`, which may not stretch it")
 LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
 LS_TYPE(MeshShape, "shape", "mesh", "obj, ply, serialized", "triangles from a file")
-LS_TYPE(CylinderShape, "shape", "cylinder", "",
-        "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it along "
-        "that line only")
+LS_TYPE(
+    CylinderShape, "shape", "cylinder", "",
+    "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it along "
+    "that line only")
 LS_TYPE(ShapeGroup, "shape", "shapegroup", "",
         "shapes that are seen where an `instance` of the group stands, and kept in memory once; they stand "
         "inside, placed within the group by their own `to_world`. Shapes that emit light, and instances, "
@@ -211,9 +212,8 @@ struct NamesOf<GridOrder> {
 };
 template <>
 struct NamesOf<MeshFormat> {
-  static constexpr Named<MeshFormat> all[] = {{"obj", MeshFormat::obj},
-                                               {"ply", MeshFormat::ply},
-                                               {"serialized", MeshFormat::serialized}};
+  static constexpr Named<MeshFormat> all[] = {
+      {"obj", MeshFormat::obj}, {"ply", MeshFormat::ply}, {"serialized", MeshFormat::serialized}};
 };
 template <>
 struct NamesOf<Projection> {

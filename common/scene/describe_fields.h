@@ -298,6 +298,11 @@ void describe(V& v, T& a) {
   v.field({.name = "sha256", .doc = "digest of its bytes", .derived = true}, a.digest);
   v.field({.name = "bytes", .doc = "its size", .derived = true}, a.bytes);
 }
+template <class V, Of<Label> T>
+void describe(V& v, T& l) {
+  v.field({.name = "name", .doc = "of the shape or instance", .derived = true}, l.name);
+  v.field({.name = "material", .doc = "of the shape's material", .derived = true}, l.material);
+}
 template <class V, Of<Scene> T>
 void describe(V& v, T& s) {
   v.field({.name = "assets", .doc = ""}, s.assets);
@@ -315,6 +320,9 @@ void describe(V& v, T& s) {
           s.sample_count);
   v.field({.name = "groups", .doc = ""}, s.groups);
   v.field({.name = "instances", .doc = ""}, s.instances);
+  v.field({.name = "aovs", .doc = "", .elided = true}, s.aovs);
+  v.field({.name = "shape_labels", .doc = "", .elided = true}, s.shape_labels);
+  v.field({.name = "instance_labels", .doc = "", .elided = true}, s.instance_labels);
 }
 
 // Anything that the table describes as an object.

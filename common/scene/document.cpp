@@ -229,8 +229,7 @@ class Loader {
       if (!parameters_.substitute(a)) return false;
     if (!check_attributes(e, {"filename"})) return false;
     const Span at = e.find("filename")->value_at;
-    const std::string name =
-        frame_ ? numbered(e.get("filename"), *frame_) : std::string(e.get("filename"));
+    const std::string name = frame_ ? numbered(e.get("filename"), *frame_) : std::string(e.get("filename"));
     if (static_cast<int>(including_.size()) >= kMaxIncludeDepth || ++includes_ > kMaxIncludes) {
       report_.error(at, fmt::format("includes are limited to {} within each other and {} altogether",
                                     kMaxIncludeDepth, kMaxIncludes));
@@ -297,6 +296,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   loader.warn_of_unused_defines(document.root);
   document.search_paths = std::move(loader.search_paths);
   document.frame = options.frame;
+  document.labels = options.labels;
   return document;
 }
 

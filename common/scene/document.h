@@ -34,6 +34,7 @@ struct Document {
   Element root;
   std::vector<std::string> search_paths;  // of <path>, the first to be tried first
   std::optional<std::uint32_t> frame;     // ReadOptions::frame
+  bool labels = false;                    // ReadOptions::labels
 };
 
 // XML text -> tree; nothing (and diagnostics) if it is malformed, not UTF-8 or beyond the limits. The only

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/scene/channels.h"
 #include "common/scene/describe_fields.h"
 #include "common/scene/integrators.h"
 #include "common/scene/known.h"
@@ -262,6 +263,15 @@ std::string old_files_section() {
   return out += kOldFiles[1];
 }
 
+std::string channel_names() {
+  std::vector<std::string> names;
+  for (const ChannelRow& row : channels())
+    if (row.mitsuba && !row.ours.empty())
+      names.push_back(row.theirs == row.ours ? fmt::format("`{}`", row.theirs)
+                                             : fmt::format("`{}` (here `{}`)", row.theirs, row.ours));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 std::string integrators_section() {
   std::string out = "Integrators by their names, in all versions:\n\n| name | means |\n|---|---|\n";
   for (const IntegratorRow& row : integrators())
@@ -270,9 +280,15 @@ std::string integrators_section() {
                          row.max_depth ? fmt::format(" with max_depth {}", *row.max_depth) : "",
                          row.other_method ? ", with a warning" : "");
   for (const WrapperRow& row : integrator_wrappers())
-    out += fmt::format("| `{}` | the integrator within it, with a warning: {} |\n", row.name, row.lost);
+    out += row.name == "aov"
+               ? fmt::format(
+                     "| `aov` | the integrator within it; its channels {} become layers of the image "
+                     "(docs/aovs.md) |\n",
+                     channel_names())
+               : fmt::format("| `{}` | the integrator within it, with a warning: {} |\n", row.name, row.lost);
   return out +
-         "\nLight that passes straight through a surface (`null`, `mask`, `thindielectric`) adds no segment to its "
+         "\nLight that passes straight through a surface (`null`, `mask`, `thindielectric`) adds no segment "
+         "to its "
          "path, and shadow rays go\non, as in Mitsuba's `volpath`; Mitsuba's `path` counts a segment there. "
          "Without a limit to the depth both are the same.\n\n";
 }
@@ -336,7 +352,8 @@ std::string scene_format_markdown() {
   out +=
       "A sampler, whatever its type, gives `sample_count` (default 4) samples a pixel. The films `ldrfilm`, "
       "`mfilm` and\n`tiledhdrfilm` are read as `hdrfilm`, with a warning.\n\n";
-  out += old_files_section() + nori::markdown() + meaningless_section() + unsupported_section() + names_section();
+  out += old_files_section() + nori::markdown() + meaningless_section() + unsupported_section() +
+         names_section();
   return out += kCanonical;
 }
 

@@ -182,6 +182,24 @@ void Pruner::lights() {
   note("light", "it is black", dark);
 }
 
+// Erases what `gone` says, and its label if there are labels. How many.
+template <class T, class Gone>
+std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, const Gone& gone) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (gone(all[i])) continue;
+    if (kept != i) {
+      all[kept] = std::move(all[i]);
+      if (!labels.empty()) labels[kept] = std::move(labels[i]);
+    }
+    ++kept;
+  }
+  const auto erased = static_cast<std::uint32_t>(all.size() - kept);
+  all.resize(kept);
+  if (!labels.empty()) labels.resize(kept);
+  return erased;
+}
+
 // Surfaces that light passes unchanged, that part no media and do not shine. A group that is left without
 // shapes goes, with its instances.
 void Pruner::invisible() {
@@ -189,13 +207,13 @@ void Pruner::invisible() {
     return std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition && !s.emitter;
   };
   note("surface", "light passes it unchanged, and there is no medium on either side",
-       static_cast<std::uint32_t>(std::erase_if(s_.shapes, unseen)));
+       erase_labelled(s_.shapes, s_.shape_labels, unseen));
   std::vector<bool> seen(s_.groups.size(), false);
   for (const Shape& s : s_.shapes)
     if (s.group) seen[s.group->value] = true;
   note("instance", "nothing of its group can be seen",
-       static_cast<std::uint32_t>(
-           std::erase_if(s_.instances, [&](const Instance& i) { return !seen[i.group.value]; })));
+       erase_labelled(s_.instances, s_.instance_labels,
+                      [&](const Instance& i) { return !seen[i.group.value]; }));
 }
 
 void Pruner::files(const std::vector<Asset>& before, const std::vector<Asset>& after) {

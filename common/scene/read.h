@@ -31,6 +31,7 @@ struct ReadOptions {
   bool strict = false;                         // warnings become errors
   // Of a sequence: a run of # in the name of a file stands for this number, and $frame is defined to be it.
   std::optional<std::uint32_t> frame = std::nullopt;
+  bool labels = false;  // fill Scene::shape_labels and instance_labels
 };
 
 struct ReadResult {

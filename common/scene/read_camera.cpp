@@ -194,12 +194,13 @@ void Reader::read_integrator(const Element& e, int depth) {
   const std::string_view type = e.get("type");
   Params p(*this, e);
   if (const WrapperRow* wrapper = wrapper_row(type)) {
-    check_channels(p);
+    read_channels(p);
     const auto inner = p.take_nested("integrator");
     if (inner.size() != 1)
       report_.error(e.at, fmt::format("{} needs one nested integrator, not {}", p.title(), inner.size()));
-    report_.warning(value_place(e, "type"),
-                    fmt::format("only the integrator within {} is used: {}", p.title(), wrapper->lost));
+    if (type != "aov" || scene_.aovs.empty())
+      report_.warning(value_place(e, "type"),
+                      fmt::format("only the integrator within {} is used: {}", p.title(), wrapper->lost));
     if (!inner.empty()) read_integrator(*inner[0].object, depth + 1);
     return p.finish();
   }
@@ -223,16 +224,6 @@ void Reader::refuse_distances(Params& p) {
     if (const Element* e = p.take(name))
       report_.error(e->at, fmt::format("'{}' is a parameter of the integrator \"{}\" alone, not of {}", name,
                                        kDistantMis, p.title()));
-}
-
-// Channels that a scene asks for and that are not written would be missed.
-void Reader::check_channels(Params& p) {
-  const Element* channels = p.take("aovs");
-  if (!channels || channels->get("value").find_first_not_of(" \t\r\n") == std::string_view::npos) return;
-  report_.error(value_place(*channels, "value"),
-                fmt::format("the extra channels \"{}\" can't be written by this version: put the nested "
-                            "integrator in the place of {}",
-                            channels->get("value"), p.title()));
 }
 
 }  // namespace ls::scene

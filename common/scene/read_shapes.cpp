@@ -78,6 +78,7 @@ void Reader::read_instance(const Element& e) {
   if (!group) return;
   instance.group = *group;
   scene_.instances.push_back(instance);
+  label_instance(e);
 }
 
 template <class T>
@@ -102,6 +103,7 @@ void Reader::read_geometry(const Element& e, T geometry) {
   check_placement(e, shape);
   check_attributes(e, shape);
   scene_.shapes.push_back(std::move(shape));
+  label_shape(e);
 }
 
 void Reader::read_shape_parts(Params& p, Shape& shape) {
@@ -127,6 +129,7 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
 
   const auto bsdfs = p.take_nested("bsdf");
   if (bsdfs.size() > 1) report_.error(bsdfs[1].use->at, fmt::format("{} has a second bsdf", p.title()));
+  material_ = bsdfs.empty() ? nullptr : bsdfs[0].object;
   if (!bsdfs.empty()) {
     if (const auto index = bsdf(*bsdfs[0].object, *bsdfs[0].use)) shape.bsdf = *index;
     return;

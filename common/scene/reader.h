@@ -116,7 +116,11 @@ class Reader {
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
   void refuse_distances(Params& p);
-  void check_channels(Params& p);
+  void read_channels(Params& p);
+
+  std::string fresh_label(std::string name, std::string_view type, std::size_t index);
+  void label_shape(const Element& e);  // the last of scene_
+  void label_instance(const Element& e);
 
   const Document& document_;
   AssetSource& assets_;
@@ -125,13 +129,15 @@ class Reader {
   Scene scene_;
   const Element* sensor_ = nullptr;
   const Element* integrator_ = nullptr;
+  const Element* material_ = nullptr;  // of the shape that was read last; nullptr: the default
+  std::unordered_set<std::string> labels_;
   // Films, filters and samplers of the top level, and which of them a sensor referred to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
   std::vector<BsdfTraits> bsdf_traits_;                // of the first bsdfs of scene_
 
-  std::map<TextureIndex, TextureIndex> old_numbers_;   // by the textures as they were read
+  std::map<TextureIndex, TextureIndex> old_numbers_;  // by the textures as they were read
   Memo<TextureIndex> textures_;
   Memo<BsdfIndex> bsdfs_;
   Memo<VolumeIndex> volumes_;

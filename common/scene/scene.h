@@ -137,8 +137,9 @@ struct BlendBsdf {  // (1 - weight) first + weight second
   bool operator==(const BlendBsdf&) const = default;
 };
 // Both kinds of map: flip_invalid_normals turns a normal by half a circle about the surface's where it would
-// face away from the viewer (Schuessler et al. 2017); use_shadowing_function darkens by the shadow that facets
-// of the map's slope would cast (Estevez, Lecocq, Stein 2019). With either, light does not go both ways alike.
+// face away from the viewer (Schuessler et al. 2017); use_shadowing_function darkens by the shadow that
+// facets of the map's slope would cast (Estevez, Lecocq, Stein 2019). With either, light does not go both
+// ways alike.
 struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
   TextureIndex normalmap;
   BsdfIndex bsdf;
@@ -203,8 +204,8 @@ struct HgPhase {
 };
 using Phase = std::variant<IsotropicPhase, HgPhase>;
 
-// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale. What it
-// emits per length is emission + sigma_a * source_radiance.
+// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale. What
+// it emits per length is emission + sigma_a * source_radiance.
 struct HomogeneousMedium {
   Rgb sigma_t{1, 1, 1};
   Rgb albedo{.75, .75, .75};
@@ -223,7 +224,8 @@ struct HeterogeneousMedium {
   PhaseIndex phase;
   std::optional<VolumeIndex> emission;         // radiance per scene unit, whatever the extinction
   std::optional<VolumeIndex> source_radiance;  // emits sigma_a times it
-  // Emits sigma_a times the radiance of a black body of temperature_offset + temperature_scale * value kelvin.
+  // Emits sigma_a times the radiance of a black body of temperature_offset + temperature_scale * value
+  // kelvin.
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on what is emitted
   double temperature_scale = 1, temperature_offset = 0;
@@ -295,6 +297,12 @@ struct IntegratorSettings {
   bool operator==(const IntegratorSettings&) const = default;
 };
 
+// What people call a shape or an instance, and its material; for the names of mattes only.
+struct Label {
+  std::string name, material;  // material: empty for instances
+  bool operator==(const Label&) const = default;
+};
+
 struct Scene {
   std::vector<Asset> assets;
   std::vector<Texture> textures;
@@ -310,6 +318,9 @@ struct Scene {
   std::uint64_t sample_count = 4;
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
+  std::string aovs;  // further outputs that the scene asks for: names of common/image/aov.h, comma between
+  // Of each shape and instance; empty unless they were asked for (ReadOptions::labels).
+  std::vector<Label> shape_labels, instance_labels;
   bool operator==(const Scene&) const = default;
 };
 

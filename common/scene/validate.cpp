@@ -105,6 +105,7 @@ class Checker {
     if (wrong_.empty()) check_texture_nesting();
     if (wrong_.empty()) check_groups();
     if (wrong_.empty()) check_crop();
+    if (wrong_.empty()) check_labels();
     if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
     return wrong_;
@@ -153,6 +154,14 @@ class Checker {
     }
     if (wrong_.empty() && seen != s_.groups.size()) wrong_ = "scene.groups: a group has no shapes";
   }
+  void check_labels() {
+    const auto fits = [](const auto& labels, const auto& things) {
+      return labels.empty() || labels.size() == things.size();
+    };
+    if (!fits(s_.shape_labels, s_.shapes)) wrong_ = "scene.shape_labels are not as many as the shapes";
+    if (!fits(s_.instance_labels, s_.instances))
+      wrong_ = "scene.instance_labels are not as many as the instances";
+  }
   void check_crop() {
     const FilmSettings& f = s_.film;
     const auto outside = [](int offset, int width, int whole) {
@@ -193,8 +202,14 @@ class Compactor {
   Scene run() {
     std::vector<bool> placed(from_.groups.size(), false);
     for (const Instance& i : from_.instances) placed[i.group.value] = true;
-    for (const Shape& s : from_.shapes)
-      if (!s.group || placed[s.group->value]) to_.shapes.push_back(s);
+    for (std::size_t i = 0; i < from_.shapes.size(); ++i) {
+      const Shape& s = from_.shapes[i];
+      if (s.group && !placed[s.group->value]) continue;
+      to_.shapes.push_back(s);
+      if (!from_.shape_labels.empty()) to_.shape_labels.push_back(from_.shape_labels[i]);
+    }
+    to_.instance_labels = from_.instance_labels;
+    to_.aovs = from_.aovs;
     to_.emitters = from_.emitters;
     to_.sensor = from_.sensor;
     to_.film = from_.film;

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "common/base/check.h"
+#include "common/scene/channels.h"
 #include "common/scene/describe_fields.h"
 #include "common/scene/integrators.h"
 
@@ -267,12 +268,17 @@ class Writer {
   void write_integrator() {
     const IntegratorSettings& i = scene_.integrator;
     WithoutDistances plain{*this};
+    if (!scene_.aovs.empty()) {
+      open("integrator", "aov", "", "");
+      value("string", "aovs", mitsuba_channels(scene_.aovs));
+    }
     open("integrator", plugin(i), "", "");
     if (i.name == kDistantMis)
       describe(*this, i);
     else
       describe(plain, i);
     close("integrator");
+    if (!scene_.aovs.empty()) close("integrator");
   }
 
   // Of a camera, what its plugin knows.

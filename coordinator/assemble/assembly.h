@@ -26,7 +26,8 @@ struct WaitingPartial {
 
 class Assembly {
  public:
-  Assembly(TileGrid grid, bool keep_relative) : film_(grid), errors_(grid.count(), keep_relative) {}
+  Assembly(TileGrid grid, bool keep_relative, AovSet aovs = {})
+      : film_(grid, aovs), errors_(grid.count(), keep_relative) {}
   Assembly(Film film, RoundErrors errors, HealthBook health)
       : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)) {}
 
@@ -58,11 +59,11 @@ class Assembly {
 };
 
 // The folded state as a file: {"LSSNAP1\n", build, film, error figures, health}, closed by a SHA-256. Returned as
-// nothing if it is missing, damaged, of another grid or another build: then everything is folded again from
-// the partials.
+// nothing if it is missing, damaged, of another grid, other AOVs or another build: then everything is folded
+// again from the partials.
 std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, const HealthBook& health,
                                      std::string_view build);
 std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
-                                      bool keep_relative, std::string_view build);
+                                      bool keep_relative, std::string_view build, AovSet aovs = {});
 
 }  // namespace ls::coordinator

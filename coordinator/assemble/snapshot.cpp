@@ -47,7 +47,7 @@ std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors
 }
 
 std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
-                                      bool keep_relative, std::string_view build) {
+                                      bool keep_relative, std::string_view build, AovSet aovs) {
   constexpr std::size_t kSeal = 32;
   if (bytes.size() < kMagic.size() + kSeal) return std::nullopt;
   if (std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) return std::nullopt;
@@ -63,7 +63,7 @@ std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const Ti
   if (!by || !film_bytes || !error_bytes || !health_bytes || !rest.empty()) return std::nullopt;
   if (std::string_view(reinterpret_cast<const char*>(by->data()), by->size()) != build) return std::nullopt;
   auto film = Film::load(*film_bytes);
-  if (!film || film->grid() != grid) return std::nullopt;
+  if (!film || film->grid() != grid || film->aovs() != aovs) return std::nullopt;
   auto errors = RoundErrors::load(*error_bytes, grid.count(), keep_relative);
   if (!errors) return std::nullopt;
   auto health = HealthBook::load({reinterpret_cast<const char*>(health_bytes->data()), health_bytes->size()});

@@ -25,7 +25,7 @@ bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex ro
 
 }  // namespace
 
-Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame) {
+Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame, AovSet aovs) {
   if (result.exr.size() > ls::limits::kPartialBytes)
     return bad(
         result, Errc::resource_exhausted,
@@ -34,10 +34,11 @@ Verified verify_result(const UnitResult& result, const UnitHeader& expected, Fra
     return bad(result, Errc::invalid_argument, "its CPU time is not a number of seconds");
   if (const auto sound = check_health(result.health, expected.tile, round_range(result.unit.round)); !sound)
     return bad(result, sound.error().code, sound.error().message);
-  auto partial = decode_partial(result.exr, expected, frame);
+  auto partial = decode_partial(result.exr, expected, frame, aovs);
   if (!partial) {
     const auto own = decode_partial_file(result.exr);
-    if (own && own->frame == frame && same_round(own->partial.header, expected, result.unit.round) &&
+    if (own && own->frame == frame && own->partial.aovs == aovs &&
+        same_round(own->partial.header, expected, result.unit.round) &&
         unit_digest(own->partial) == result.digest)
       return OtherRange{own->partial.header.samples};
     return bad(result, partial.error().code, partial.error().message);

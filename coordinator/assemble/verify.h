@@ -19,6 +19,7 @@ struct BadResult {
 };
 using Verified = std::variant<Partial, OtherRange, BadResult>;
 
-Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame);
+Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame,
+                       AovSet aovs = {});
 
 }  // namespace ls::coordinator

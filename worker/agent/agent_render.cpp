@@ -10,12 +10,12 @@
 namespace ls::worker {
 namespace {
 
-constexpr std::int64_t kBytesPerPixel = kPartialChannels * 4;
 constexpr std::int64_t kExrOverhead = 16 << 10;  // header and line offsets
 
 // A result that would not fit into a message is refused before it costs anything.
-std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
-  const std::int64_t bytes = unit.rect.pixels() * kBytesPerPixel + kExrOverhead;
+std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
+  const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
+  const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
   if (bytes <= static_cast<std::int64_t>(limits::kPartialBytes)) return std::nullopt;
   return UnitFailure{
       .scene_at_fault = true,
@@ -28,7 +28,7 @@ std::optional<UnitFailure> too_large(const LeaseUnit& unit) {
 
 tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                                  const LeaseBook::Held& held) {
-  if (auto failure = too_large(held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
+  if (auto failure = too_large(job, held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
   auto rendered = backend.render(job, held.unit, slot.stop);
   if (!rendered) {
     slot.last_job = {};

@@ -26,6 +26,11 @@ using child::Slot;
 // fails another unit, and the farm gives a worker no more of a job after three: an innocent one must not run
 // out before the guilty do.
 constexpr int kInnocentDeaths = 64;
+
+std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
+  return static_cast<std::size_t>(unit.rect.pixels()) *
+         (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
+}
 constexpr Duration kStopLimit = std::chrono::seconds(10);  // from the stop flag to its obedience
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
@@ -240,8 +245,7 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
 
 tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job, const LeaseUnit& unit,
                                                              const std::atomic<bool>& stop) {
-  if (unit.rect.pixels() > static_cast<std::int64_t>(child::kSlotPixels))
-    return failed("the tile is too large");
+  if (floats_of(job, unit) > child::kSlotFloats) return failed("the tile is too large");
   int slot = -1;
   {
     const std::lock_guard lock(mutex_);
@@ -304,7 +308,8 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   RenderedUnit out;
   const JobBrief& brief = job.brief;
   out.partial.header = {brief.scene, brief.settings_digest, numeric_class_, unit.rect, unit.samples};
-  out.partial.sums.assign(slot.sums, slot.sums + unit.rect.pixels() * kPartialChannels);
+  out.partial.sums.assign(slot.sums, slot.sums + floats_of(job, unit));
+  out.partial.aovs = aovs_of(brief.settings);
   out.cpu_seconds = reply.cpu_seconds;
   out.wall_seconds = reply.wall_seconds;
   if (!answer->text.empty()) {

@@ -33,7 +33,8 @@ inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
 inline constexpr std::size_t kReasonBytes = 64 << 10;  // of a reply
 
-inline constexpr std::size_t kSlotPixels = 202 * 202;  // the largest tile whose partial fits a message
+// The largest partial that fits a message: of a tile of 202 x 202 pixels without AOVs.
+inline constexpr std::size_t kSlotFloats = 202 * 202 * 6;
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
 
@@ -63,7 +64,7 @@ struct Slot {
   std::atomic<std::int32_t> tile{-1}, round{-1};
   std::atomic<bool> stop{false};     // set by the parent
   std::atomic<bool> crashed{false};  // set by the child's signal handler: this thread is the guilty one
-  float sums[kSlotPixels * 6];
+  float sums[kSlotFloats];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 

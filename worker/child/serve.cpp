@@ -151,7 +151,7 @@ class Server {
     }
     if (!rendered) return refused(reply, rendered.error());
     const std::vector<float>& sums = rendered->partial.sums;
-    if (sums.size() > kSlotPixels * 6) return refused(reply, UnitFailure{.reason = "the tile is too large"});
+    if (sums.size() > kSlotFloats) return refused(reply, UnitFailure{.reason = "the tile is too large"});
     std::copy(sums.begin(), sums.end(), slot.sums);
     reply.cpu_seconds = rendered->cpu_seconds;
     reply.wall_seconds = rendered->wall_seconds;

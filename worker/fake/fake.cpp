@@ -49,7 +49,8 @@ class FakeBackend final : public LocalBackend {
     if (!pause(stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
     out.partial =
-        fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples});
+        fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples},
+                     aovs_of(brief.settings));
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
     if (faulty && options_.fault.kind == FakeFault::Kind::unwell)
       out.health.add(HealthCause::infinite, 2, {unit.rect.x0, unit.rect.y0, unit.samples.s0});

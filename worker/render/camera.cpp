@@ -83,6 +83,13 @@ CameraRay Camera::perspective_ray(double x, double y, float aperture, V2 lens) c
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
 }
 
+float Camera::near_distance(const V3& d) const {
+  if (projection_ == Projection::spherical) return 0;
+  const double along = axis_z_.length();
+  if (projection_ == Projection::orthographic) return static_cast<float>(near_ * along);
+  return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
+}
+
 // As in Mitsuba the near plane is where to_world puts it, stretched or not, and from there the ray reaches
 // far - near.
 CameraRay Camera::orthographic_ray(double x, double y) const {

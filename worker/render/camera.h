@@ -28,6 +28,8 @@ class Camera {
   CameraRay ray(double fx, double fy, V2 lens) const;
   // Whether all its rays have a beginning and a direction in the range of float32.
   bool usable() const;
+  // From the camera, or its lens, to where a ray of this direction starts.
+  float near_distance(const V3& d) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 

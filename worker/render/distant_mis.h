@@ -178,7 +178,7 @@ class SegmentLight {
     const C3 arriving = path.unoccluded(p, p, *light, path.medium_, RandomStream(stream.next()));
     if (is_black(arriving)) return;
     const C3 through = transmittance<F>(medium, path.start_, path.d_, 0, spot.t, RandomStream(stream.next()));
-    path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)));
+    path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)), true);
   }
 };
 

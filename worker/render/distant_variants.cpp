@@ -9,9 +9,9 @@ std::span<const Variant> distant_variants() {
       variant<Features{}>("surfaces"),
       variant<Features{.media = true}, SegmentLight>("homogeneous grey media"),
       variant<Features{.media = true, .grids = true}, SegmentLight>("grey grids"),
-      variant<kEverything, SegmentLight>("everything"),
+      variant<kEveryScene, SegmentLight>("everything"),
   };
-  static_assert(std::end(kVariants)[-1].covers == kEverything);
+  static_assert(std::end(kVariants)[-1].covers == kEveryScene);
   return kVariants;
 }
 

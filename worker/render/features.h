@@ -10,14 +10,21 @@ struct Features {
   bool chromatic = false;  // extinction that differs between channels
   bool emission = false;   // media that give off light
   bool overlaps = false;   // media within or across each other (media_state.h)
+  bool split = false;      // AOVs of light: each sample's radiance in its parts (light_split.h)
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
-           (emission || !need.emission) && (overlaps || !need.overlaps);
+           (emission || !need.emission) && (overlaps || !need.overlaps) && (split || !need.split);
   }
 };
-inline constexpr Features kEverything{
+inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true};
+inline constexpr Features kEverything{.media = true,
+                                      .grids = true,
+                                      .chromatic = true,
+                                      .emission = true,
+                                      .overlaps = true,
+                                      .split = true};
 
 }  // namespace ls::render

@@ -20,6 +20,7 @@
 #include <type_traits>
 
 #include "worker/render/built.h"
+#include "worker/render/light_split.h"
 #include "worker/render/media_state.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
@@ -48,12 +49,21 @@ struct SampleOutcome {
   }
 };
 
+struct FirstSurface {
+  SurfaceHit hit;
+  float not_passed = 1;  // 1 over the share of light that the surface does not let pass straight on
+};
+
 template <Features F, template <Features> class Light = VertexLight>
 class PathTracer {
  public:
-  PathTracer(const World& world, const SampleStream& stream) : world_(world), stream_(stream) {}
+  // `split`: where the parts of the radiance are added up; needed with F.split, else not looked at.
+  PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr)
+      : world_(world), stream_(stream), split_(split) {}
 
   SampleOutcome trace(const CameraRay& ray);
+  // The first surface at which the path is scattered where there are no media; for AOVs (path_first.h).
+  std::optional<FirstSurface> first_surface(const CameraRay& ray);
 
  private:
   friend class Light<F>;
@@ -93,11 +103,14 @@ class PathTracer {
   void prefer_scatterer(SurfaceHit& hit) const;
   bool survives(float u);
 
-  void add(const C3& weighted) {
-    if constexpr (F.chromatic) {
-      outcome_.radiance += weighted / mean(density_);
-    } else {
-      outcome_.radiance += weighted;
+  // `ahead`: of light that is scattered once more than the path so far, in the medium ahead of it.
+  void add(const C3& weighted, bool ahead = false) {
+    C3 light = weighted;
+    if constexpr (F.chromatic) light = weighted / mean(density_);
+    outcome_.radiance += light;
+    if constexpr (F.split) {
+      const bool in_medium = depth_ == 0 ? ahead : first_in_medium_;
+      (*split_)[static_cast<std::size_t>(part_of(depth_ + ahead, in_medium))] += light;
     }
   }
   static float mean(const C3& c) { return (c.x + c.y + c.z) / 3; }
@@ -120,6 +133,7 @@ class PathTracer {
 
   const World& world_;
   const SampleStream& stream_;
+  LightSplit* split_;
   // Where the path stands, and where its next ray is sent from: moved off a surface, so that it does not meet
   // it again. A medium fills the way between them too (over a mean free path of a medium of optical depth
   // 1e6).
@@ -130,6 +144,7 @@ class PathTracer {
   int depth_ = 0;    // scatterings so far
   int segment_ = 0;  // rays so far, null crossings included
   Within medium_;
+  bool first_in_medium_ = false;  // the first scattering was; with F.split
   Vertex last_;
   SampleOutcome outcome_;
   MediumCounters counters_;
@@ -208,6 +223,7 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
   last_.delta = false;
   last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
   apply(flight);
+  if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
   ++depth_;
   Light<F>::at_vertex(*this, medium, last_.p, d_);
   const Group direction = stream_.group(depth_, Purpose::direction);
@@ -331,6 +347,7 @@ bool PathTracer<F, Light>::survives(float u) {
 
 }  // namespace ls::render
 
+#include "worker/render/path_first.h"
 #include "worker/render/path_glow.h"
 #include "worker/render/path_media.h"
 #include "worker/render/path_overlap.h"

@@ -43,6 +43,7 @@ std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) 
   last_.p = clear_of_ends(start_ + d_ * flight.t, segment, flight.t);
   last_.delta = false;
   apply(flight);
+  if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
   ++depth_;
   light_vertex(*met, last_.p, d_);
   const Group direction = stream_.group(depth_, Purpose::direction);

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "worker/render/aov_pixel.h"
+#include "worker/render/rounded.h"
 #include "worker/render/variant.h"
 #include "worker/render/world.h"
 
@@ -22,26 +24,26 @@ class FlushDenormals {
   unsigned saved_;
 };
 
-// Cheapest first; the last covers everything.
+// Cheapest first; the last covers every scene.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
     variant<Features{.media = true}>("homogeneous grey media"),
     variant<Features{.media = true, .chromatic = true}>("homogeneous chromatic media"),
     variant<Features{.media = true, .grids = true}>("grey grids"),
     variant<Features{.media = true, .grids = true, .chromatic = true}>("chromatic grids"),
-    variant<kEverything>("everything"),
+    variant<kEveryScene>("everything"),
 };
-static_assert(std::end(kVariants)[-1].covers == kEverything);
+static_assert(std::end(kVariants)[-1].covers == kEveryScene);
 
 std::span<const Variant> variants_for(const World& w) {
   return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
 }
+const Variant& split_variant(const World& w) { return w.distant_mis ? kDistantSplitVariant : kSplitVariant; }
 const Variant& choose(const World& w) {
-  const auto variants = variants_for(w);
-  for (const Variant& v : variants) {
+  for (const Variant& v : variants_for(w)) {
     if (v.covers.covers(w.need)) return v;
   }
-  return variants.back();
+  return split_variant(w);
 }
 
 // What a sum in float32 can hold of 2^31 samples. A larger sample is an error of the scene; added up it would
@@ -75,12 +77,24 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
+// What is done beside the colour's sums: nothing, or an AovPixel.
+struct NoAovs {
+  static LightSplit* split() { return nullptr; }
+  static void begin_pixel() {}
+  static void begin_sample() {}
+  static void end_sample(int, int, std::uint64_t, bool) {}
+  static void store(float*, std::size_t, std::size_t) {}
+};
+
+template <class Aovs>
 PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range, Health& health,
-                       Breadcrumb* crumb) {
+                       Breadcrumb* crumb, Aovs& aovs) {
   PixelSums sums;
   for (std::uint64_t s = range.s0; s < range.s1; ++s) {
     if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
-    const SampleOutcome out = sample(w, x, y, s);
+    aovs.begin_sample();
+    const SampleOutcome out = sample(w, x, y, s, aovs.split());
+    aovs.end_sample(x, y, s, usable(out));
     // A sample that went wrong is counted, contributes zero and stays in N: never drawn again (STABILITY
     // N54).
     const bool add = usable(out);
@@ -93,19 +107,13 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
   return sums;
 }
 
-// One rounding to float32; denormals become 0 here, where the mode of the process that folds can't matter any
-// more.
-float rounded(double sum) {
-  const auto f = static_cast<float>(sum);
-  return std::abs(f) < 0x1p-126f ? 0.f : f;
-}
-
+template <class Aovs>
 TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
-                            const std::atomic<bool>* stop, Breadcrumb* crumb) {
+                            const std::atomic<bool>* stop, Breadcrumb* crumb, Aovs aovs) {
   const FlushDenormals mode;
   TileResult r;
   const auto pixels = static_cast<std::size_t>(tile.pixels());
-  r.sums.assign(6 * pixels, 0.f);
+  r.sums.assign((6 + planes_of(w.aovs).count()) * pixels, 0.f);
   std::size_t i = 0;
   for (int y = tile.y0; y < tile.y1; ++y) {
     if (stop && stop->load(std::memory_order_relaxed)) {
@@ -117,12 +125,24 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
         crumb->x.store(x, std::memory_order_relaxed);
         crumb->y.store(y, std::memory_order_relaxed);
       }
-      const PixelSums sums = render_pixel(w, sample, x, y, range, r.health, crumb);
+      aovs.begin_pixel();
+      const PixelSums sums = render_pixel(w, sample, x, y, range, r.health, crumb, aovs);
+      aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
     }
   }
   return r;
+}
+TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+                            const std::atomic<bool>* stop, Breadcrumb* crumb) {
+  if (w.aovs.empty()) return render_tile_with(w, sample, tile, range, stop, crumb, NoAovs{});
+  return render_tile_with(w, sample, tile, range, stop, crumb, AovPixel(w));
+}
+
+// With a variant that splits the light, asked for or not.
+TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
+  return render_tile_with(w, v.sample, tile, range, nullptr, nullptr, AovPixel(w));
 }
 
 }  // namespace
@@ -143,6 +163,7 @@ std::vector<std::string> covering_variants(const World& world) {
   for (const Variant& v : variants_for(world)) {
     if (v.covers.covers(world.need)) names.emplace_back(v.name);
   }
+  names.emplace_back(split_variant(world).name);
   return names;
 }
 
@@ -150,12 +171,15 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
   for (const Variant& v : variants_for(world)) {
     if (name == v.name) return render_tile_with(world, v.sample, tile, samples, nullptr, nullptr);
   }
+  const Variant& split = split_variant(world);
+  if (name == split.name) return render_split(world, split, tile, samples);
   return {};
 }
 
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
-  const SampleOutcome out = choose(world).sample(world, x, y, sample);
+  LightSplit split{};
+  const SampleOutcome out = choose(world).sample(world, x, y, sample, &split);
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;

@@ -37,8 +37,8 @@ struct Breadcrumb {
 };
 
 struct TileResult {
-  std::vector<float> sums;  // six planes, see common/image/partial.h
-  Health health;             // of the samples, by cause and pixel; not of the inputs
+  std::vector<float> sums;  // planes, see common/image/partial.h: six, and those of the settings' AOVs
+  Health health;            // of the samples, by cause and pixel; not of the inputs
   bool stopped = false;  // `stop` was seen: sums are not valid
 };
 

@@ -27,7 +27,8 @@ enum class Purpose : std::uint32_t {
   distance,
   track_distance,
   overlap,
-  overlap_emission
+  overlap_emission,
+  albedo
 };
 
 // Four numbers of one purpose at one path vertex.

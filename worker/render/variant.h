@@ -10,7 +10,8 @@
 
 namespace ls::render {
 
-using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t);
+// The last: where a variant with Features::split adds up the parts of the light; else not looked at.
+using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*);
 struct Variant {
   Features covers;
   const char* name;
@@ -23,12 +24,13 @@ inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, i
   return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
 }
 template <Features F, template <Features> class Light>
-SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample) {
-  if constexpr (!kBuilt.features.covers(F)) return {.cut_off = true};  // build_world refuses such scenes
+SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample, LightSplit* split) {
+  if constexpr (!kBuilt.features.covers(F))
+    return {.cut_off = HealthCause::unnamed};  // build_world refuses such scenes
   x += w.origin_x;
   y += w.origin_y;
   const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
-  return PathTracer<F, Light>(w, stream).trace(camera_ray(w, stream, x, y));
+  return PathTracer<F, Light>(w, stream, split).trace(camera_ray(w, stream, x, y));
 }
 
 template <Features F, template <Features> class Light = VertexLight>
@@ -36,7 +38,9 @@ constexpr Variant variant(const char* name) {
   return {F, name, &sample_with<F, Light>};
 }
 
-// Of `volpath_distant_mis`; cheapest first, the last covers everything.
+// Of `volpath_distant_mis`; cheapest first, the last covers every scene.
 std::span<const Variant> distant_variants();
+// Of `volpath` and of `volpath_distant_mis`: every scene, with the light in its parts.
+extern const Variant kSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

@@ -110,7 +110,7 @@ class VertexLight {
     if (is_black(arriving)) return;
     C3 in_scattered;
     for (int c = 0; c < 3; ++c) in_scattered[c] = medium.sigma_s[c] * std::exp(-medium.sigma_t[c] * s.t);
-    path.add(path.beta_ * in_scattered * arriving * (phase * weight / (light->pdf * s.pdf)));
+    path.add(path.beta_ * in_scattered * arriving * (phase * weight / (light->pdf * s.pdf)), true);
   }
 };
 

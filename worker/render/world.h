@@ -4,6 +4,7 @@
 #include <deque>
 #include <vector>
 
+#include "common/image/aov.h"
 #include "common/scene/needs.h"
 #include "worker/render/accel.h"
 #include "worker/render/bsdf/bsdf.h"
@@ -54,6 +55,11 @@ class World {
   FrameSize size;
   // Of the image in the full frame, in pixels: the pixels of a crop are those of the frame.
   int origin_x = 0, origin_y = 0;
+
+  AovSet aovs;
+  // For the AOVs of these names: identifiers of each surface, and of each instance what the surfaces have
+  // else.
+  std::vector<float> shape_ids, material_ids, instance_ids;
 
   Health inputs;  // what was changed of the scene's inputs, by cause
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/assets/image.h"
+#include "common/image/cryptomatte.h"
 #include "common/scene/integrators.h"
 #include "worker/render/built.h"
 #include "worker/render/coincident.h"
@@ -48,11 +49,27 @@ void note_surface_needs(const Scene& scene, World& w) {
     SurfaceInfo& s = w.geometry.surfaces[i];
     const auto& emitter = scene.shapes[i].emitter;
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
+    // Of a mesh uv changes nothing else; other shapes' frames would turn, and with them the samples.
+    s.wants_uv = s.wants_uv || (w.aovs.has(Aov::uv) && s.uvs);
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
     s.smooth = w.bsdfs.has_smooth(s.bsdf);
     w.veils = w.veils || s.veil;
   }
+}
+
+// Identifiers of the names that mattes have; of their number in the list where the scene brings none.
+void name_surfaces(const Scene& scene, World& w) {
+  const auto id = [](const std::vector<Label>& labels, std::size_t i, auto member,
+                     std::string_view else_named) {
+    return matte_id(i < labels.size() ? labels[i].*member : fmt::format("{}_{}", else_named, i));
+  };
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    w.shape_ids.push_back(id(scene.shape_labels, i, &Label::name, "shape"));
+    w.material_ids.push_back(id(scene.shape_labels, i, &Label::material, "material"));
+  }
+  for (std::size_t i = 0; i < scene.instances.size(); ++i)
+    w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
 }
 
 // A crop is rendered with the pixels of the whole frame, those that it has: the same samples give the same
@@ -115,6 +132,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   World& w = *world;
   const AssetLoader loader{scene, files};
   w.seed = settings.seed;
+  w.aovs = aovs_of(settings);
   w.size = settings.size;
   w.max_depth = settings.max_depth;
   w.rr_depth = settings.rr_depth;
@@ -179,6 +197,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = w.need.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
+  w.need.split = w.aovs.any_of(aovs_of(AovKind::light));
+  if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();

@@ -98,10 +98,22 @@ INSTANTIATE_TEST_SUITE_P(
              "<volume type=\"gridvolume\"><string name=\"filename\" value=\"cloud.vol\"/><boolean "
              "name=\"node_centred\" value=\"true\"/><string name=\"wrap_mode\" value=\"repeat\"/></volume>",
              2, "can only be clamp"},
-        Case{"ChannelsThatAreNotWritten",
-             "<integrator type=\"aov\"><string name=\"aovs\" value=\"dd.y:depth\"/><integrator "
+        Case{"ChannelThatIsNotWritten",
+             "<integrator type=\"aov\"><string name=\"aovs\" value=\"dd:depth,u:dp_du\"/><integrator "
              "type=\"path\"/></integrator>",
-             51, "the extra channels \"dd.y:depth\" can't be written by this version"},
+             51, "the channel \"dp_du\" can't be written by this version; there are albedo, depth,"},
+        Case{"ChannelByNumber",
+             "<integrator type=\"aov\"><string name=\"aovs\" value=\"i:shape_index\"/><integrator "
+             "type=\"path\"/></integrator>",
+             51, "--aov shape_id writes mattes"},
+        Case{"UnknownChannel",
+             "<integrator type=\"aov\"><string name=\"aovs\" value=\"n:sh_norml\"/><integrator "
+             "type=\"path\"/></integrator>",
+             51, "there is no channel \"sh_norml\"; did you mean 'sh_normal'?"},
+        Case{"ChannelWithoutLabel",
+             "<integrator type=\"aov\"><string name=\"aovs\" value=\"depth\"/><integrator "
+             "type=\"path\"/></integrator>",
+             51, "\"depth\" of 'aovs' is not written as label:channel"},
         Case{"WrapperOfNothing", "<integrator type=\"moment\"/>", 2, "needs one nested integrator, not 0"},
         Case{"UnknownReference", shape("<ref id=\"steem\"/>") + "<bsdf type=\"null\" id=\"steam\"/>", 31,
              "no object has the id \"steem\"; did you mean \"steam\" (line 2)?"},

@@ -1,0 +1,61 @@
+"""Channels and header strings of the images that we write (scanline, ZIP), read without a library: what a test compares."""
+
+import struct
+import zlib
+
+TYPES = {0: "I", 1: "e", 2: "f"}
+LINES = 16  # of a ZIP block
+
+
+def _text(data, at):
+    end = data.index(0, at)
+    return data[at:end].decode(), end + 1
+
+
+def _header(data):
+    assert data[:4] == b"\x76\x2f\x31\x01", "no EXR file"
+    at, found = 8, {}
+    while data[at]:
+        name, at = _text(data, at)
+        kind, at = _text(data, at)
+        size, = struct.unpack_from("<i", data, at)
+        found[name] = (kind, data[at + 4:at + 4 + size])
+        at += 4 + size
+    return found, at + 1
+
+
+def _unzipped(block, size):
+    if len(block) == size:
+        return block
+    raw = bytearray(zlib.decompress(block))
+    for i in range(1, len(raw)):
+        raw[i] = (raw[i - 1] + raw[i] - 128) & 255
+    half = (len(raw) + 1) // 2
+    out = bytearray(len(raw))
+    out[0::2], out[1::2] = raw[:half], raw[half:]
+    return bytes(out)
+
+
+def read(path):
+    """({channel: rows of numbers}, {name: string of the header}, {channel: its type, one of "Ief"})."""
+    data = path.read_bytes()
+    header, at = _header(data)
+    channels, raw, place = [], header["channels"][1], 0
+    while raw[place]:
+        name, place = _text(raw, place)
+        channels.append((name, TYPES[struct.unpack_from("<i", raw, place)[0]]))
+        place += 16
+    x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"][1])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    line = sum(struct.calcsize("<" + kind) * width for _, kind in channels)
+    rows = {name: [None] * height for name, _ in channels}
+    for offset in struct.unpack_from(f"<{-(-height // LINES)}Q", data, at):
+        first, size = struct.unpack_from("<2i", data, offset)
+        lines = min(LINES, y1 + 1 - first)
+        block, place = _unzipped(data[offset + 8:offset + 8 + size], lines * line), 0
+        for y in range(first - y0, first - y0 + lines):
+            for name, kind in channels:
+                rows[name][y] = struct.unpack_from(f"<{width}{kind}", block, place)
+                place += struct.calcsize("<" + kind) * width
+    strings = {name: value.decode() for name, (kind, value) in header.items() if kind == "string"}
+    return rows, strings, dict(channels)

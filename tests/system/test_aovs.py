@@ -1,0 +1,138 @@
+"""AOVs end to end: the same layers however they are computed, and the same colour with and without them."""
+
+import json
+import os
+import struct
+
+import pytest
+from cli_kit import FOG, digest, lightshaft, write_fog
+from exr_layers import read
+
+SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
+ALL = ("albedo,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,position,shape_id,single,"
+       "surface,uv,volume")
+
+
+@pytest.fixture(scope="module")
+def fog(tmp_path_factory):
+    """The fog, and a named floor below it."""
+    scene = write_fog(tmp_path_factory.mktemp("fog"))
+    floor = ('<bsdf type="diffuse" id="plaster"/><shape type="rectangle" id="floor"><transform name="to_world">'
+             '<rotate x="1" angle="-90"/><scale value="3"/><translate y="-1.2"/></transform><ref id="plaster"/></shape>')
+    scene.write_text(FOG.replace("<emitter type=\"constant\">", floor + "<emitter type=\"constant\">"))
+    return scene
+
+
+def render(scene, out, *flags, spp=SPP, **options):
+    return lightshaft("render", scene, "-o", out, "--spp", spp, *flags, **options)
+
+
+@pytest.fixture(scope="module")
+def expected(fog, tmp_path_factory):
+    """(digest of the colour without AOVs, the image with all of them), from one thread."""
+    folder = tmp_path_factory.mktemp("one")
+    plain = digest(render(fog, folder / "plain.exr", "--threads", 1))
+    assert digest(render(fog, folder / "out.exr", "--aov", ALL, "--threads", 1)) == plain
+    return plain, folder / "out.exr"
+
+
+def layers(path):
+    return read(path)[0]
+
+
+@pytest.mark.parametrize("flags", [("--threads", "3"), ("--isolate", "--threads", "2")], ids=" ".join)
+def test_threads_and_isolation_do_not_change_a_layer(fog, expected, tmp_path, flags):
+    assert digest(render(fog, tmp_path / "out.exr", "--aov", ALL, *flags)) == expected[0]
+    assert layers(tmp_path / "out.exr") == layers(expected[1])
+
+
+def test_what_every_image_has_may_be_asked_for_and_adds_nothing(fog, expected, tmp_path):
+    assert digest(render(fog, tmp_path / "out.exr", "--aov", "spp,stderr", "--threads", 1)) == expected[0]
+    rows, strings, _ = read(tmp_path / "out.exr")
+    assert sorted(rows) == ["B", "G", "R", "spp", "stderr.B", "stderr.G", "stderr.R"]
+    assert json.loads(strings["lightshaft:job"])["aov"] == []
+
+
+def test_partials_have_the_channels_and_merge_to_the_same_layers(fog, expected, tmp_path):
+    kept = tmp_path / "partials"
+    render(fog, tmp_path / "out.exr", "--aov", ALL, "--partial-dir", kept)
+    assert digest(lightshaft("merge", kept, "-o", tmp_path / "merged.exr")) == expected[0]
+
+    assert layers(tmp_path / "merged.exr") == layers(expected[1])
+    # Nobody who does not ask for them pays for them.
+    plain = tmp_path / "plain"
+    render(fog, tmp_path / "out.exr", "--partial-dir", plain)
+    one = next(plain.glob("*.exr")).read_bytes()
+    assert b"aov." not in one and b"id." not in one
+
+
+def test_the_layers_are_typed_named_and_add_up(expected):
+    rows, strings, types = read(expected[1])
+    width, height = 72, 40
+
+    assert {types[c] for c in ("depth.Z", "position.X", "uv.U", "crypto_object00.R", "crypto_material02.A")} == {"f"}
+    assert {types[c] for c in ("R", "albedo.R", "normal.Z", "direct.G", "coverage.A")} == {"e"}
+    for y in range(height):
+        for x in range(width):
+            whole = rows["G"][y][x]
+            # Three halves of 11 bits each, of numbers not above the sum's.
+            close = 4 * 2 ** -11 * whole + 1e-6
+            assert abs(rows["direct.G"][y][x] + rows["indirect.G"][y][x] - whole) <= close
+            parts = rows["surface.G"][y][x] + rows["volume.G"][y][x] + rows["emission.G"][y][x]
+            assert abs(parts - whole) <= close
+            ranks = [rows[f"crypto_object{i // 4:02}.{'RGBA'[i % 4]}"][y][x] for i in range(12)]
+            assert abs(sum(ranks[1::2]) - rows["coverage.A"][y][x]) <= 2 ** -11
+            assert all(a >= b for a, b in zip(ranks[1::2], ranks[3::2]))
+    # The floor's name is the identifier of most pixels at the bottom.
+    key = next(k for k in strings if k.startswith("cryptomatte/") and strings[k] == "crypto_object").rsplit("/", 1)[0]
+    manifest = json.loads(strings[key + "/manifest"])
+    assert strings[key + "/hash"] == "MurmurHash3_32" and strings[key + "/conversion"] == "uint32_to_float32"
+    assert set(manifest) == {"cube_0", "rectangle_1", "floor"}
+    floor, = struct.unpack(">f", bytes.fromhex(manifest["floor"]))
+    assert rows["crypto_object00.R"][height - 1][width // 2] == floor
+    assert rows["crypto_object00.G"][height - 1][width // 2] == 1
+    assert rows["normal.Y"][height - 1][width // 2] == 1 and rows["albedo.G"][height - 1][width // 2] == .5
+    assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == 0
+
+
+def test_an_unknown_name_is_refused_with_the_list(fog, tmp_path):
+    said = render(fog, tmp_path / "out.exr", "--aov", "depth,radiosity", code=2).stderr
+
+    assert '"radiosity"' in said and "position" in said and "stderr" in said
+
+
+def submit(farm, scene, *flags):
+    env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+    return lightshaft("submit", scene, "--spp", SPP, *flags, env=env).stdout.split()[0]
+
+
+def fetched(farm, job, path):
+    path.write_bytes(farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
+    return path
+
+
+def test_a_farm_that_is_killed_gives_the_same_layers(farm, fog, expected, tmp_path):
+    farm.add_workers(2, fake=False)
+    job = submit(farm, fog, "--aov", ALL)
+    farm.wait_for_progress(job, 3)
+    farm.workers[0].kill()
+    farm.restart_coordinator()
+    farm.add_worker(fake=False)
+
+    assert farm.pixels(job) == expected[0]
+    image = fetched(farm, job, tmp_path / "farm.exr")
+    assert layers(image) == layers(expected[1])
+    keys = [k for k in read(image)[1] if k.endswith("/manifest")]
+    assert [read(image)[1][k] for k in keys] == [read(expected[1])[1][k] for k in keys] and len(keys) == 2
+
+
+def test_a_job_is_extended_to_the_layers_of_one_shot(farm, fog, tmp_path):
+    farm.add_worker(fake=False)
+    job = submit(farm, fog, "--aov", "depth,shape_id,volume")
+    farm.wait_for_job(job)
+    farm.request("PATCH", f"/api/v1/jobs/{job}", json.dumps({"spp": 2 * SPP}).encode(), "application/json")
+    pixels = farm.pixels(job)
+    one_shot = digest(render(fog, tmp_path / "one.exr", "--aov", "depth,shape_id,volume", spp=2 * SPP))
+
+    assert pixels == one_shot
+    assert layers(fetched(farm, job, tmp_path / "farm.exr")) == layers(tmp_path / "one.exr")
