@@ -68,7 +68,7 @@ WorldReport describe(const World& w) {
   feature(w.coincident, "a search for surfaces that lie on null ones");
   const bool angles =
       w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
-  feature(w.distant_mis ? angles : w.equiangular, "equi-angular sampling about lights");
+  feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points, "equi-angular sampling about lights");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");

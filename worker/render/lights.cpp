@@ -24,6 +24,15 @@ float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
 
 }  // namespace
 
+std::vector<V3> Lights::points() const {
+  std::vector<V3> list;
+  for (const Light& l : lights_) {
+    if (l.kind == Kind::point || l.kind == Kind::spot || l.kind == Kind::projector)
+      list.push_back(l.position);
+  }
+  return list;
+}
+
 LightChoice Lights::chosen(const LightNumbers& numbers, const Drawn& drawn) const {
   LightChoice c;
   c.light = drawn.light;
@@ -36,6 +45,7 @@ LightChoice Lights::chosen(const LightNumbers& numbers, const Drawn& drawn) cons
     case Kind::spot:
     case Kind::projector:
       c.pivot = l.position;
+      c.is_point = true;
       break;
     case Kind::sphere:
       c.pivot = V3(geometry_->spheres[l.primitive].center);

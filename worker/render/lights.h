@@ -41,7 +41,7 @@ struct LightNumbers {
 struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
-  bool has_place = false;
+  bool has_place = false, is_point = false;  // is_point: a place without an extent
   V3 pivot;
   LightNumbers numbers;
 };
@@ -55,6 +55,7 @@ class Lights {
 
   bool can_sample() const { return !lights_.empty(); }  // any light that next-event estimation can reach
   bool any_with_place() const { return any_with_place_; }
+  std::vector<V3> points() const;  // where the lights are that have a place without an extent
   // Before the shaded point is known: half by power, half each as often.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
   // For the point x of a surface of normal n, or of a medium (n = 0): of many lights, by a tree.

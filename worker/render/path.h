@@ -86,6 +86,10 @@ class PathTracer {
   void add_glow(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
+  // Whether a segment is left after so many scatterings and as many boundaries and veils passed.
+  bool may_go_on(int scatterings, int passed) const {
+    return world_.depth_allows(scatterings + (world_.passing_counts ? passed : 0));
+  }
   void pass_boundary(const SurfaceHit& hit);
   void light_surface(const SurfaceHit& hit, const V3& wo);
   void add_emission(const SurfaceHit& hit);
@@ -142,6 +146,7 @@ class PathTracer {
   float eta_scale_ = 1;  // undoes the radiance scaling of refraction in roulette decisions
   int hero_ = 0;
   int depth_ = 0;    // scatterings so far
+  int passed_ = 0;   // null boundaries and veils passed so far
   int segment_ = 0;  // rays so far, null crossings included
   Within medium_;
   bool first_in_medium_ = false;  // the first scattering was; with F.split
@@ -184,6 +189,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     add_emission(hit);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if ((kBuilt.boundaries && surface.null) || (kBuilt.veils && surface.veil && passes_veil(hit))) {
+      if (!may_go_on(depth_, ++passed_)) break;
       pass_boundary(hit);
       if (is_black(beta_)) break;
       continue;
@@ -259,7 +265,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
 // A number for roulette, or nothing: absorbed, or too deep.
 template <Features F, template <Features> class Light>
 std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) {
-  if (!world_.depth_allows(depth_ + 1)) return std::nullopt;
+  if (!may_go_on(depth_ + 1, passed_)) return std::nullopt;
   ++depth_;
   const V3 wo = hit.shading.to_local(-d_);
   light_surface(hit, wo);

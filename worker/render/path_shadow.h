@@ -47,6 +47,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
       }
     }
     if (!met) return value;
+    if (!may_go_on(depth_, passed_ + i + 1)) return {0, 0, 0};
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (kBuilt.veils && surface.veil) {
       value *= world_.bsdfs.veil(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;

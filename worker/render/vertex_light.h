@@ -1,9 +1,13 @@
-// The default strategy of path.h for light in media: (1) next-event estimation at each vertex, and (3) in
-// homogeneous media, next-event estimation at points placed equi-angularly about the light on each segment.
+// The default strategy of path.h for light in media: (1) next-event estimation at each vertex, and (3)
+// next-event estimation at points placed equi-angularly about the light on each segment: in homogeneous media
+// about every light with a place; in grids, on the part of a segment that has any density, about lights
+// without an extent (docs/decisions/0011).
 // With (2), directions from the phase function that hit a light: for a vertex at distance t of a segment, (1)
 // and (2) share the density f(t) of free flight and (3) has e(t); with p_l, p_s the solid-angle densities of
 // light and direction sampling the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only
-// the ratio e / f matters: `focus` below.
+// the ratio e / f matters: `focus` below. In grids f stands for the density of flights through the macro
+// cells' means (stretch.h): weights need not know the true one, they need to be the same functions of the
+// vertex for all strategies.
 #pragma once
 
 #include <cmath>
@@ -12,62 +16,73 @@
 #include "worker/render/equiangular.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
+#include "worker/render/stretch.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
 
-// Density of the free flight through a homogeneous medium ending at t, whichever channel were the hero.
-// `density`: of the path so far, by channel, relative to the hero's.
+// Density of the free flight ending at this spot, whichever channel were the hero. `density`: of the path so
+// far, by channel, relative to the hero's.
 template <Features F>
-float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, float t) {
+float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Stretch::Spot& spot) {
   if constexpr (F.chromatic) {
     float num = 0;
-    for (int c = 0; c < 3; ++c) num += density[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * t));
-    return num / 3 / ((density.x + density.y + density.z) / 3);
+    for (int c = 0; c < 3; ++c) num += density[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * spot.x));
+    return spot.rate * (num / 3 / ((density.x + density.y + density.z) / 3));
   } else {
-    const float s = m.sigma_t.x * std::exp(-m.sigma_t.x * t);
-    return (s + s + s) / 3;
+    const float s = m.sigma_t.x * std::exp(-m.sigma_t.x * spot.x);
+    return spot.rate * ((s + s + s) / 3);
   }
 }
 
 template <Features F>
 class VertexLight {
  public:
-  struct Plan {
-    bool focused = false;  // sampled equi-angularly, too
+  struct Plan {  // of a segment that is sampled equi-angularly, too
+    bool focused = false, points_only = false;
     float length = 0;
   };
-  struct Vertex {  // of a focused segment:
-    bool focused = false;
+  struct Vertex {  // of such a segment: of the part that has a medium
+    bool focused = false, points_only = false;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
 
     // e / f for a light with this pivot.
-    float focus(const V3& pivot) const {
-      return focused ? EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf : 0.f;
+    float focus(const V3& pivot, bool is_point) const {
+      return focused && (is_point || !points_only) ? EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf
+                                                   : 0.f;
     }
-    float found_as_light(const V3& pivot) const { return 1 + focus(pivot); }
+    // Of a light that was hit: no point.
+    float found_as_light(const V3& pivot) const { return 1 + focus(pivot, false); }
     static float found_as_light() { return 1; }
   };
 
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, const Segment& segment, bool may_scatter) {
-    const bool focused = kBuilt.equiangular && path.world_.equiangular && !medium.grid &&
-                         std::isfinite(segment.length) && may_scatter;
-    if (focused) focus_on_light(path, medium, segment.length);
-    return {focused, segment.length};
+    Plan plan;
+    if (!kBuilt.equiangular || !may_scatter) return plan;
+    if constexpr (F.grids) {
+      plan.points_only = medium.grid;
+      plan.focused = medium.grid && path.world_.equiangular_points;
+    }
+    plan.focused = plan.focused || (!medium.grid && path.world_.equiangular && std::isfinite(segment.length));
+    plan.length = segment.length;
+    if (plan.focused) focus_on_light(path, medium, segment, plan);
+    return plan;
   }
 
   template <class Path>
   static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
     Vertex v;
     if (!plan.focused) return v;
-    v.o = path.start_;
+    const Stretch stretch(medium, path.start_, path.d_, plan.length);
+    v.points_only = plan.points_only;
+    v.o = path.start_ + path.d_ * stretch.from();
     v.d = path.d_;
-    v.length = plan.length;
-    v.t = t;
-    v.flight_pdf = flight_pdf<F>(medium, path.density_, t);
-    v.focused = v.flight_pdf > 0;
+    v.length = stretch.to() - stretch.from();
+    v.t = t - stretch.from();
+    v.flight_pdf = flight_pdf<F>(medium, path.density_, stretch.at(t));
+    v.focused = v.flight_pdf > 0 && v.length > 0;
     return v;
   }
 
@@ -81,7 +96,8 @@ class VertexLight {
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);
-    const float with_focus = 1 + (choice.has_place ? path.last_.in_medium.focus(choice.pivot) : 0.f);
+    const float with_focus =
+        1 + (choice.has_place ? path.last_.in_medium.focus(choice.pivot, choice.is_point) : 0.f);
     const float weight = light->delta ? 1 / with_focus : light->pdf / (light->pdf * with_focus + phase);
     const C3 arriving =
         path.unoccluded(p, p, *light, path.medium_, path.stream_.stream(path.depth_, Purpose::track_shadow));
@@ -91,26 +107,34 @@ class VertexLight {
  private:
   // Strategy (3): light scattered once, from a vertex near the light.
   template <class Path>
-  static void focus_on_light(Path& path, const Medium& medium, float t_max) {
+  static void focus_on_light(Path& path, const Medium& medium, const Segment& segment, const Plan& plan) {
     const Lights& lights = path.world_.lights;
     const Group g = path.stream_.group(path.segment_, Purpose::segment);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
-    if (!choice.has_place || !(t_max > 0)) return;
-    const EquiAngular::Sample s = EquiAngular(path.start_, path.d_, t_max, choice.pivot).sample(g.u(3));
-    const auto light = lights.sample(choice, s.p);
+    if (!choice.has_place || (plan.points_only && !choice.is_point)) return;
+    const Stretch stretch(medium, path.start_, path.d_, plan.length);
+    const float length = stretch.to() - stretch.from();
+    if (!(length > 0)) return;
+    const V3 o = path.start_ + path.d_ * stretch.from();
+    const EquiAngular::Sample s = EquiAngular(o, path.d_, length, choice.pivot).sample(g.u(3));
+    const Stretch::Spot spot = stretch.at(stretch.from() + s.t);
+    const V3 p = path.clear_of_ends(s.p, segment, spot.t);
+    const C3 scattering = spot.rate > 0 ? stretch.scattering(spot, p) : C3(0);
+    if (is_black(scattering)) return;
+    const auto light = lights.sample(choice, p);
     if (!light || !(s.pdf > 0)) return;
     const float phase = medium.phase.value(path.d_, light->direction);
     // e / f; infinite where no flight gets to
-    const float ratio = s.pdf / flight_pdf<F>(medium, path.density_, s.t);
+    const float ratio = s.pdf / flight_pdf<F>(medium, path.density_, spot);
     const float share = light->delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
     const float weight = light->delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f)
                                       : (std::isfinite(ratio) ? share : 1.f);
-    const C3 arriving = path.unoccluded(s.p, s.p, *light, path.medium_,
+    const C3 arriving = path.unoccluded(p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;
-    C3 in_scattered;
-    for (int c = 0; c < 3; ++c) in_scattered[c] = medium.sigma_s[c] * std::exp(-medium.sigma_t[c] * s.t);
-    path.add(path.beta_ * in_scattered * arriving * (phase * weight / (light->pdf * s.pdf)), true);
+    const C3 through = transmittance<F>(medium, path.start_, path.d_, 0, spot.t,
+                                        path.stream_.stream(path.segment_, Purpose::track_distance));
+    path.add(path.beta_ * (scattering * through) * arriving * (phase * weight / (light->pdf * s.pdf)), true);
   }
 };
 

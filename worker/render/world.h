@@ -44,12 +44,16 @@ class World {
   Features need;
   bool use_media = true;     // false: the integrator `path`, which sees no media
   bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too
-  bool veils = false;        // some surface lets a share of the light pass: shadow rays collect it
-  bool distant_mis = false;  // the integrator `volpath_distant_mis` (distant_mis.h), and its choices
+  bool equiangular_points = false;  // the same in grids, if points shine in them
+  bool veils = false;               // some surface lets a share of the light pass: shadow rays collect it
+  bool distant_mis = false;         // the integrator `volpath_distant_mis` (distant_mis.h), and its choices
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
   bool hide_emitters = false;
   int max_depth = -1;  // segments; -1: unlimited
+  // Null boundaries and surfaces that let light pass end segments: as Mitsuba's `path` counts, but not its
+  // `volpath`.
+  bool passing_counts = false;
   int rr_depth = 5;
   std::uint64_t seed = 0;
   FrameSize size;

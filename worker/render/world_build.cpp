@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/assets/image.h"
@@ -54,7 +55,7 @@ void note_surface_needs(const Scene& scene, World& w) {
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
     s.smooth = w.bsdfs.has_smooth(s.bsdf);
-    w.veils = w.veils || s.veil;
+    w.veils = w.veils || s.veil || (w.passing_counts && s.null);
   }
 }
 
@@ -70,6 +71,23 @@ void name_surfaces(const Scene& scene, World& w) {
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i)
     w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
+}
+
+// Whether a light without an extent lies in a grid, or as near as a tenth of its size: light scattered close
+// to it, as 1 / distance^2, is what flights miss.
+bool a_point_shines_in_a_grid(const World& w) {
+  const std::vector<V3> points = w.lights.points();
+  return std::any_of(w.media.begin(), w.media.end(), [&](const Medium& m) {
+    if (!m.grid || is_black(m.sigma_t)) return false;
+    const V3 lo = m.density->domain_lo(), hi = m.density->domain_hi(), margin = (hi - lo) * .1f;
+    return std::any_of(points.begin(), points.end(), [&](const V3& p) {
+      const V3 q = m.density->to_index(p);
+      for (int k = 0; k < 3; ++k) {
+        if (!(q[k] >= lo[k] - margin[k] && q[k] <= hi[k] + margin[k])) return false;
+      }
+      return true;
+    });
+  });
 }
 
 // A crop is rendered with the pixels of the whole frame, those that it has: the same samples give the same
@@ -136,6 +154,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.size = settings.size;
   w.max_depth = settings.max_depth;
   w.rr_depth = settings.rr_depth;
+  w.passing_counts = settings.integrator == "path" && settings.max_depth >= 0;
   w.use_media = scene::sees_media(settings.integrator);
   w.distant_mis = settings.integrator == "volpath_distant_mis";
   w.distance = scene.integrator.distance;
@@ -202,8 +221,11 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
+  w.equiangular_points =
+      kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) && a_point_shines_in_a_grid(w);
   // Lights chosen for a whole segment know no point: what is weighed against them must choose alike.
-  if (!w.equiangular && settings.integrator != "volpath_distant_mis") w.lights.use_tree_in_media();
+  if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
+    w.lights.use_tree_in_media();
   return std::shared_ptr<const World>(world);
 }
 
