@@ -79,8 +79,8 @@ std::string frames_table(const json& frames) {
   for (const json& f : all) {
     const std::string state = text(f, "state");
     if (all.size() > kMostFrames && (state == "done" || state == "queued")) continue;
-    rows.push_back({number(f, "frame", "{:.0f}"), state, percent(f, "progress"), number(f, "spp_done", "{:.4g}"),
-                    number(f, "relmse", "{:.3g}"), text(f, "error")});
+    rows.push_back({number(f, "frame", "{:.0f}"), state, percent(f, "progress"),
+                    number(f, "spp_done", "{:.4g}"), number(f, "relmse", "{:.3g}"), text(f, "error")});
   }
   return rows.size() == 1 ? "" : "\n" + table(rows);
 }
@@ -126,7 +126,12 @@ std::string job_text(const json& job) {
   rows.push_back({"relMSE", relmse});
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
-  rows.push_back({"left", time_of(job, "eta_seconds")});
+  std::string left = time_of(job, "eta_seconds");
+  if (const auto ci = pair_field(job, "eta_ci95"))
+    left += fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second));
+  rows.push_back({"left", left});
+  if (number_field(job, "eta_with_8_more"))
+    rows.push_back({"with 8 more workers", time_of(job, "eta_with_8_more")});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)

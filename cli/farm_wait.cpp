@@ -23,6 +23,7 @@ ProgressFigures figures_of(const json& job) {
   f.spp_done = number_field(job, "spp_done").value_or(0);
   f.relmse = number_field(job, "relmse");
   f.eta_seconds = number_field(job, "eta_seconds");
+  f.eta_ci95 = pair_field(job, "eta_ci95");
   f.trouble = text_field(job, "error");
   const double elapsed = number_field(job, "elapsed_seconds").value_or(0);
   if (const auto size = pair_field(job, "size"); elapsed > 0 && size)

@@ -70,7 +70,9 @@ ProgressFigures figures_of(const JobView& job) {
           job.elapsed_seconds > 0 ? samples / job.elapsed_seconds : 0,
           job.error_now ? std::optional(job.error_now->relmse) : std::nullopt,
           job.eta_seconds,
-          {}};
+          {},
+          {},
+          job.eta_ci95};
 }
 
 void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {

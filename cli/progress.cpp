@@ -45,6 +45,8 @@ std::string progress_line(const ProgressFigures& f, int columns) {
   if (f.samples_per_second > 0) line += "  " + show_rate(f.samples_per_second);
   if (f.relmse) line += fmt::format("  relMSE {:.3g}", *f.relmse);
   if (f.eta_seconds) line += fmt::format("  {} left", show_seconds(*f.eta_seconds));
+  if (f.eta_seconds && f.eta_ci95)
+    line += fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second));
   if (!f.trouble.empty()) line += "  " + plain_text(f.trouble);
   if (columns > 0 && line.size() >= static_cast<std::size_t>(columns))
     line.resize(static_cast<std::size_t>(columns) - 1);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace ls::cli {
 
@@ -16,6 +17,7 @@ struct ProgressFigures {
   std::optional<double> eta_seconds;
   std::string trouble;      // why it waits
   std::string frames = {};  // of a sequence: "3 of 10 frames"
+  std::optional<std::pair<double, double>> eta_ci95 = {};
 };
 // " 42 % [########          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123  0:42 left"
 std::string progress_line(const ProgressFigures& figures, int columns);

@@ -50,7 +50,10 @@ std::string report_summary(const std::string& report) {
   if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
   if (const auto ci = pair_field(j, "relmse_ci95"))
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
-  if (const std::string verdict = text_field(j, "verdict"); !verdict.empty()) line += ": " + verdict;
+  if (const std::string verdict = text_field(j, "verdict"); !verdict.empty())
+    line += ": " + verdict;
+  else if (j.contains("slope_ci95") && j["slope_ci95"].is_array())
+    line += ": " + text_field(j, "trend");
   return line;
 }
 

@@ -25,6 +25,8 @@
 
 namespace ls::coordinator {
 
+inline constexpr int kMoreWorkers = 8;  // of JobView::eta_with_more
+
 struct ErrorFigures {  // of the image as folded up to one complete round over all tiles
   double rmse = 0;
   double relmse = 0;
@@ -72,7 +74,9 @@ struct JobView {
   double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
   std::optional<double> eta_seconds;
-  std::string error;                  // why it failed
+  std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
+  std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
+  std::string error;                                  // why it failed
   std::vector<std::string> warnings;  // of the scene
   FrameSize size;
   int tile = 32;

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/image/convergence.h"
 #include "common/image/final_image.h"
+#include "coordinator/assemble/report.h"
 #include "coordinator/intake.h"
 #include "coordinator/service_impl.h"
 
@@ -44,15 +46,26 @@ namespace {
 
 double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
 
-// Samples still needed by the 1/N law of independent samples; 0 when the target is met.
-double spp_to_target(const ErrorFigures& error, double spp, double target) {
-  return std::max(0.0, spp * (error.relmse / target - 1));
-}
-
 struct Outlook {
   double progress = 0;
   std::optional<double> eta_seconds;
+  std::optional<std::pair<double, double>> eta_ci95;
+  double core_seconds = 0;  // that eta_seconds comes from; 0: from the clock
 };
+
+// The forecast of the time to the target error, where that comes before what was `out`'s end.
+void look_at_target(const JobEntry& entry, double target, int threads, Outlook& out) {
+  const ConvergencePoint& last = entry.points.back();
+  const auto forecast = forecast_of(error_points(entry.points), target);
+  if (!forecast || threads <= 0) return;
+  const double more = std::max(0.0, forecast->spp - last.spp);
+  out.progress = std::max(out.progress, last.spp / (last.spp + more));
+  const double seconds = forecast->core_seconds / threads;
+  if (seconds >= out.eta_seconds.value_or(INFINITY)) return;
+  out.eta_seconds = seconds;
+  out.eta_ci95 = {forecast->core_seconds_lo / threads, forecast->core_seconds_hi / threads};
+  out.core_seconds = forecast->core_seconds;
+}
 
 // Whichever of samples, target and time comes first.
 Outlook outlook(const JobEntry& entry, const JobFigures& f, double elapsed, int threads) {
@@ -60,19 +73,16 @@ Outlook outlook(const JobEntry& entry, const JobFigures& f, double elapsed, int 
   const double core_left = f.core_seconds_left;
   if (entry.stored.spp && f.units_total > 0)
     out.progress = static_cast<double>(f.units_done) / static_cast<double>(f.units_total);
-  if (threads > 0 && core_left > 0) out.eta_seconds = core_left / threads;
-  const auto& spec = entry.stored.spec;
-  if (spec.target_error && !entry.points.empty()) {
-    const ConvergencePoint& last = entry.points.back();
-    const double more = spp_to_target(last.error, last.spp, *spec.target_error);
-    out.progress = std::max(out.progress, last.spp / (last.spp + more));
-    const double cores = more * pixels_of(entry.grid) * f.seconds_per_sample;
-    if (threads > 0 && f.seconds_per_sample > 0)
-      out.eta_seconds = std::min(out.eta_seconds.value_or(INFINITY), cores / threads);
+  if (threads > 0 && core_left > 0) {
+    out.eta_seconds = core_left / threads;
+    out.core_seconds = core_left;
   }
+  const auto& spec = entry.stored.spec;
+  if (spec.target_error && !entry.points.empty()) look_at_target(entry, *spec.target_error, threads, out);
   if (spec.time) {
     out.progress = std::max(out.progress, std::min(1.0, elapsed / *spec.time));
-    out.eta_seconds = std::min(out.eta_seconds.value_or(INFINITY), std::max(0.0, *spec.time - elapsed));
+    const double left = std::max(0.0, *spec.time - elapsed);
+    if (left < out.eta_seconds.value_or(INFINITY)) out = {out.progress, left, std::nullopt, 0};
   }
   return out;
 }
@@ -113,7 +123,13 @@ JobView Service::view_locked(const JobEntry& entry) const {
     v.queued_core_seconds = figures->core_seconds_queued;
     const Outlook out = outlook(entry, *figures, v.elapsed_seconds, farm_.threads_connected());
     v.progress = out.progress;
-    if (v.state == JobState::running || v.state == JobState::queued) v.eta_seconds = out.eta_seconds;
+    if (v.state == JobState::running || v.state == JobState::queued) {
+      v.eta_seconds = out.eta_seconds;
+      v.eta_ci95 = out.eta_ci95;
+      const int workers = farm_.workers_connected();
+      if (out.core_seconds > 0 && workers > 0)
+        v.eta_with_more = out.eta_seconds.value_or(0) * workers / (workers + kMoreWorkers);
+    }
     if (v.error.empty() && !entry.finishing && figures->units_leased == 0)
       v.error = farm_.why_waiting(job.id);
   }

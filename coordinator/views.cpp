@@ -41,6 +41,8 @@ json to_value(const JobView& v) {
          {"spp_done", number(v.spp_done)},
          {"target_error", v.target_error ? number(*v.target_error) : json()},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
+         {"eta_ci95", v.eta_ci95 ? json{number(v.eta_ci95->first), number(v.eta_ci95->second)} : json()},
+         {"eta_with_8_more", v.eta_with_more ? number(*v.eta_with_more) : json()},
          {"error", text_or_null(v.error)},
          {"warnings", v.warnings},
          {"size", {v.size.width, v.size.height}},

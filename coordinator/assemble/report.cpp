@@ -29,6 +29,14 @@ json point(const ConvergencePoint& p) {
 
 ErrorFigures figures_of(const ImageError& e) { return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi}; }
 
+std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points) {
+  std::vector<ErrorPoint> out;
+  out.reserve(points.size());
+  for (const ConvergencePoint& p : points)
+    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi});
+  return out;
+}
+
 std::string report_json(const ReportFacts& facts) {
   const StoredJob& job = facts.job;
   const JobTotals& totals = job.totals;
@@ -68,6 +76,10 @@ std::string report_json(const ReportFacts& facts) {
   j["rmse_ci95"] = known ? json{number(e.rmse_lo), number(e.rmse_hi)} : json();
   j["relmse"] = known ? number(e.relmse) : json();
   j["relmse_ci95"] = known ? json{number(e.relmse_lo), number(e.relmse_hi)} : json();
+  const auto trend = trend_of(error_points(facts.convergence));
+  j["slope"] = trend ? number(-trend->slope) : json();
+  j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
+  j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
   j["trusted"] = known && e.trusted;
   j["verdict"] = e.verdict;
   // Error reached per second of wall clock; per core second for comparisons between farms.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/image/convergence.h"
 #include "common/image/error_estimate.h"
 #include "coordinator/store/job_store.h"
 
@@ -23,5 +24,6 @@ struct ReportFacts {
 std::string report_json(const ReportFacts& facts);
 
 ErrorFigures figures_of(const ImageError& error);
+std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points);
 
 }  // namespace ls::coordinator

@@ -106,6 +106,7 @@ class Farm {
   // sick. Empty while someone may take it.
   std::string why_waiting(const JobId& id) const;
   int threads_connected() const;
+  int workers_connected() const;
 
   // Looks through everything and says what does not add up: planned = done + leased + queued, what leases,
   // workers and jobs say of one another, no worker idle while a unit it may take is queued. Empty if all is

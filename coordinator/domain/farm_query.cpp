@@ -161,5 +161,6 @@ std::string Farm::why_waiting(const JobId& id) const {
 }
 
 int Farm::threads_connected() const { return state_->workers.threads(); }
+int Farm::workers_connected() const { return state_->workers.connected(); }
 
 }  // namespace ls::coordinator

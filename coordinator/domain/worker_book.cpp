@@ -46,6 +46,7 @@ void WorkerBook::connected(Worker& worker, bool yes) {
   if (worker.connected == yes) return;
   worker.connected = yes;
   threads_ += yes ? worker.threads : -worker.threads;
+  connected_ += yes ? 1 : -1;
 }
 
 bool fits(const Job& job, const Worker& worker) {

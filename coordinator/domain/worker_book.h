@@ -80,6 +80,7 @@ class WorkerBook {
 
   const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
   int threads() const { return threads_; }  // of connected workers
+  int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
 
  private:
@@ -87,7 +88,7 @@ class WorkerBook {
   std::unordered_map<WorkerId, WorkerIndex> index_;
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> hungry_;
-  int threads_ = 0;
+  int threads_ = 0, connected_ = 0;
 };
 
 // Of the job's numeric class, with its tags; leaves aside what the worker is doing.

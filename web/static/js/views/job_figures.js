@@ -14,11 +14,18 @@ export function figures(job, report) {
     fact("relMSE", figure(job.relmse), ci ? [ci, h("i", { key: "ci" }, "95 % interval")] : "not known yet", "key"),
     report?.trusted === false ? h("p", { key: "verdict", class: "verdict" }, report.verdict || "This error estimate can't be trusted yet.") : null,
     fact("Samples per pixel", spp(job.spp_done), `of ${count(job.spp)}`, "key"),
-    isOver(job) ? fact("Took", duration(job.elapsed_seconds), "wall clock", "key") : fact("Time left", duration(job.eta_seconds), `${duration(job.elapsed_seconds)} so far`, "key"),
+    isOver(job) ? fact("Took", duration(job.elapsed_seconds), "wall clock", "key") : fact("Time left", duration(job.eta_seconds), timeNote(job), "key"),
     fact("RMSE", figure(job.rmse)),
     fact("Core time", duration(job.core_seconds)),
     fact("Units", count(job.units_done), `of ${count(job.units_total)}`),
     fact("Numeric health", clean ? "clean" : "see above", null, clean ? "good" : "bad"));
+}
+
+/** What the forecast leaves open, and what more workers would do. */
+function timeNote(job) {
+  const range = job.eta_ci95 ? `${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : null;
+  const more = typeof job.eta_with_8_more === "number" ? `${duration(job.eta_with_8_more)} with 8 more workers` : null;
+  return [range, more, `${duration(job.elapsed_seconds)} so far`].filter(Boolean).join(", ");
 }
 
 const fact = (name, value, note, className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name), h("dd", null, h("b", null, value), note ? h("small", null, note) : null));
