@@ -35,10 +35,12 @@ Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::strin
                               const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
+inline constexpr float kLargestHalf = 65504;
+
 // A picture of several planes of one size.
 struct ExrHalf {
   std::vector<float> values;
-};  // converted; the caller has clamped to +-65504
+};  // converted; the caller has clamped to +-kLargestHalf
 struct ExrFloat {
   std::vector<float> values;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "common/image/exr_file.h"
 #include "common/image/render_limits.h"
 
 namespace ls {
@@ -65,7 +66,6 @@ Result<void> read_tiles(const FinalPicture& from, const std::string& name, Seale
 
 // What final_exr() stores of a mean.
 float stored(double mean, bool halves) {
-  constexpr float kLargestHalf = 65504;
   const float value = static_cast<float>(mean) + 0.f;  // -0 becomes 0
   if (!halves) return value;
   return as_half(std::abs(value) <= kLargestHalf ? value : std::copysign(kLargestHalf, value));

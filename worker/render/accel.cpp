@@ -117,9 +117,8 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
   std::memcpy(&r.tfar, &rest, sizeof rest);
 }
 
-// Embree's behaviour on NaN is undefined, and Debian's stops the process at rays that begin beyond 1.8e18, in
-// the space of an instance too (kLargestInverse). The world is of unit size: from so far away it is nowhere.
-constexpr float kFarthest = 1e9f;
+// Embree is undefined on NaN, and Debian's stops at rays from beyond 1.8e18 (in instances: kLargestInverse).
+constexpr float kFarthest = 1e9f;  // the world is of unit size: from so far away it is nowhere
 bool near_enough(const V3& o) {
   return std::abs(o.x) <= kFarthest && std::abs(o.y) <= kFarthest && std::abs(o.z) <= kFarthest;
 }
@@ -360,7 +359,7 @@ std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, flo
 Together Accel::between(const V3& a, const V3& b) const {
   Together together;
   const V3 d = b - a;
-  if (!state_->coincident || !traceable(a, d)) return together;
+  if (!state_->coincident || !near_enough(a) || !near_enough(b)) return together;
   RTCRayHit rh;
   set_ray(rh.ray, a, d, 1);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
