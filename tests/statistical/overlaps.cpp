@@ -94,7 +94,7 @@ Case white_crowd() {
   kit.container(SphereShape{}, translate({0, .5, .4}) * scale(.5), null, ranked);
   kit.environment();
   kit.look({.4, -6, .7}, {0, 0, 0}, 25);
-  return {"overlap_white_crowd", kit, grey(1), 64};
+  return {"overlap_white_crowd", kit, grey(1), 1024, .008};
 }
 
 // Two media that give off light and absorb, in one box: (e1 + e2) (1 - e^-(s1 + s2) d) / (s1 + s2).
