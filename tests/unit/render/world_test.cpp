@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tests/support/render_check.h"
+#include "worker/render/world.h"
 
 namespace ls::render {
 namespace {
