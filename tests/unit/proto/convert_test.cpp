@@ -151,9 +151,9 @@ const Damage kDamages[] = {
     {"result.exr",
      [](pb::FromWorker& m) { m.mutable_result()->set_exr(std::string(limits::kPartialBytes + 1, 'x')); }, 2},
     {"unit.job", [](pb::FromWorker& m) { m.mutable_result()->clear_unit(); }, 2},
-    {"failure.reason", [](pb::FromWorker& m) { m.mutable_failure()->set_reason(std::string(9000, 'x')); }, 3},
-    {"returned.lease", [](pb::FromWorker& m) { m.mutable_returned()->set_lease(std::string(65, 'x')); }, 5},
-    {"message", [](pb::FromWorker& m) { m.Clear(); }, 6},
+    {"failure.reason", [](pb::FromWorker& m) { m.mutable_failure()->set_reason(std::string(9000, 'x')); }, 4},
+    {"returned.lease", [](pb::FromWorker& m) { m.mutable_returned()->set_lease(std::string(65, 'x')); }, 6},
+    {"message", [](pb::FromWorker& m) { m.Clear(); }, 7},
 };
 
 TEST(Convert, NamesTheFieldThatIsWrong) {
