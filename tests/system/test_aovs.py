@@ -95,6 +95,23 @@ def test_the_layers_are_typed_named_and_add_up(expected):
     assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == 0
 
 
+def test_mitsubas_wrapper_asks_for_layers(fog, expected, tmp_path):
+    scene = fog.parent / "wrapped.xml"
+    scene.write_text(fog.read_text().replace('<integrator type="volpath"/>', """<integrator type="aov">
+      <string name="aovs" value="depth:depth,nn:sh_normal"/><integrator type="volpath"/></integrator>"""))
+
+    done = render(scene, tmp_path / "out.exr", "--aov", "uv")
+
+    assert digest(done) == expected[0] and '"nn" is "normal"' in done.stderr
+    rows = layers(tmp_path / "out.exr")
+    assert all(rows[c] == layers(expected[1])[c] for c in ("depth.Z", "normal.X", "uv.U"))
+    assert "position.X" not in rows
+
+
+def test_verify_renders_the_layers_again(fog, expected):
+    assert "as sealed" in lightshaft("verify", expected[1], "--scene", fog, "--tiles", 2, "--seed", 1).stdout
+
+
 def test_an_unknown_name_is_refused_with_the_list(fog, tmp_path):
     said = render(fog, tmp_path / "out.exr", "--aov", "depth,radiosity", code=2).stderr
 

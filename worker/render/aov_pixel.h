@@ -22,7 +22,7 @@ class AovPixel {
 
   LightSplit* split() { return &split_; }  // of the sample that is rendered now
   void begin_pixel();
-  void begin_sample() { split_ = {}; }
+  void begin_sample() { split_.fill(C3(0)); }  // C3{} is not initialised
   // After the sample was rendered at the image's pixel (x, y); `usable`: its radiance counts.
   void end_sample(int x, int y, std::uint64_t sample, bool usable);
   // To the planes of planes_of(world.aovs), `pixels` floats each, at index i.
@@ -38,7 +38,7 @@ class AovPixel {
   const World& world_;
   AovPlanes planes_;
   bool wants_surface_, wants_light_;
-  LightSplit split_{};
+  LightSplit split_;
   std::array<Sums, kAovs> sums_{};
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;

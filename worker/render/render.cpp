@@ -178,7 +178,8 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
 
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
-  LightSplit split{};
+  LightSplit split;
+  split.fill(C3(0));
   const SampleOutcome out = choose(world).sample(world, x, y, sample, &split);
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
