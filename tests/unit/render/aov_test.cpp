@@ -167,7 +167,7 @@ TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {
   EXPECT_LT(half.of_hits("aov.position.X"), 0);
   EXPECT_EQ(half.ids(0).slots[1], IdSlot{});
 
-  kit.look({0, 0, -5}, {0, 0, -9});
+  kit.look({0, 0, -5}, {0, 0, -9}, 1, {0, 1, 0});
   const Picture none(kit, kOfSurface);
   for (const char* plane : {"aov.hits", "aov.depth.Z", "aov.normal.Z", "aov.coverage.A", "aov.albedo.R"})
     EXPECT_EQ(none.sum(plane, 0), 0) << plane;
@@ -201,7 +201,7 @@ TEST(Aovs, InstancesAreThingsOfTheirOwn) {
   kit.scene.instances = {{GroupIndex{0}, translate({5, 0, 0})}, {GroupIndex{0}, translate({0, 5, 0})}};
   kit.scene.shape_labels = {{"ball", "clay"}};
   kit.scene.instance_labels = {{"left", ""}, {"right", ""}};
-  kit.look({0, 5, 9}, {0, 5, 0});
+  kit.look({0, 5, 9}, {0, 5, 0}, 1e-3, {0, 1, 0});
 
   const Picture p(kit, {"shape_id", "material_id", "uv"});
 
