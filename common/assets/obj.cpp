@@ -173,7 +173,8 @@ Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view n
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   if (is_serialized(*bytes)) return decode_serialized(name, *bytes, index);
-  return as_text(*bytes).starts_with("ply") ? decode_ply_with(attributes, name, *bytes) : decode_obj(name, *bytes);
+  return as_text(*bytes).starts_with("ply") ? decode_ply_with(attributes, name, *bytes)
+                                            : decode_obj(name, *bytes);
 }
 
 }  // namespace ls

@@ -96,7 +96,8 @@ void describe_priority(V& v, auto& priority) {
        .doc = "where media overlap, those of the highest priority are there and the others are not; equal "
               "ones add up. Not in Mitsuba",
        .range = {-1000000, 1000000},
-       .unwritten = 0},
+       .unwritten = 0,
+       .elided = true},
       priority);
 }
 template <class V, Of<HomogeneousMedium> T>

@@ -283,11 +283,13 @@ constexpr Refused kRefused[] = {
      "its formula is its author's own, not Burley's; choose principled with spec_trans, or dielectric"},
     {"bsdf", "disney", "each author's has other lobes; choose principled, which is Mitsuba's"},
     {"bsdf", "bumpmap",
-     "each author's image textures have slopes of their own; write the scene in Mitsuba's language (lightshaft "
+     "each author's image textures have slopes of their own; write the scene in Mitsuba's language "
+     "(lightshaft "
      "convert) and put its bumpmap around the bsdf"},
     {"bsdf", "emissive", "put an <emitter type=\"area\"> into the mesh instead"},
     {"emitter", "environment",
-     "which direction its image's edges mean differs between authors; write it as an emitter \"envmap\" with a "
+     "which direction its image's edges mean differs between authors; write it as an emitter \"envmap\" with "
+     "a "
      "filename, whose top row is +z"},
     {"emitter", "spotlight",
      "each author's falls off otherwise; write it as an emitter \"spot\", which is linear in the angle"},
@@ -302,8 +304,8 @@ constexpr Refused kRefused[] = {
 
 std::string text_of(unsigned types) {
   static constexpr std::pair<unsigned, std::string_view> kTags[] = {
-      {kColor, "color"},     {kFloat, "float"},  {kInteger, "integer"}, {kBoolean, "boolean"},
-      {kString, "string"},   {kPoint, "point"},  {kVector, "vector"},   {kTransform, "transform"},
+      {kColor, "color"},     {kFloat, "float"},   {kInteger, "integer"}, {kBoolean, "boolean"},
+      {kString, "string"},   {kPoint, "point"},   {kVector, "vector"},   {kTransform, "transform"},
       {kTexture, "texture"}, {kVolume, "volume"}, {kBsdf, "bsdf"}};
   if ((types & kNumber) == kNumber) types &= ~unsigned{kInteger};  // where a float will do, an integer does
   std::string out;

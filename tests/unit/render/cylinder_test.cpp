@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/chi_square.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -206,12 +207,11 @@ TEST(CylinderLights, ShineInwardsWhereFlipped) {
 }
 
 TEST(CylinderLights, AreSampledUniformlyByArea) {
-  // Counts in 16 x 16 cells of uv: chi-square of 255 degrees of freedom, whose mean plus 5 deviations (of
-  // sqrt(2 * 255)) is 368.
+  // Counts in 16 x 16 cells of uv.
   const LightBench b(area(between({0, 0, 0}, {0, 0, 2}, .7), {}));
   RandomStream r(17);
-  std::vector<int> counts(256, 0);
   constexpr int kSamples = 1 << 18;
+  std::vector<double> counts(256, 0), expected(256, kSamples / 256.);
   for (int i = 0; i < kSamples; ++i) {
     const float u = r.uniform(), v = r.uniform();
     const auto p = b.world->lights.choose(numbers(0, u, v)).pivot;
@@ -223,9 +223,9 @@ TEST(CylinderLights, AreSampledUniformlyByArea) {
               z = std::clamp(static_cast<int>(q.dot(c.axis) / c.length * 16), 0, 15);
     ++counts[static_cast<std::size_t>(16 * z + x)];
   }
-  double chi2 = 0;
-  for (const int n : counts) chi2 += (n - kSamples / 256.) * (n - kSamples / 256.) / (kSamples / 256.);
-  EXPECT_LT(chi2, 368);
+  test::ChiSquareBook book("render/cylinder");
+  book.expect("area", expected, counts);
+  book.close();
 }
 
 // A cylinder of null walls around an absorbing medium: Beer's law across it.

@@ -9,6 +9,8 @@
 #include <limits>
 #include <random>
 
+#include "tests/support/chi_square.h"
+#include "tests/support/jacobian.h"
 #include "tests/support/render_check.h"
 #include "tests/support/sky_kit.h"
 #include "worker/render/hash.h"
@@ -164,6 +166,7 @@ TEST(EnvironmentMap, DensityIntegratesToOne) {
 }
 
 TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
+  test::ChiSquareBook book("render/envmap");
   for (const Named& n : skies()) {
     const EnvironmentMap m = map_of(n.image);
     const Bins bins(n.image);
@@ -177,33 +180,19 @@ TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
       const std::uint32_t x = r.bits(), y = r.bits();
       ++got[static_cast<std::size_t>(bins.of(m.sample(x, y)))];
     }
-    // Bins of fewer than 8 go together.
-    double chi2 = 0, rest_expected = 0, rest_got = 0;
-    int freedom = -1;
-    const auto add = [&](double e, double g) {
-      chi2 += (g - e) * (g - e) / e;
-      ++freedom;
-    };
-    for (std::size_t i = 0; i < got.size(); ++i) {
-      if (expected[i] >= 8) {
-        add(expected[i], got[i]);
-      } else {
-        rest_expected += expected[i];
-        rest_got += got[i];
-      }
-    }
-    if (rest_expected >= 8) {
-      add(rest_expected, rest_got);
-    } else {
-      EXPECT_LE(rest_got, rest_expected + 6 * std::sqrt(rest_expected) + 6) << n.name;
-    }
-    ASSERT_GT(freedom, 2) << n.name;
-    // Wilson and Hilferty: the cube root of chi2 / n is normal about 1 - 2/9n with variance 2/9n; 4.75 sigma
-    // are 1e-6.
-    const double k = 2. / (9 * freedom);
-    EXPECT_LT((std::cbrt(chi2 / freedom) - (1 - k)) / std::sqrt(k), 4.75)
-        << n.name << " " << chi2 << " of " << freedom;
+    book.expect(n.name, expected, got);
   }
+  book.close();
+}
+
+// Of one value everywhere the map has no kinks between its cells.
+TEST(EnvironmentMap, AConstantMapStretchesTheSquareByOneOverTheDensity) {
+  const EnvironmentMap m = map_of(SkyImage(6, 4, 2));
+  test::expect_jacobian("constant sky", [&](const V2& u) -> std::optional<test::Mapped> {
+    const auto word = [](float x) { return static_cast<std::uint32_t>(x * 0x1p32f); };
+    const V3 d = m.sample(word(u.x), word(u.y));
+    return test::Mapped{V3d(d), double{m.at(d).pdf}};
+  });
 }
 
 TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {

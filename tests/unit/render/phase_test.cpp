@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "worker/render/hash.h"
 
@@ -17,13 +16,6 @@ const double kAnisotropies[] = {-.9999, -.9, -.5, -1e-7, 0, 1e-7, .3, .75, .99, 
 double reference(double g, double x) {
   const double a = std::abs(g), s = (1 - a) * (1 - a) + 2 * a * x;
   return (1 - a) * (1 + a) / (4 * M_PI * s * std::sqrt(s));
-}
-// Probability that 1 - cos from the peak is below x.
-double distribution(double g, double x) {
-  const double a = std::abs(g);
-  if (a < 1e-6) return x / 2;  // to first order in a, 1e-6 here
-  const double root = std::sqrt((1 - a) * (1 - a) + 2 * a * x);
-  return (1 - a) * (1 + a) / (2 * a) * (1 / (1 - a) - 1 / root);
 }
 V3 uniform_sphere(const V2& u) {
   const float z = 1 - 2 * u.x, r = 2 * safe_sqrt(u.x * (1 - u.x)), a = kTwoPi * u.y;
@@ -71,28 +63,6 @@ TEST(HenyeyGreenstein, DensityOfASampleIsItsValue) {
       const double width = std::max(1 - std::abs(g), 1e-4);
       ASSERT_NEAR(hg.value(w, s.w) / s.pdf, 1, 2e-6 / width + 1e-5) << "g " << g;
     }
-  }
-}
-
-// Chi-square of samples in cells of equal probability: exact expectations, no small ones.
-TEST(HenyeyGreenstein, SamplesAreDistributedAsTheDensitySays) {
-  constexpr int kCells = 64, kSamples = 64000;
-  constexpr double kLimit = 135;  // P(chi^2_63 > 135) = 3e-7, ten tests: 3e-6
-  for (const double g : kAnisotropies) {
-    RandomStream r(7);
-    std::vector<int> count(kCells, 0);
-    const V3 w(0, 0, 1);
-    for (int i = 0; i < kSamples; ++i) {
-      const float u = r.uniform(), v = r.uniform();
-      const PhaseSample s = HenyeyGreenstein{g_of(g)}.sample(w, {u, v});
-      const V3d d = g >= 0 ? V3d(s.w) - V3d(w) : V3d(s.w) + V3d(w);
-      const double p = distribution(double{g_of(g)}, d.dot(d) / 2);
-      ++count[static_cast<std::size_t>(std::min(kCells - 1, static_cast<int>(p * kCells)))];
-    }
-    double chi = 0;
-    const double expected = double{kSamples} / kCells;
-    for (const int n : count) chi += (n - expected) * (n - expected) / expected;
-    EXPECT_LT(chi, kLimit) << "g " << g;
   }
 }
 

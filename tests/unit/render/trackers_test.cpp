@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "tests/support/chi_square.h"
 #include "tests/unit/render/grids.h"
 #include "worker/render/medium.h"
 
@@ -154,7 +155,7 @@ TEST(Trackers, FlightsThroughDenseCellsAreExponentialInDepth) {
   m.sigma_t = m.sigma_s = C3(40);
   MediumCounters counters;
   constexpr int kFlights = 20000, kBins = 16;
-  std::vector<int> count(kBins, 0);
+  std::vector<double> count(kBins, 0), expected(kBins, double{kFlights} / kBins);
   for (int i = 0; i < kFlights; ++i) {
     RandomStream r(mix64(i));
     const V3 o(-1, 3 + 20 * r.uniform(), 3 + 20 * r.uniform()), d = normalize(V3(1, .2f, .1f));
@@ -164,9 +165,9 @@ TEST(Trackers, FlightsThroughDenseCellsAreExponentialInDepth) {
     const double share = -std::expm1(-40 * g.exact_integral(V3d(o), V3d(d), 0, f.t));
     ++count[static_cast<std::size_t>(std::min(kBins - 1, static_cast<int>(share * kBins)))];
   }
-  double chi = 0;
-  for (const int c : count) chi += sqr(c - double{kFlights} / kBins) / (double{kFlights} / kBins);
-  EXPECT_LT(chi, 56);  // P(chi^2_15 > 56) = 1e-6
+  test::ChiSquareBook book("render/trackers");
+  book.expect("dense cells", expected, count);
+  book.close();
   EXPECT_EQ(counters.majorant_violations, 0u);
 }
 

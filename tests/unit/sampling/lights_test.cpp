@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "tests/support/chi_square.h"
 #include "tests/support/jacobian.h"
 #include "tests/support/sphere_cells.h"
 #include "tests/unit/render/light_bench.h"
+#include "worker/render/transform.h"
 
 namespace ls::render {
 namespace {
@@ -23,12 +25,16 @@ struct Case {
   V3d from;      // in the scene
   V3d towards;   // the cells' axis
   double reach;  // of the cells: 1 - cos
+  // Points of the light, in the scene, spread evenly over its area for (u, v) in the unit square: of lights
+  // whose density has no bound, seen from there (it grows as 1 / cos towards a rim), or changes fast.
+  std::function<V3d(double, double)> surface = {};
+  double area = 0;
 };
 
 std::vector<Case> cases() {
   std::vector<Case> all;
   const auto add = [&](std::string name, SceneKit kit, V3d from, V3d to, double reach) {
-    all.push_back({std::move(name), std::move(kit), from, to - from, reach});
+    all.push_back({std::move(name), std::move(kit), from, to - from, reach, {}, 0});
   };
   add("rectangle", area(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1},
       {0, 0, 2}, .2);
@@ -48,6 +54,19 @@ std::vector<Case> cases() {
   add("inside of a cylinder", area(CylinderShape{}, {}, true), {.3, .2, .4}, {.3, .2, 1}, 2);
   add("cube", area(CubeShape{}, translate({0, 0, 3}) * test::rotate_x(30)), {.3, .2, -1}, {0, 0, 3}, .2);
   add("inside of a cube", area(CubeShape{}, {}, true), {.3, .2, -.4}, {0, 0, 0}, 2);
+  const auto by_surface = [&](std::string_view name, double light_area,
+                              std::function<V3d(double, double)> f) {
+    for (Case& c : all)
+      if (c.name == name) c.surface = std::move(f), c.area = light_area;
+  };
+  const auto place = [](const Transform& t) { return Affine(t); };
+  const Affine tilted = place(translate({0, 0, 2}) * test::rotate_x(160)), flat = place(test::rotate_x(180)),
+               tube = place(translate({0, 0, 3}) * test::rotate_x(70));
+  by_surface("rectangle", 4, [=](double u, double v) { return tilted.point({2 * u - 1, 2 * v - 1, 0}); });
+  by_surface("near rectangle", 4, [=](double u, double v) { return flat.point({2 * u - 1, 2 * v - 1, 0}); });
+  by_surface("cylinder", 2 * M_PI, [=](double u, double v) {
+    return tube.point({std::cos(2 * M_PI * u), std::sin(2 * M_PI * u), v});
+  });
   for (const double angle : {.3, 5., 60., 89.}) {
     SceneKit kit;
     kit.shape(RectangleShape{}, translate({0, 0, -5}), kit.diffuse(.5));
@@ -72,13 +91,39 @@ double density(const LightBench& b, const V3& x, const V3& d) {
   return alone.x > 0 ? double{alone.x} / double{shared.x} - 1 : 0;
 }
 
+// The same masses as SphereCells::masses(), by an even grid of points of the light.
+std::vector<double> masses_by_surface(const LightBench& b, const Case& c, const test::SphereCells& cells) {
+  constexpr int kGrid = 700;
+  const V3 x = b.at(c.from);
+  std::vector<double> p(cells.size(), 0);
+  double all = 0;
+  const double scale = b.world->geometry.scale, piece = c.area * scale * scale / kGrid / kGrid;
+  for (int i = 0; i < kGrid; ++i)
+    for (int j = 0; j < kGrid; ++j) {
+      const double golden = .6180339887498949 * (j + .5);
+      const V3 y = b.at(c.surface((i + golden - std::floor(golden)) / kGrid, (j + .5) / kGrid)), f = y - x;
+      const V3 d = normalize(f);
+      SurfaceHit hit;
+      const auto id = b.world->accel.nearest(x, d, kInfinity);
+      if (!id || !b.world->geometry.complete(*id, x, d, hit) || (hit.p - y).length() > 1e-3f * f.length())
+        continue;
+      const double mass = density(b, x, d) * std::abs(dot(hit.ng, d)) / dot(f, f) * piece;
+      p[cells.of(d)] += mass;
+      all += mass;
+    }
+  EXPECT_LE(all, 1 + 3e-3) << c.name;
+  p.back() += std::max(0., 1 - all);
+  return p;
+}
+
 TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
   test::ChiSquareBook book("sampling/lights");
   for (const Case& c : cases()) {
     const LightBench b(c.kit);
     const V3 x = b.at(c.from);
     const test::SphereCells cells(V3(c.towards), c.reach, 12, 24);
-    const auto p = cells.masses([&](const V3& d) { return density(b, x, d); }, 16);
+    const auto p = c.surface ? masses_by_surface(b, c, cells)
+                             : cells.masses([&](const V3& d) { return density(b, x, d); }, 16);
     // Of the cells' points about 3 per mille lie in cells that an edge of the light cuts.
     EXPECT_LE(cells.total(), 1 + 3e-3) << c.name;
     std::vector<double> got(cells.size(), 0);

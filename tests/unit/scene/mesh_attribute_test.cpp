@@ -62,7 +62,7 @@ TEST(MeshAttribute, OfWhatCanHaveNoneIsRefusedWhereItStands) {
   const std::string bsdf = "<bsdf type=\"diffuse\">" + attribute("reflectance", "vertex_color") + "</bsdf>";
   EXPECT_THAT(
       error_of(with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>")),
-      HasSubstr("test.xml:2:1: error: this sphere has no attribute \"vertex_color\", which its bsdf reads"));
+      HasSubstr("test.xml:2:2: error: this sphere has no attribute \"vertex_color\", which its bsdf reads"));
   EXPECT_THAT(error_of(with_sensor(R"(<shape type="obj"><string name="filename" value="mesh.obj"/>)" + bsdf +
                                    "</shape>")),
               HasSubstr("only a \"ply\" mesh has attributes"));
