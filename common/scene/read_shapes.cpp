@@ -104,6 +104,7 @@ void Reader::read_geometry(const Element& e, T geometry) {
   check_attributes(e, shape);
   scene_.shapes.push_back(std::move(shape));
   label_shape(e);
+  shape_elements_.push_back(&e);
 }
 
 void Reader::read_shape_parts(Params& p, Shape& shape) {

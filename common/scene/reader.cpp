@@ -26,6 +26,7 @@ Scene Reader::read() {
     read_child(child);
   }
   read_idle_parts();
+  warn_of_media_around_camera();
   if (!sensor_) report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
   return std::move(scene_);
 }

@@ -93,6 +93,7 @@ class Reader {
   void read_shape_parts(Params& p, Shape& shape);
   std::optional<AreaEmitter> read_area(const Element& e);
   void check_placement(const Element& e, const Shape& shape);
+  void warn_of_media_around_camera();
   void read_shape_group(const Element& e);
   void read_instance(const Element& e);
 
@@ -127,6 +128,7 @@ class Reader {
   Report& report_;
   Ids ids_;
   Scene scene_;
+  std::vector<const Element*> shape_elements_;  // of the scene's shapes
   const Element* sensor_ = nullptr;
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // of the shape that was read last; nullptr: the default

@@ -77,24 +77,35 @@ class Finder {
     return {d.center - d.u - d.v, d.center + d.u + d.v, d.center + (d.u - d.v) * side};
   }
 
-  void mark(std::uint32_t surface, double reach) {
-    float& together = g_.surfaces[surface].together;
-    together = std::max(together, static_cast<float>(reach));
+  void mark(std::uint32_t surface, double reach, bool own = true) {
+    SurfaceInfo& s = g_.surfaces[surface];
+    s.together = std::max(s.together, static_cast<float>(reach));
+    if (!own) return;  // hits on instances have reaches of their own
+    if (!(s.reach > 0)) {
+      const Parts& p = shapes_[surface];
+      for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));
+    }
+    s.reach = std::max(s.reach, s.together);
   }
   bool spent(std::uint64_t pairs) {
     if ((pairs_ += pairs) <= kMaxPairs) return false;
     for (SurfaceInfo& s : g_.surfaces) s.together = 1;
+    const PrimitiveSet& own = g_.own;
+    for (std::uint32_t i = own.triangles.first; i < own.triangles.last; ++i) mark(g_.triangle_surface[i], 1);
+    for (std::uint32_t i = own.spheres.first; i < own.spheres.last; ++i) mark(g_.spheres[i].surface, 1);
+    for (std::uint32_t i = own.disks.first; i < own.disks.last; ++i) mark(g_.disks[i].surface, 1);
+    for (std::uint32_t i = own.cylinders.first; i < own.cylinders.last; ++i) mark(g_.cylinders[i].surface, 1);
     return true;
   }
 
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
-    if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n.surface);
+    if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
     // Each pair of null surfaces comes twice.
     if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
-      mark(n.surface, 1);
-      mark(o.surface, 1);
+      mark(n.surface, 1, n.instance == kNone);
+      mark(o.surface, 1, o.instance == kNone);
       return;
     }
     compare_pieces(n.surface, o);
@@ -144,9 +155,9 @@ class Finder {
   }
 
   // A mesh may hold a triangle twice: cells of one file that share a wall.
-  void twice_in_itself(std::uint32_t surface) {
+  void twice_in_itself(const SurfaceBox& n) {
     std::vector<std::array<double, 9>> keys;
-    const Parts& mine = shapes_[surface];
+    const Parts& mine = shapes_[n.surface];
     if (spent(mine.triangles)) return;
     for (std::uint32_t i = 0; i < mine.triangles; ++i) {
       const Piece p = piece(mine, i);
@@ -157,7 +168,7 @@ class Finder {
     }
     std::sort(keys.begin(), keys.end());
     for (auto it = keys.begin(); (it = std::adjacent_find(it, keys.end())) != keys.end(); ++it)
-      for (const double x : *it) mark(surface, std::abs(x));
+      for (const double x : *it) mark(n.surface, n.instance == kNone ? std::abs(x) : 1, n.instance == kNone);
   }
 
   Geometry& g_;

@@ -31,12 +31,10 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 // point just outside. And where another wall of a room begins at the edge, the rounding of the point must not
 // put it behind that wall, from where a ray would get out: by at most sqrt(3) / 2 units in the last place,
 // 2^-24, of the reach. So points keep four of them from every edge. `twice_area`: of the triangle.
-void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach, Barycentric& b) {
-  const double margin = 0x1p-22 * reach / twice_area;  // times an edge: the share of the height over it
+[[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
+                                       Barycentric& b) {
   const double w = 1 - b.u - b.v;
-  const double edges = std::abs(e1.x) + std::abs(e1.y) + std::abs(e1.z) + std::abs(e2.x) + std::abs(e2.y) +
-                       std::abs(e2.z);  // no edge is longer
-  if (std::min(w, std::min(b.u, b.v)) > margin * edges) return;
+  const double margin = 0x1p-22 * reach / twice_area;  // times an edge: the share of the height over it
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);
   const double u = std::max(0., b.u - lu), v = std::max(0., b.v - lv), rest = std::max(0., w - lw);
@@ -45,25 +43,21 @@ void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reac
   b.v = lv + v * k;
 }
 
-float reach_of(const V3& a, const V3& b, const V3& c) {
-  return std::max(largest(a), std::max(largest(b), largest(c)));
-}
-
 bool complete_triangle(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
   const std::uint32_t* idx = &g.indices[3 * i];
-  const V3 &a0 = g.positions[idx[0]], &a1 = g.positions[idx[1]], &a2 = g.positions[idx[2]];
-  const V3d v0(a0), v1(a1), v2(a2);
+  const V3d v0(g.positions[idx[0]]), v1(g.positions[idx[1]]), v2(g.positions[idx[2]]);
   const V3d e1 = v1 - v0, e2 = v2 - v0;
   Barycentric b;
   if (!meet_triangle(v0, e1, e2, o, d, b)) return false;
   const V3d n = e1.cross(e2);
   const double twice_area = n.length();
-  hit.reach = reach_of(a0, a1, a2);
-  keep_from_edges(e1, e2, twice_area, hit.reach, b);
-  hit.t = static_cast<float>(b.t);
-  hit.p = V3(v0 + e1 * b.u + e2 * b.v);
   hit.surface = g.triangle_surface[i];
   const SurfaceInfo& s = g.surfaces[hit.surface];
+  hit.reach = s.reach > 0 ? s.reach : g.reach_of(i);
+  if (!(std::min(1 - b.u - b.v, std::min(b.u, b.v)) > s.edge))
+    keep_from_edges(e1, e2, twice_area, hit.reach, b);
+  hit.t = static_cast<float>(b.t);
+  hit.p = V3(v0 + e1 * b.u + e2 * b.v);
   hit.ng = V3(n * (s.orientation / twice_area));
   const auto u = static_cast<float>(b.u), v = static_cast<float>(b.v), w = 1 - u - v;
   hit.uv = {u, v};
@@ -115,9 +109,9 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d
   if (!(l > 0)) return false;
   n /= l;
   hit.p = V3(s.center + n * s.radius);
-  hit.reach = reach_in_double(hit.p, s.radius);
   hit.surface = s.surface;
   const SurfaceInfo& info = g.surfaces[s.surface];
+  hit.reach = std::max(info.reach, reach_in_double(hit.p, s.radius));
   hit.ng = V3(n) * info.orientation;
   if (!info.wants_uv && !info.wants_tangent) {
     hit.shading = Frame(hit.ng);
@@ -156,7 +150,7 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& 
     b /= std::sqrt(r2);
   }
   hit.p = V3(s.center + s.u * a + s.v * b);
-  hit.reach = reach_in_double(hit.p, std::sqrt(uu + vv));
+  hit.reach = std::max(g.surfaces[s.surface].reach, reach_in_double(hit.p, std::sqrt(uu + vv)));
   hit.surface = s.surface;
   hit.ng = V3(s.n) * g.surfaces[s.surface].orientation;
   double angle = std::atan2(b, a);
@@ -182,9 +176,9 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
   const double z = std::clamp(q.dot(s.axis), 0., s.length);
   const V3d n = s.u * (x / l) + s.v * (y / l);
   hit.p = V3(s.p0 + s.axis * z + n * s.radius);
-  hit.reach = reach_in_double(hit.p, s.length + s.radius);
   hit.surface = s.surface;
   const SurfaceInfo& info = g.surfaces[s.surface];
+  hit.reach = std::max(info.reach, reach_in_double(hit.p, s.length + s.radius));
   hit.ng = V3(n) * info.orientation;
   double angle = std::atan2(y, x);
   if (angle < 0) angle += 2 * 3.14159265358979323846;
@@ -201,11 +195,8 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
 V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-  if (!(!kBuilt.instances || id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit)
-                                                  : complete_instanced(id, o, d, hit)))
-    return false;
-  hit.reach = std::max(hit.reach, surfaces[hit.surface].together);
-  return true;
+  return !kBuilt.instances || id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit)
+                                                   : complete_instanced(id, o, d, hit);
 }
 
 bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const {
@@ -262,7 +253,7 @@ bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, Surf
   const Frame local = hit.shading;
   hit.p = V3(i.to_world.point(V3d(hit.p)));
   hit.ng = normal(hit.ng);
-  hit.reach = reach_of(i, hit.p, hit.ng, hit.reach);
+  hit.reach = std::max(surfaces[hit.surface].together, render::reach_of(i, hit.p, hit.ng, hit.reach));
   const V3 ns = normal(local.n);
   hit.shading = info.wants_tangent ? Frame::from_tangent(ns, normalize(vector(local.s))) : Frame(ns);
   if (info.wants_slopes) hit.set_slopes(vector(local.to_world(hit.du)), vector(local.to_world(hit.dv)), 1);
@@ -316,6 +307,11 @@ double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, do
     if (t > t_min && t < t_max && z >= 0 && z <= s.length) return t;
   }
   return kInf;
+}
+
+float Geometry::reach_of(std::uint32_t triangle) const {
+  return std::max(largest(vertex(triangle, 0)),
+                  std::max(largest(vertex(triangle, 1)), largest(vertex(triangle, 2))));
 }
 
 std::uint64_t Geometry::bytes() const {

@@ -41,6 +41,10 @@ struct SurfaceInfo {  // one per scene shape
   // Of surfaces that coincide somewhere with another, one of the two null: the largest reach of those (see
   // SurfaceHit), so that a ray steps over all of them at once. 0: none does.
   float together = 0;
+  // The reach of a hit on a triangle, where those of the triangles are within a factor of 16; 0: each has its
+  // own. Of other shapes the least.
+  float reach = 0;
+  double edge = 0;  // hits whose barycentric coordinates are all above this are clear of all edges
 };
 
 struct Sphere {
@@ -153,6 +157,8 @@ class Geometry {
   // Completes a hit on this primitive: t, position, normals, uv, from exact data and plain arithmetic.
   // Nothing if the ray does not meet it after all.
   bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
+  // The largest coordinate of its corners.
+  float reach_of(std::uint32_t triangle) const;
 
  private:
   bool complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const;

@@ -123,8 +123,27 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     add_channel(g.attributes, a, surface, a.name.starts_with("face_") ? first_triangle : base, kept);
 }
 
+// What completing a hit on any of these triangles has not to find out again; from `first` on.
+void note_reach(const Geometry& g, std::uint32_t first, SurfaceInfo& info) {
+  float least = std::numeric_limits<float>::infinity(), most = 0;
+  for (std::uint32_t i = first; i < g.triangle_count(); ++i) {
+    const float reach = g.reach_of(i);
+    least = std::min(least, reach);
+    most = std::max(most, reach);
+  }
+  info.reach = least * 16 >= most ? most : 0;
+  for (std::uint32_t i = first; i < g.triangle_count(); ++i) {
+    const V3d a(g.vertex(i, 0)), e1 = V3d(g.vertex(i, 1)) - a, e2 = V3d(g.vertex(i, 2)) - a;
+    const double longest = std::max((e2 - e1).length(), std::max(e1.length(), e2.length()));
+    info.edge =
+        std::max(info.edge, 0x1p-22 * std::max(info.reach, g.reach_of(i)) * longest / e1.cross(e2).length());
+  }
+}
+
 void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& space) {
+  const std::uint32_t triangles = g.triangle_count();
   append_mesh(g, p.mesh, p.normals_given, surface, space);
+  if (g.triangle_count() > triangles) note_reach(g, triangles, g.surfaces[surface]);
   if (p.sphere) {
     Sphere s = *p.sphere;
     s.center = space(s.center);

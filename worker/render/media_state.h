@@ -32,6 +32,19 @@ class MediaState {
   // Boundaries that a path may be inside of at once. One more is an error of the sample, which is counted.
   static constexpr int kCapacity = 32;
 
+  // Copied for every shadow ray: only what is in use.
+  MediaState() = default;
+  MediaState(const MediaState& o) { *this = o; }
+  MediaState& operator=(const MediaState& o) {
+    background_ = o.background_;
+    bodies_ = o.bodies_;
+    count_ = o.count_;
+    overflowed_ = o.overflowed_;
+    std::copy_n(o.body_.begin(), bodies_, body_.begin());
+    std::copy_n(o.effect_.begin(), count_, effect_.begin());
+    return *this;
+  }
+
   bool any() const { return count_ > 0; }
   bool several() const { return count_ > 1; }
   std::uint32_t one() const { return effect_[0]; }
@@ -63,7 +76,7 @@ class MediaState {
   int bodies_ = 0, count_ = 0;
   bool overflowed_ = false;
   std::array<Body, kCapacity> body_;
-  std::array<std::uint32_t, kCapacity + 1> effect_{kNone};
+  std::array<std::uint32_t, kCapacity + 1> effect_;
 };
 
 }  // namespace ls::render

@@ -25,8 +25,9 @@ auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const V3& w, const V3& 
     -> Within {
   if constexpr (F.media) {
     if (!world_.use_media) return in;
-    const bool outside = dot(w, hit.ng) > 0, through = outside == (dot(from, hit.ng) > 0);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (!surface.transition && !(surface.together > 0)) return in;
+    const bool outside = dot(w, hit.ng) > 0, through = outside == (dot(from, hit.ng) > 0);
     if (surface.together > 0 && through) return through_all(hit, w, from, in);
     stand(surface, outside, through, in);
   }

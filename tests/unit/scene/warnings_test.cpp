@@ -125,5 +125,34 @@ TEST(Warnings, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
   EXPECT_THAT(r.diagnostics.at(0).text, HasSubstr("<bsdf type=\"null\"/>"));
 }
 
+// The camera of kSensor is at the origin.
+TEST(Warnings, TellOfACameraInAMediumThatItsSensorDoesNotName) {
+  const std::string fog = "<medium type=\"homogeneous\" id=\"fog\"/>";
+  const auto body = [](const std::string& type, const std::string& inside, const std::string& to_world) {
+    return "<shape type=\"" + type + "\"><bsdf type=\"null\"/><ref name=\"" + inside +
+           "\" id=\"fog\"/><transform name=\"to_world\">" + to_world + "</transform></shape>";
+  };
+  const struct {
+    std::string shape;
+    bool told;
+  } rows[] = {
+      {body("cube", "interior", ""), true},
+      {body("sphere", "interior", "<scale value=\"2\"/><translate x=\"1.9\"/>"), true},
+      {body("sphere", "interior", "<scale value=\"2\"/><translate x=\"2.1\"/>"), false},
+      {body("cube", "interior", "<rotate z=\"1\" angle=\"45\"/><translate x=\"1.3\"/>"), true},
+      {body("cube", "interior", "<rotate z=\"1\" angle=\"45\"/><translate x=\"1.3\" y=\"1.3\"/>"), false},
+      {body("cube", "exterior", ""), false},
+      {body("rectangle", "interior", ""), false},
+  };
+  for (const auto& row : rows) {
+    const auto r = read(with_sensor(fog + row.shape));
+    ASSERT_TRUE(r.scene) << row.shape;
+    ASSERT_EQ(r.diagnostics.size(), row.told ? 1u : 0u) << row.shape;
+    if (!row.told) continue;
+    EXPECT_THAT(r.diagnostics[0].text, HasSubstr("that holds a medium"));
+    EXPECT_THAT(r.diagnostics[0].text, HasSubstr("add <ref name=\"medium\" id=\"fog\"/>"));
+  }
+}
+
 }  // namespace
 }  // namespace ls
