@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """How a ray's way through steam is searched for light: exponential, equi-angular, both, and the default integrator.
 
-usage: distances.py [--spp N] [--voxel SIZE] [--threads N] [--keep DIR]
+usage: distances.py [--spp N] [--voxel SIZE] [--threads N] [--keep DIR] [--picture OUT.jpg]
 Renders the demo scene by its sun and window, and by a lamp in the steam instead of the sun, with `volpath` and with each setting
 of `volpath_distant_mis`, at the same samples a pixel. Prints relMSE with its 95 % interval (the renderer's own estimate, which
-needs no reference), seconds, and efficiency 1 / (relMSE x seconds) over that of `exponential`. --keep keeps the pictures, in which
-the settings differ by noise alone. A bench, not a test: nothing else should run meanwhile.
+needs no reference), core seconds, and efficiency 1 / (relMSE x core seconds) over that of `exponential`. --keep keeps the pictures,
+in which the settings differ by noise alone; --picture makes one of docs/distances.md of them: the lamp by `exponential`, `mis` and
+`volpath` (needs numpy, the OpenEXR package of PyPI and ImageMagick's convert). A bench, not a test.
 """
 import argparse
 import json
@@ -52,6 +53,20 @@ def render(scene, out, args):
     return json.loads(report.read_text())
 
 
+def picture(folder, out):
+    """Side by side, a strip of black between; sRGB after an exposure that shows the steam."""
+    import numpy as np
+    from agreement import load
+    parts = []
+    for name in ("exponential_power", "mis_power", "volpath_default"):
+        linear = np.clip(load(folder / f"lamp_{name}.exr") * 1.4, 0, 1)
+        parts += [np.where(linear <= .0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - .055), np.zeros((linear.shape[0], 4, 3))]
+    image = (np.concatenate(parts[:-1], 1) * 255 + .5).astype(np.uint8)
+    ppm = folder / "picture.ppm"
+    ppm.write_bytes(b"P6 %d %d 255\n" % (image.shape[1], image.shape[0]) + image.tobytes())
+    subprocess.run(["convert", ppm, "-quality", "90", out], check=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--spp", type=int, default=64)
@@ -59,6 +74,7 @@ def main():
     parser.add_argument("--voxel", default="0.05")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--keep", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(args.keep or temporary).resolve()
@@ -66,17 +82,19 @@ def main():
         demo(folder, args.voxel)
         for light in ("sun", "lamp"):
             print(f"{light}, {args.size}, {args.spp} samples a pixel")
-            print(f"{'distance':<14}{'heuristic':<11}{'relMSE':>10}  {'95 %':<20}{'seconds':>9}{'efficiency':>12}")
+            print(f"{'distance':<14}{'heuristic':<11}{'relMSE':>10}  {'95 %':<20}{'core s':>9}{'efficiency':>12}")
             rows = []
             for distance, heuristic in SETTINGS:
                 scene = with_integrator(folder / f"{light}.xml", distance, heuristic)
                 rows.append((distance, heuristic, render(scene, folder / f"{light}_{distance}_{heuristic or 'default'}.exr", args)))
-            base = 1 / (rows[1][2]["relmse"] * rows[1][2]["render_seconds"])
+            base = 1 / (rows[1][2]["relmse"] * rows[1][2]["core_seconds"])
             for distance, heuristic, r in rows:
                 low, high = r["relmse_ci95"]
-                ratio = 1 / (r["relmse"] * r["render_seconds"]) / base
+                ratio = 1 / (r["relmse"] * r["core_seconds"]) / base
                 print(f"{distance:<14}{heuristic:<11}{r['relmse']:>10.3g}  {f'{low:.3g} to {high:.3g}':<20}"
-                      f"{r['render_seconds']:>9.1f}{ratio:>12.2f}", flush=True)
+                      f"{r['core_seconds']:>9.1f}{ratio:>12.2f}", flush=True)
+        if args.picture:
+            picture(folder, args.picture.resolve())
 
 
 if __name__ == "__main__":

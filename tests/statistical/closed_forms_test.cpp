@@ -37,6 +37,7 @@ const std::vector<Case>& table() {
     add_distant(c);
     add_emission(c);
     add_overlaps(c);
+    add_points_in_grids(c);
     return c;
   }();
   return cases;

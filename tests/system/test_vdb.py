@@ -129,6 +129,49 @@ def test_a_grid_is_found_by_name(tmp_path):
     assert smoke != heat
 
 
+@pytest.mark.parametrize("kind", ["without a name", "of another name", "of no class"])
+def test_what_is_unusual_about_the_only_grid_changes_nothing(tmp_path, kind):
+    def seen(grids):
+        vdb.write(str(tmp_path / "fog.vdb"), grids=grids)
+        return digest(lightshaft("render", write_scene(tmp_path), "-o", tmp_path / "a.exr", "--spp", 2))
+
+    usual = seen([grid(fog_array())])
+    unusual = grid(fog_array(), {"without a name": "", "of another name": "smoke"}.get(kind, "density"))
+    if kind == "of no class":
+        unusual.gridClass = vdb.GridClass.UNKNOWN
+
+    assert seen([unusual]) == usual
+
+
+def test_of_grids_of_one_name_one_must_be_meant(tmp_path):
+    vdb.write(str(tmp_path / "fog.vdb"), grids=[grid(fog_array()), grid(fog_array() * 0 + 1e-3)])
+    said = render(write_scene(tmp_path), tmp_path, code=2).stderr
+    seen = [digest(lightshaft("render", write_scene(tmp_path, f"density[{i}]"), "-o", tmp_path / "a.exr", "--spp", 2)) for i in (0, 1)]
+
+    assert "'density[0]', 'density[1]'" in said
+    assert seen[0] != seen[1]
+
+
+def test_a_grid_lies_where_its_affine_map_puts_it(tmp_path):
+    # Rotated by a right angle about z as it is in the file, and the values turned back: the same fog.
+    turned = grid(fog_array())
+    voxel = 2 / N
+    turned.transform = vdb.createLinearTransform([[0, voxel, 0, 0], [-voxel, 0, 0, 0], [0, 0, voxel, 0],
+                                                  [1 - voxel / 2, -1 + voxel / 2, -1 + voxel / 2, 1]])
+    turned.copyFromArray(fog_array().transpose(1, 0, 2)[:, ::-1].copy(), tolerance=-1)
+    reports = []
+    for name, made in (("straight", grid(fog_array())), ("turned", turned)):
+        vdb.write(str(tmp_path / "fog.vdb"), grids=[made])
+        scene = write_scene(tmp_path)
+        reference = ["--reference", tmp_path / "straight.exr"] if reports else []
+        lightshaft("render", scene, "-o", tmp_path / f"{name}.exr", "--spp", 64, "--float", "--seed", len(reports), "--threads", 2,
+                   "--report", tmp_path / "r.json", *reference)
+        reports.append(load(tmp_path / "r.json"))
+
+    # Both renders' noise, which is twice the estimate's square; a fog in another place differs by more than itself.
+    assert reports[1]["convergence"][-1]["true_relmse"] < 4 * reports[1]["relmse"]
+
+
 def test_a_scene_without_a_vdb_never_maps_openvdb(tmp_path):
     scene = write_fog(tmp_path)
     mapped = subprocess.run(["sh", "-c", 'LD_DEBUG=files exec "$0" render "$1" -o "$2" --spp 2 --quiet', bin_dir() / "lightshaft", scene, tmp_path / "o.exr"],

@@ -105,7 +105,7 @@ TEST(Nvdb, ChoosesAGridByItsName) {
   EXPECT_THAT(read(both, "flame").error,
               HasSubstr("it has no grid 'flame'; there are 'temperature', 'density'"));
   b.name = "fuel";
-  EXPECT_THAT(read(a.file() + b.file()).error, HasSubstr("none is called 'density'; name one of"));
+  EXPECT_THAT(read(a.file() + b.file()).error, HasSubstr("no single one is called 'density'; name one of"));
 }
 
 TEST(Nvdb, RefusesWhatIsNoDensityByName) {

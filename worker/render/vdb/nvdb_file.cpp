@@ -96,8 +96,8 @@ const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
   for (const Entry& e : all)
     if (e.name == (wanted.empty() ? "density" : wanted)) return e;
   if (wanted.empty())
-    throw Refused{1,
-                  "the file holds several grids and none is called 'density'; name one of " + names_of(all)};
+    throw Refused{1, "the file holds several grids and no single one is called 'density'; name one of " +
+                         names_of(all)};
   throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(all)};
 }
 

@@ -43,8 +43,8 @@ std::string choose(const openvdb::io::File& file, const std::string& wanted) {
     for (const auto& n : names) {
       if (n == "density") return n;
     }
-    throw Refused{1,
-                  "the file holds several grids and none is called 'density'; name one of " + names_of(file)};
+    throw Refused{1, "the file holds several grids and no single one is called 'density'; name one of " +
+                         names_of(file)};
   }
   for (const auto& n : names) {
     if (n == wanted) return n;
