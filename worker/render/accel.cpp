@@ -16,6 +16,7 @@
 
 #include "worker/render/built.h"
 #include "worker/render/counters.h"
+#include "worker/render/primitive_side.h"
 #include "worker/render/shape_boxes.h"
 
 namespace ls::render {
@@ -192,14 +193,6 @@ RTCScene new_scene(RTCDevice device, bool coincident) {
                                  : RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
   return s;
-}
-
-struct Side {
-  std::uint32_t first, last;
-  std::uint32_t count() const { return last - first; }
-};
-Side side_of(const PrimitiveRange& r, int side) {
-  return side ? Side{r.passing, r.last} : Side{r.first, r.passing};
 }
 
 void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes& to, int side,
