@@ -7,6 +7,7 @@ import struct
 import pytest
 from cli_kit import FOG, digest, lightshaft, write_fog
 from exr_layers import read
+from local_farm import SCENE, HttpError
 
 SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
 ALL = ("albedo,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,position,shape_id,single,"
@@ -153,3 +154,17 @@ def test_a_job_is_extended_to_the_layers_of_one_shot(farm, fog, tmp_path):
 
     assert pixels == one_shot
     assert layers(fetched(farm, job, tmp_path / "farm.exr")) == layers(tmp_path / "one.exr")
+
+
+def test_the_spec_over_http_asks_for_layers_and_is_told_what_there_is(farm, tmp_path):
+    farm.add_worker(fake=True)
+    with pytest.raises(HttpError) as refused:
+        farm.submit(SCENE, aov="depth,radiosity")
+    assert refused.value.status == 400
+    assert "radiosity" in str(refused.value) and "position" in str(refused.value)
+
+    job = farm.submit(SCENE, aov="material_id,depth", spp=4)
+    farm.wait_for_job(job)
+
+    channels = set(layers(fetched(farm, job, tmp_path / "fake.exr")))
+    assert {"depth.Z", "crypto_material00.R"} <= channels and "crypto_object00.R" not in channels

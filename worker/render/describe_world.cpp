@@ -66,6 +66,7 @@ WorldReport describe(const World& w) {
   feature(w.need.emission, "light given off by media");
   feature(w.need.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null ones");
+  feature(w.need.split, "AOVs of light");
   const bool angles =
       w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
   feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points, "equi-angular sampling about lights");
