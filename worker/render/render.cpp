@@ -155,6 +155,7 @@ TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, 
 std::vector<std::string> all_variants(const World& world) {
   std::vector<std::string> names;
   for (const Variant& v : variants_for(world)) names.emplace_back(v.name);
+  names.emplace_back(split_variant(world).name);
   return names;
 }
 
