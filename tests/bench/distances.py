@@ -6,7 +6,7 @@ Renders the demo scene by its sun and window, and by a lamp in the steam instead
 of `volpath_distant_mis`, at the same samples a pixel. Prints relMSE with its 95 % interval (the renderer's own estimate, which
 needs no reference), core seconds, and efficiency 1 / (relMSE x core seconds) over that of `exponential`. --keep keeps the pictures,
 in which the settings differ by noise alone; --picture makes one of docs/distances.md of them: the lamp by `exponential`, `mis` and
-`volpath` (needs numpy, the OpenEXR package of PyPI and ImageMagick's convert). A bench, not a test.
+`volpath` (needs numpy and, of PyPI, OpenEXR and mitsuba, which writes the JPEG). A bench, not a test.
 """
 import argparse
 import json
@@ -54,17 +54,18 @@ def render(scene, out, args):
 
 
 def picture(folder, out):
-    """Side by side, a strip of black between; sRGB after an exposure that shows the steam."""
+    """Side by side, a strip of black between; sRGB after an exposure that shows the steam, every pixel as four."""
     import numpy as np
     from agreement import load
     parts = []
     for name in ("exponential_power", "mis_power", "volpath_default"):
-        linear = np.clip(load(folder / f"lamp_{name}.exr") * 1.4, 0, 1)
+        linear = np.clip(load(folder / f"lamp_{name}.exr") * .35, 0, 1)
         parts += [np.where(linear <= .0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - .055), np.zeros((linear.shape[0], 4, 3))]
     image = (np.concatenate(parts[:-1], 1) * 255 + .5).astype(np.uint8)
-    ppm = folder / "picture.ppm"
-    ppm.write_bytes(b"P6 %d %d 255\n" % (image.shape[1], image.shape[0]) + image.tobytes())
-    subprocess.run(["convert", ppm, "-quality", "90", out], check=True)
+    image = image.repeat(2, 0).repeat(2, 1)
+    import mitsuba
+    mitsuba.set_variant("scalar_rgb")
+    mitsuba.Bitmap(image).write(str(out), quality=88)
 
 
 def main():
