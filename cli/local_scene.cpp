@@ -138,7 +138,7 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
   LocalScene scene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
                    std::move(files), frame};
   for (const bool sees_media : {false, true})
-    for (const Asset& a : scene::pruned(scene.scene, sees_media).scene.assets)
+    for (const Asset& a : scene::pruned(scene.scene, {sees_media, !sees_media}).scene.assets)
       scene.needed[sees_media].insert(a.digest);
   return scene;
 }

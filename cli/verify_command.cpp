@@ -15,7 +15,6 @@
 #include "cli/say.h"
 #include "cli/verify_image.h"
 #include "common/base/plain_text.h"
-#include "common/scene/integrators.h"
 #include "common/scene/prune.h"
 #include "common/scene/serialize.h"
 #include "coordinator/mattes.h"
@@ -140,7 +139,9 @@ int run(const Flags& flags) {
                                 coordinator::wants_labels(image->settings));
   if (!scene) return say_rejected(scene.error());
   // What a job of it renders.
-  scene->scene = scene::pruned(scene->scene, scene::sees_media(image->settings.integrator)).scene;
+  scene->scene =
+      scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
+          .scene;
   if (const auto same = check_same(*image, *scene, flags); !same) return say_error(same.error());
   const int threads = flags.threads > 0 ? flags.threads : worker::usable_cpus();
   const auto limit = render::limit_threads(threads);

@@ -103,13 +103,13 @@ Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
                                                   std::optional<std::uint32_t> frame,
                                                   const UploadedScene& read, const RenderSettings& settings) {
-  const bool sees_media = scene::sees_media(settings.integrator);
-  scene::Pruned pruned = scene::pruned(read.scene, sees_media);
+  const scene::PrunedFor whom = scene::pruned_for(settings.integrator, settings.max_depth);
+  scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
   const auto again = read_uploaded(request, blobs, frame, true);  // for the places that name it
   if (!again) return tl::unexpected(again.error());
-  return scene::pruned(again->scene, sees_media);  // it has come meanwhile
+  return scene::pruned(again->scene, whom);  // it has come meanwhile
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "common/base/overloaded.h"
 #include "common/scene/bsdf_traits.h"
+#include "common/scene/integrators.h"
 #include "common/scene/limits.h"
 #include "common/scene/validate.h"
 
@@ -17,7 +18,7 @@ bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
 
 class Pruner {
  public:
-  Pruner(const Scene& scene, bool sees_media) : s_(scene), sees_media_(sees_media) {}
+  Pruner(const Scene& scene, const PrunedFor& whom) : s_(scene), whom_(whom) {}
 
   Pruned run() {
     const std::vector<Asset> assets = s_.assets;
@@ -71,7 +72,7 @@ class Pruner {
   void files(const std::vector<Asset>& before, const std::vector<Asset>& after);
 
   Scene s_;
-  const bool sees_media_;
+  const PrunedFor whom_;
   std::vector<LeftOut> left_out_;
   std::uint32_t blends_ = 0, masks_ = 0;
 };
@@ -98,7 +99,7 @@ void Pruner::media() {
   int lowest = std::numeric_limits<int>::max();
   for (const Medium& m : s_.media) lowest = std::min(lowest, priority(m));
   for (const Medium& m : s_.media)
-    live.push_back(sees_media_ &&
+    live.push_back(whom_.media &&
                    (priority(m) > lowest || std::visit([&](const auto& x) { return does_something(x); }, m)));
   const auto drop_dead = [&](std::optional<MediumIndex>& m) {
     if (!m) return;
@@ -117,7 +118,7 @@ void Pruner::media() {
     for (Shape& s : s_.shapes) s.is_medium_transition = false;
   std::uint32_t dead = 0;
   for (std::size_t i = 0; i < live.size(); ++i) dead += used[i] && !live[i];
-  note("medium", sees_media_ ? "it neither takes light nor gives any" : "the integrator `path` sees none",
+  note("medium", whom_.media ? "it neither takes light nor gives any" : "the integrator `path` sees none",
        dead);
 }
 
@@ -204,7 +205,8 @@ std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, co
 // shapes goes, with its instances.
 void Pruner::invisible() {
   const auto unseen = [&](const Shape& s) {
-    return std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition && !s.emitter;
+    return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&
+           !s.is_medium_transition && !s.emitter;
   };
   note("surface", "light passes it unchanged, and there is no medium on either side",
        erase_labelled(s_.shapes, s_.shape_labels, unseen));
@@ -224,6 +226,11 @@ void Pruner::files(const std::vector<Asset>& before, const std::vector<Asset>& a
 
 }  // namespace
 
-Pruned pruned(const Scene& scene, bool sees_media) { return Pruner(scene, sees_media).run(); }
+PrunedFor pruned_for(std::string_view integrator, int max_depth) {
+  const bool media = sees_media(integrator);
+  return {media, !media && max_depth >= 0};
+}
+
+Pruned pruned(const Scene& scene, const PrunedFor& whom) { return Pruner(scene, whom).run(); }
 
 }  // namespace ls::scene

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/scene/scene.h"
@@ -24,8 +25,14 @@ struct Pruned {
   std::vector<LeftOut> left_out;  // in a fixed order
 };
 
-// `scene` is consistent (validate.h). `sees_media`: false for the integrator `path`, whose scenes have none.
-// Pruning what is pruned changes nothing.
-Pruned pruned(const Scene& scene, bool sees_media);
+// For which integrator: `media` is false for `path`, whose scenes have none; `passing_counts` where surfaces
+// that light passes unchanged use up its depth, so that they can be told by what is missing behind them.
+struct PrunedFor {
+  bool media = true, passing_counts = false;
+};
+PrunedFor pruned_for(std::string_view integrator, int max_depth);
+
+// `scene` is consistent (validate.h). Pruning what is pruned changes nothing.
+Pruned pruned(const Scene& scene, const PrunedFor& whom);
 
 }  // namespace ls::scene

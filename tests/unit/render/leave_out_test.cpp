@@ -90,7 +90,7 @@ TEST(LeaveOut, TakingOutDeadPartsDoesNotChangeABit) {
   int changed = 0, scene = 0;
   for (SceneKit kit : scenes_with_dead_parts()) {
     const auto before = render(*test::world_of(kit));
-    const scene::Pruned pruned = scene::pruned(kit.scene, true);
+    const scene::Pruned pruned = scene::pruned(kit.scene, {});
     EXPECT_FALSE(pruned.left_out.empty()) << scene;
     kit.scene = pruned.scene;
     const auto world = test::world_of(kit);
@@ -127,7 +127,7 @@ TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
   EXPECT_EQ(variant(foggy()), "homogeneous grey media");
   EXPECT_EQ(variant(cloudy()), "grey grids");
   auto world = test::world_of(cloudy());
-  EXPECT_EQ(all_variants(*world).back(), covering_variants(*world).back());
+  EXPECT_THAT(covering_variants(*world), testing::Contains(all_variants(*world).back()));
 }
 
 TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {

@@ -20,9 +20,9 @@ using ::testing::Field;
 using ::testing::HasSubstr;
 
 Pruned pruned(std::string_view objects, bool sees_media = true) {
-  const Pruned p = scene::pruned(must_read(with_sensor(objects)), sees_media);
+  const Pruned p = scene::pruned(must_read(with_sensor(objects)), {sees_media});
   EXPECT_EQ(scene::find_inconsistency(p.scene), "");
-  EXPECT_EQ(scene::pruned(p.scene, sees_media).scene, p.scene);
+  EXPECT_EQ(scene::pruned(p.scene, {sees_media}).scene, p.scene);
   EXPECT_EQ(serialize(deserialize_scene(serialize(p.scene)).value()), serialize(p.scene));
   return p;
 }
@@ -122,13 +122,16 @@ TEST(Prune, LightsWithoutPowerGoWithTheirFiles) {
   const Pruned p = pruned(sphere(kGrey + dark) +
                           R"(<emitter type="point"><rgb name="intensity" value="0"/></emitter>
                              <emitter type="constant"><rgb name="radiance" value="0"/></emitter>
-                             <emitter type="envmap"><string name="filename" value="wood.png"/><float name="scale" value="0"/></emitter>
                              <emitter type="point"/>)");
   EXPECT_EQ(p.scene.emitters.size(), 1u);
   EXPECT_FALSE(p.scene.shapes.at(0).emitter);
-  EXPECT_TRUE(p.scene.assets.empty());
   EXPECT_THAT(p.left_out,
-              Contains(AllOf(Field(&scene::LeftOut::what, "light"), Field(&scene::LeftOut::count, 4u))));
+              Contains(AllOf(Field(&scene::LeftOut::what, "light"), Field(&scene::LeftOut::count, 3u))));
+
+  const Pruned map = pruned(
+      R"(<emitter type="envmap"><string name="filename" value="wood.png"/><float name="scale" value="0"/></emitter>)");
+  EXPECT_TRUE(map.scene.emitters.empty());
+  EXPECT_TRUE(map.scene.assets.empty());
 }
 
 TEST(Prune, AMediumThatDoesNothingGoesWithItsGrid) {
@@ -171,6 +174,13 @@ TEST(Prune, AnIntegratorWithoutMediaNeedsNoneOfTheirFiles) {
   EXPECT_TRUE(scene::sees_media("volpath_distant_mis"));
 }
 
+TEST(Prune, SurfacesThatUseUpTheDepthOfPathsStay) {
+  const Scene s = must_read(with_sensor(sphere(kNull) + sphere(kGrey)));
+  EXPECT_EQ(scene::pruned(s, scene::pruned_for("path", 3)).scene.shapes.size(), 2u);
+  EXPECT_EQ(scene::pruned(s, scene::pruned_for("path", -1)).scene.shapes.size(), 1u);
+  EXPECT_EQ(scene::pruned(s, scene::pruned_for("volpath", 3)).scene.shapes.size(), 1u);
+}
+
 TEST(Prune, LightOfStrength0NeedsNoGrid) {
   const std::string glow =
       R"(<volume type="gridvolume" name="emission"><string name="filename" value="steam.vdb"/></volume><float name="emission_scale" value="0"/>)";
@@ -181,7 +191,7 @@ TEST(Prune, LightOfStrength0NeedsNoGrid) {
 
 TEST(Prune, TheExampleOfEverythingStaysAsItIs) {
   const Scene s = must_read(kExample);
-  EXPECT_EQ(scene::pruned(s, true).scene, s);
+  EXPECT_EQ(scene::pruned(s, {}).scene, s);
 }
 
 TEST(Needs, AreWhatTheSceneHas) {
