@@ -178,6 +178,8 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoin
       const float rest = k ? u_lobe / x.chance[1] : (u_lobe - x.chance[1]) / x.chance[0];
       auto s = sample_part(k ? m.back : m.front, uv, wo, std::min(rest, 0x1.fffffep-1f), u);
       if (!s) return s;
+      // Where there is nothing of the other it is as if this one stood alone, bit for bit.
+      if (x.share[1 - k] == 0 && x.chance[1 - k] == 0) return s;
       if (s->delta) {
         s->weight *= x.share[k] / x.chance[k];
         s->pdf *= x.chance[k];
