@@ -82,17 +82,18 @@ def random_grid(path):
 
 
 def with_unused(scene, folder):
-    """The scene with two large grids that no pixel depends on: one in no surface, one of density 0."""
-    for name in ("unused.vol", "nothing.vol"):
-        random_grid(folder / name)
-    medium = ('<medium type="heterogeneous" id="{}"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/></volume>'
-              '<float name="scale" value="{}"/></medium>')
-    more = (medium.format("unused", "unused.vol", 1) + medium.format("nothing", "nothing.vol", 0) +
-            '<shape type="sphere"><bsdf type="diffuse"/><ref name="interior" id="nothing"/></shape>')
-    ball = '<shape type="sphere"><bsdf type="diffuse"/></shape>'
+    """The scene with two large files that no pixel depends on: a grid in no surface, an image in a branch of weight 0."""
+    random_grid(folder / "unused.vol")
+    (folder / "nothing.png").write_bytes(os.urandom(UNUSED_BYTES + 1))
+    medium = ('<medium type="heterogeneous" id="unused"><volume name="sigma_t" type="gridvolume"><string name="filename" value="unused.vol"/></volume>'
+              '</medium>')
+    plain = '<bsdf type="diffuse"/>'
+    image = '<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="nothing.png"/></texture></bsdf>'
+    blend = f'<bsdf type="blendbsdf"><float name="weight" value="0"/>{plain}{image}</bsdf>'
+    ball = '<shape type="sphere"><float name="radius" value="0.3"/>{}</shape>'
     fat, lean = folder / "fat.xml", folder / "lean.xml"
-    lean.write_text(scene.read_text().replace("</scene>", ball + "</scene>"))
-    fat.write_text(scene.read_text().replace("</scene>", more + "</scene>"))
+    lean.write_text(scene.read_text().replace("</scene>", ball.format(plain) + "</scene>"))
+    fat.write_text(scene.read_text().replace("</scene>", medium + ball.format(blend) + "</scene>"))
     return fat, lean
 
 
@@ -104,7 +105,7 @@ def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
     fat, lean = with_unused(write_fog(tmp_path), tmp_path)
     told = inspect(fat)
     assert [a["name"] for a in told["assets"]] == ["fog.vol"]
-    assert {f["name"] for f in told["files_left_out"]} == {"unused.vol", "nothing.vol"}
+    assert {f["name"] for f in told["files_left_out"]} == {"unused.vol", "nothing.png"}
     assert told["structures"] == inspect(lean)["structures"]
     assert told["scene_bytes"] == inspect(lean)["scene_bytes"]
 
@@ -117,7 +118,7 @@ def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
             said = lightshaft("submit", scene, "--spp", 2, env=env)
             job = said.stdout.split()[0]
             pixels[scene] = farm.pixels(job)
-            assert "unused.vol" not in said.stderr and "nothing.vol" not in said.stderr
+            assert "unused.vol" not in said.stderr and "nothing.png" not in said.stderr
             report = farm.report(job)
             assert report["needs"]["grids"] and "volume grids" in report["features_used"]
         analysis = report["analysis"]
@@ -133,7 +134,7 @@ def test_a_scene_may_be_sent_whole_and_nothing_beyond_its_needs_goes_to_workers(
     with LocalFarm(tmp_path / "farm") as farm:
         farm.add_worker(fake=False)
         digests = {}
-        for path in (fat, *tmp_path.glob("*.vol")):
+        for path in (fat, *tmp_path.glob("*.vol"), *tmp_path.glob("*.png")):
             digests[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
             farm.request("PUT", f"/api/v1/blobs/{digests[path.name]}", path.read_bytes(), "application/octet-stream")
         scene = digests.pop("fat.xml")
