@@ -221,8 +221,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
-  w.equiangular_points =
-      kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) && a_point_shines_in_a_grid(w);
+  w.equiangular_points = kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) &&
+                         a_point_shines_in_a_grid(w);
   // Lights chosen for a whole segment know no point: what is weighed against them must choose alike.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
