@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 """What a scene does not need, measured: writes docs/leave-out.md.
 
-usage: leave_out.py [--out FILE.md] [--jobs N] [--keep] [--only NAME,...]
+usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone]
 
 For a vacuum, a homogeneous, a grid and a textured scene:
 - instructions per path (callgrind, within render_tile, one thread) of the release build, against a build of the same sources
   without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...);
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
 - what a worker on a farm keeps resident and which libraries it has mapped;
-- bytes uploaded, sent and loaded with 100 MB of assets that nothing needed names, and without.
-Builds land in build/leave-out-*. Needs valgrind and a release build. Instruction counts do not depend on what else runs.
+- bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
+--bytes-alone measures the last two, which need no other build. Builds land in build/leave-out-*. Needs valgrind and a release build. Instruction counts do not depend on what else runs.
 """
 import argparse
 import json
@@ -105,7 +105,7 @@ def on_a_farm(scene, folder):
 
 def with_unused(scene, folder):
     big = folder / "unused.vol"
-    n = 297  # cubed, times four bytes: 100 MB
+    n = 298  # cubed, times four bytes: 100 MiB and a little
     head = b"VOL\x03" + struct.pack("<5i6f", 1, n, n, n, 1, 0, 0, 0, 1, 1, 1)
     big.write_bytes(head + os.urandom(4096) + bytes(4 * n ** 3 - 4096))
     assert big.stat().st_size >= UNUSED
@@ -121,36 +121,37 @@ def mib(n):
 
 
 def work(binary, scene):
-    size = f"{SIZE[0]}x{SIZE[1]}"
     done = subprocess.run([binary, "inspect", scene, "--json", "--work"], check=True, capture_output=True, text=True)
-    return json.loads(done.stdout)["work"], size
+    return json.loads(done.stdout)["work"]
 
 
-def measure(names, jobs, folder):
+def compute(name, release, counting, jobs, scene, folder):
+    without = [part for part in ALL if part not in SCENES[name][1]]
+    bare = build(name, "-DLIGHTSHAFT_WITHOUT=" + ",".join(without), jobs=jobs)
+    full, pixels = instructions(release, scene, folder)
+    least, same = instructions(bare, scene, folder)
+    assert pixels == same, f"{name}: the build without {without} gives another image"
+    print(name, f"{full:.0f} instructions a path, {least:.0f} without: {100 * (full / least - 1):+.2f} %", flush=True)
+    return {"full": full, "bare": least, "without": without, "work": work(counting, scene)}
+
+
+def measure(names, jobs, folder, bytes_alone):
     write(folder)
     release = ROOT / "build" / "release" / "bin" / "lightshaft"
-    counting = build("counting", "-DLIGHTSHAFT_COUNT=ON", jobs=jobs)
+    counting = None if bytes_alone else build("counting", "-DLIGHTSHAFT_COUNT=ON", jobs=jobs)
     rows = {}
     for name in names:
         scene = folder / f"{name}.xml"
-        without = [part for part in ALL if part not in SCENES[name][1]]
-        bare = build(name, "-DLIGHTSHAFT_WITHOUT=" + ",".join(without), jobs=jobs)
-        full, pixels = instructions(release, scene, folder)
-        least, same = instructions(bare, scene, folder)
-        assert pixels == same, f"{name}: the build without {without} gives another image"
         told = json.loads(subprocess.run([release, "inspect", scene, "--json"], check=True, capture_output=True, text=True).stdout)
-        rows[name] = {"full": full, "bare": least, "without": without, "variant": told["variant"], "needed": sum(s["bytes"] for s in told["structures"]),
-                      "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, folder), folder / f"farm-{name}-fat"),
-                      "work": work(counting, scene)[0]}
-        print(name, f"{full:.0f} instructions a path, {least:.0f} without: {100 * (full / least - 1):+.2f} %", flush=True)
+        rows[name] = {"variant": told["variant"], "needed": sum(s["bytes"] for s in told["structures"]),
+                      "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, folder), folder / f"farm-{name}-fat")}
+        if not bytes_alone:
+            rows[name] |= compute(name, release, counting, jobs, scene, folder)
     return rows
 
 
-def page(rows):
-    out = ["# What a scene does not need is left out", "",
-           "Made by `tests/bench/leave_out.py` (release build, GCC 12, `-march=x86-64-v3`). "
-           f"Images of {SIZE[0]} x {SIZE[1]} pixels with {SPP} samples, one thread.", "",
-           "## Instructions per path", "",
+def computed(rows):
+    out = ["## Instructions per path", "", f"Images of {SIZE[0]} x {SIZE[1]} pixels with {SPP} samples, one thread.", "",
            "Callgrind, within `render_tile`: what the presence of parts that the scene does not use costs it. *without*: the same sources "
            "with these parts compiled out (`cmake -DLIGHTSHAFT_WITHOUT=...`); both give the same pixels, bit for bit.", "",
            "| scene | instantiation | instructions | without the unused parts | difference |", "|---|---|---|---|---|"]
@@ -161,11 +162,22 @@ def page(rows):
             "| work | " + " | ".join(rows) + " |", "|---|" + "---|" * len(rows)]
     for key in next(iter(rows.values()))["work"]:
         out.append(f"| {key.replace('_', ' ')} | " + " | ".join(str(r["work"][key]) for r in rows.values()) + " |")
-    out += ["", "## Bytes", "",
+    return out + [""]
+
+
+def page(rows, bytes_alone):
+    command = "tests/bench/leave_out.py" + (" --bytes-alone" if bytes_alone else "")
+    out = ["# What a scene does not need is left out", "", f"Made by `{command}` (release build, GCC 12, `-march=x86-64-v3`).", ""]
+    if bytes_alone:
+        out += ["Without `--bytes-alone` it also builds the renderer without the parts that each scene does not use and compares instructions per path, "
+                "and tabulates the counters of work.", ""]
+    else:
+        out += computed(rows)
+    out += ["## Bytes", "",
             "A job on a farm with one worker: what the coordinator stores of it, what the worker fetched, what its render process keeps resident; and "
-            "the same with a grid of 100 MB beside it that nothing needed names. *needed*: the sum of the scene's structures (`lightshaft inspect`); "
+            "the same with a grid of 100 MiB beside it that nothing needed names. *needed*: the sum of the scene's structures (`lightshaft inspect`); "
             "resident memory beyond the vacuum scene's against what is needed beyond its.", "",
-            "| scene | needed MiB | resident MiB | beyond vacuum: resident, needed | stored MiB, with 100 MB unused | fetched MiB, with | resident MiB, with | same pixels |",
+            "| scene | needed MiB | resident MiB | beyond vacuum: resident, needed | stored MiB, with 100 MiB unused | fetched MiB, with | resident MiB, with | same pixels |",
             "|---|---|---|---|---|---|---|---|"]
     base = rows.get("vacuum")
     for name, r in rows.items():
@@ -187,10 +199,11 @@ def main():
     options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "leave-out.md")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
+    options.add_argument("--bytes-alone", action="store_true")
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="lightshaft-leave-out-") as folder:
-        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder))
-    chosen.out.write_text(page(rows))
+        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone)
+    chosen.out.write_text(page(rows, chosen.bytes_alone))
 
 
 if __name__ == "__main__":
