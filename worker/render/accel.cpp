@@ -119,10 +119,7 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
 }
 
 // Embree is undefined on NaN, and Debian's stops at rays from beyond 1.8e18 (in instances: kLargestInverse).
-constexpr float kFarthest = 1e9f;  // the world is of unit size: from so far away it is nowhere
-bool near_enough(const V3& o) {
-  return std::abs(o.x) <= kFarthest && std::abs(o.y) <= kFarthest && std::abs(o.z) <= kFarthest;
-}
+bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
 
 // The scenes over one set of primitives. all == opaque where there is nothing that light passes.
 struct Scenes {

@@ -111,8 +111,9 @@ def read_tree(root):
     """All files that the rules look at."""
     root = pathlib.Path(root)
     paths = [path for folder in FOLDERS if (root / folder).is_dir() for path in (root / folder).rglob("*")]
+    paths += [root / CONSTANTS_PAGE]
     return {path.relative_to(root).as_posix(): path.read_text(encoding="utf-8", errors="replace")
-            for path in paths if path.is_file() and (path.suffix in CHECKED or path.name == "CMakeLists.txt")}
+            for path in paths if path == root / CONSTANTS_PAGE or path.is_file() and (path.suffix in CHECKED or path.name == "CMakeLists.txt")}
 
 
 def without_comments(text):
@@ -272,5 +273,41 @@ def exceptions_are_files(tree):
             yield f"the exception for {path} is for a file that is not there"
 
 
+# Numbers that decide pixels: named constants of the renderer, and literals with an exponent that have no name. (A literal
+# without one, such as .5, is nearly always arithmetic.) Grids' file formats are not pixels.
+CONSTANTS_PAGE = "docs/constants.md"
+DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb/)")
+NAMED_NUMBER = re.compile(r"\bconstexpr\s+(?:static\s+)?(?:float|double|int|std::\w+)\s+(k[A-Z]\w*)\s*(?:\[|=)")
+BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+)f?\b")
+
+
+def numbers_that_decide(text):
+    seen = without_texts(text)
+    lines = [line for line in seen.split("\n") if not NAMED_NUMBER.search(line)]
+    return set(NAMED_NUMBER.findall(seen)) | {match[0].rstrip("f") for line in lines for match in BARE_NUMBER.finditer(line)}
+
+
+def constants_listed(page):
+    """{path: names and numbers} of the page's table rows: | `path` | `kName` `1e-7` | ..."""
+    listed = {}
+    for line in page.split("\n"):
+        cells = [re.findall(r"`([^`]+)`", cell) for cell in line.split("|")[1:3]] if line.startswith("| `") else []
+        for path in cells[0] if cells else []:
+            listed.setdefault("worker/render/" + path, set()).update(cells[1])
+    return listed
+
+
+def constants_are_listed(tree):
+    found = {path: numbers_that_decide(text) for path, text in product(tree).items() if DECIDES_PIXELS.search(path)}
+    listed = constants_listed(tree.get(CONSTANTS_PAGE, ""))
+    for path, numbers in found.items():
+        for number in sorted(numbers - listed.get(path, set())):
+            yield f"{path}: {number} decides pixels and has no row in {CONSTANTS_PAGE}: say there what it is for and what it does"
+    for path, numbers in listed.items():
+        for number in sorted(numbers - found.get(path, set())):
+            yield f"{CONSTANTS_PAGE} has a row for {number} in {path}, where it is not"
+
+
 RULES = [layering, quoted_includes_exist, include_cycles, doors, library_types_stay_behind_their_doors, headers_are_guarded,
-         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, nobody_exits, exceptions_are_files]
+         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, nobody_exits, exceptions_are_files,
+         constants_are_listed]

@@ -114,6 +114,13 @@ class Rules(unittest.TestCase):
             "cli/a.cpp": "if (bad) std::exit(1);", "worker/b.cpp": "  abort();", "coordinator/c.cpp": "::_exit(3);",
             "cli/main.cpp": "std::exit(2);", "worker/d.cpp": "job.abort(); stream->terminate(); on_exit(); // exit()\n"}, "cli/a.cpp", "worker/b.cpp", "coordinator/c.cpp")
 
+    def test_constants(self):
+        page = "| `a.h` `b.h` | `kDepth` `1e-7` | why |\n| `gone.h` | `kOld` | why |\n"
+        self.assert_finds(architecture.constants_are_listed, {
+            "docs/constants.md": page, "worker/render/vdb/c.cpp": "constexpr int kMany = 5;", "worker/agent/d.cpp": "x = 1e-9;",
+            "worker/render/a.h": "inline constexpr float kDepth = 4;  // 1e-3\nif (x < 1e-7f) y = .5f;",
+            "worker/render/b.h": "constexpr double kNew = 1e-30;\nstatic constexpr std::size_t kDepth = 1;\nx += 0x1p-20f; y = 1e-7;"},
+            "b.h: kNew decides", "b.h: 0x1p-20 decides", "row for kOld in worker/render/gone.h")
 
     def test_exceptions_for_files_that_went(self):
         excepted = {**architecture.LONG_FILES, **architecture.CLOCK_EXCEPTIONS, **architecture.EXIT_EXCEPTIONS, **architecture.SLEEP_EXCEPTIONS}
