@@ -168,6 +168,8 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
   if (area.beam_width > area.cutoff_angle)
     report_.error(
         e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", area.beam_width, area.cutoff_angle));
+  // Nothing lies between the two that it could be about; and without them it is not written.
+  if (area.beam_width == AreaEmitter{}.beam_width) area.falloff = AreaEmitter{}.falloff;
   return area;
 }
 

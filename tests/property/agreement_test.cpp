@@ -15,7 +15,8 @@
 namespace ls::test {
 namespace {
 
-constexpr std::uint64_t kScenes = 150;  // of a usual run
+constexpr std::uint64_t kScenes = 60;
+// of a usual run
 struct Rival {
   const char* name;
   IntegratorSettings settings;

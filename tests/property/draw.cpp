@@ -78,6 +78,19 @@ BsdfIndex Draw::bsdf(int depth) {
     const auto* share = std::get_if<ConstantTexture>(&scene_.textures[p->spec_trans->value]);
     if (share && share->value == Rgb{0, 0, 0}) p->spec_trans.reset();
   }
+  constexpr Rgb kGreys[] = {{.1, .1, .1}, {.4, .4, .4}, {1, 1, 1}};
+  // Energy that facets pass on to each other is tabulated for one roughness, which takes a while to build.
+  std::visit(
+      [&](auto& rough) {
+        if constexpr (requires { rough.multiple_scattering; }) {
+          if (dice_.chance(.8)) rough.multiple_scattering = false;
+          if constexpr (requires { rough.alpha_u; })
+            if (rough.multiple_scattering)
+              rough.alpha_u = rough.alpha_v =
+                  SceneKit::push<TextureTag>(scene_.textures, ConstantTexture{kGreys[dice_.below(3)]});
+        }
+      },
+      b);
   if (auto* bump = std::get_if<BumpMapBsdf>(&b)) {
     BitmapTexture heights;
     heights.file = SceneKit::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));

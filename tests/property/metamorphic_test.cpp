@@ -14,7 +14,7 @@
 namespace ls::test {
 namespace {
 
-constexpr std::uint64_t kRandom = 40;  // scenes beside the different ones
+constexpr std::uint64_t kRandom = 12;  // scenes beside the different ones
 
 // The different scenes and random ones that can be built, with a film of 12 x 12.
 std::vector<NamedScene> scenes() {

@@ -68,6 +68,7 @@ class Composer {
     draw_.fill(e);
     if (dice_.chance(.6)) e.cutoff_angle = e.beam_width = 90, e.falloff = 1;
     e.beam_width = std::min(e.beam_width, e.cutoff_angle);
+    if (e.beam_width == 90) e.falloff = 1;
     s.emitter = e;
   }
   void mesh_file(MeshShape& mesh) {

@@ -18,7 +18,7 @@
 namespace ls::test {
 namespace {
 
-constexpr std::uint64_t kScenes = 300;  // of a usual run
+constexpr std::uint64_t kScenes = 200;  // of a usual run
 constexpr SampleRange kSamples{0, 4};
 
 struct Tally {

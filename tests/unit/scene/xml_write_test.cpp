@@ -149,6 +149,14 @@ TEST(XmlWrite, KeepsEveryBitOfEveryValue) {
   }
 }
 
+TEST(XmlWrite, KeepsAFalloffThatIsAboutNothing) {
+  const Scene s = must_read(with_sensor(
+      R"(<shape type="disk"><emitter type="area"><float name="cutoff_angle" value="90"/>
+         <float name="beam_width" value="90"/><float name="falloff" value="3"/></emitter></shape>)"));
+  EXPECT_EQ(s.shapes[0].emitter->falloff, 1);
+  proven(s);
+}
+
 TEST(XmlWrite, TellsAPinholeFromALens) {
   Scene s = must_read(with_sensor(""));
   EXPECT_THAT(proven(s), HasSubstr("<sensor type=\"perspective\">"));
