@@ -37,6 +37,9 @@ Table all_cases() {
   add_single(t);
   add_fields(t);
   add_seed(t);
+  add_surfaces(t);
+  add_rooms(t);
+  add_interfaces(t);
   return t;
 }
 

@@ -111,6 +111,9 @@ void add_slabs(Table& t);
 void add_single(Table& t);
 void add_fields(Table& t);
 void add_seed(Table& t);
+void add_surfaces(Table& t);
+void add_rooms(Table& t);
+void add_interfaces(Table& t);
 
 // All of them, in the order of the report.
 Table all_cases();

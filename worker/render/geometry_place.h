@@ -17,7 +17,8 @@ struct LocalMesh {
   std::vector<V3d> normals;
   std::vector<V2> uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;  // the file wants its triangles flat
+  bool face_normals = false;            // the file wants its triangles flat
+  std::uint64_t dropped_triangles = 0;  // without area, by the file's reader
   std::vector<MeshAttribute> attributes;
 };
 struct Placed {
