@@ -34,9 +34,13 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
 }
 
 // What it is that the lines say, for the page of the docs and for whoever checks that no row is missing.
-nlohmann::ordered_json table_with_rows(const std::vector<ValidateCase>& lines, double level) {
+nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
+                                       bool quick) {
   nlohmann::ordered_json json = table_json(lines);
-  json["level"] = level;
+  json["level"] = level_of(table);
+  json["left_out"] = nlohmann::ordered_json::array();
+  for (const cases::Case& c : table.cases())
+    if (quick && c.options.slow) json["left_out"].push_back({{"name", c.id}, {"rows", c.rows}});
   for (const cases::Elsewhere& e : cases::answered_elsewhere())
     json["elsewhere"].push_back({{"row", e.row}, {"file", e.file}, {"test", e.test}});
   return json;
@@ -52,7 +56,7 @@ int run_table(const Flags& flags) {
   const cases::Table table = cases::all_cases();
   print(table_heading());
   const auto lines = run_cases(table, options);
-  return report(lines, table_with_rows(lines, level_of(table)), flags);
+  return report(lines, table_with_rows(table, lines, flags.quick), flags);
 }
 
 int run_file(const Flags& flags) {

@@ -36,16 +36,14 @@ Table all_cases() {
   add_slabs(t);
   add_single(t);
   add_fields(t);
+  add_emission(t);
+  add_furnaces(t);
+  add_direct_light(t);
   add_seed(t);
   add_surfaces(t);
   add_rooms(t);
   add_interfaces(t);
   return t;
-}
-
-const std::vector<Elsewhere>& answered_elsewhere() {
-  static const std::vector<Elsewhere> rows;
-  return rows;
 }
 
 }  // namespace ls::cases

@@ -54,6 +54,8 @@ struct MeanOptions {
   bool channels = false;
   // Left out of the quick table: long paths, or heavy tails.
   bool slow = false;
+  // Paths at least, where a first run of few may miss what matters.
+  std::uint64_t least = 0;
 };
 
 struct Mean {
@@ -110,6 +112,9 @@ void add_light_shapes(Table& t);
 void add_slabs(Table& t);
 void add_single(Table& t);
 void add_fields(Table& t);
+void add_emission(Table& t);
+void add_furnaces(Table& t);
+void add_direct_light(Table& t);
 void add_seed(Table& t);
 void add_surfaces(Table& t);
 void add_rooms(Table& t);

@@ -206,6 +206,34 @@ void cut_in_pieces(Table& t) {
   }
 }
 
+// Voxels ten thousand times as long as they are wide: depths along each axis.
+void long_voxels(Table& t) {
+  const std::array<int, 3> n{4, 4, 4};
+  std::vector<float> values(64);
+  for (std::size_t i = 0; i < 64; ++i) values[i] = static_cast<float>((i * 7919) % 13) / 6;
+  const Vec3 half{.5, 50, .005};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Vec3 from{.5, .5, .5}, to = from;
+    from[axis] = 0;
+    to[axis] = 1;
+    t.mean(fmt::format("N65-voxels-1-to-1e4-along-{}/grid/volpath", "xyz"[axis]), "N65",
+           "A grid whose voxels are 100 units long and a hundredth wide, along each axis.",
+           [=] {
+             SceneKit kit;
+             const BsdfIndex null = kit.null();
+             const Transform place = box({-half[0], -half[1], -half[2]}, half);
+             kit.container(CubeShape{}, scale(half[0], half[1], half[2]), null,
+                           kit.heterogeneous(kit.grid(n, values, place), rgb(0), 1 / (2 * half[axis])));
+             kit.environment();
+             Vec3 eye{0, 0, 0};
+             eye[axis] = -2 * half[axis];
+             kit.look(eye, {0, 0, 0}, 1e-5, axis == 2 ? Vec3{0, 1, 0} : Vec3{0, 0, 1});
+             return kit;
+           },
+           grey(std::exp(-depth_along(n, values, from, to))), {.slack = 1e-5});
+  }
+}
+
 SceneKit with_voxel(float value, double sigma = 1) {
   std::vector<float> values(4 * 4 * 4, 1);
   values[21] = value;
@@ -296,6 +324,7 @@ void add_grids(Table& t) {
   hot_voxels(t);
   along_faces(t);
   cut_in_pieces(t);
+  long_voxels(t);
   no_densities(t);
   heroes(t);
   null_collisions(t);

@@ -114,7 +114,7 @@ void from_afar(Table& t) {
              return kit;
            },
            // Its rim is .1 rad off: the way down is longer by at most .005, times .01.
-           grey(lit_cube_answer(.01, 1)), {.slack = 5e-5});
+           grey(lit_cube_answer(.01, 1)), {.slack = 5e-5, .slow = way.grid && !way.distant});
   }
 }
 

@@ -108,7 +108,7 @@ void slabs(Table& t) {
                            through ? "T" : "R", way.name()),
                "7.2 N18", "A slab of Henyey-Greenstein scattering at normal incidence, tabulated.",
                [=] { return column(way, row.slab, through); }, grey(through ? row.t : row.r),
-               {.slack = 1e-5, .slow = !through});
+               {.slack = 1e-5, .slow = !through || way.grid || row.slab.tau > 4});
     }
   }
 }

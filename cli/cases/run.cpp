@@ -126,6 +126,7 @@ class Runner {
     if (!s) return failed(s.error().message);
     const double times = growth(*s);
     double paths = std::clamp(static_cast<double>(s->paths) * times, double{kPilotPaths}, most);
+    paths = std::max(paths, static_cast<double>(case_->options.least));
     for (std::size_t attempt = 1;; ++attempt) {
       s = look(static_cast<std::uint64_t>(paths), seed_of(id, options_.seed, attempt));
       if (!s) return failed(s.error().message);
@@ -224,6 +225,12 @@ std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& o
     if (!asked_for(c.id, options.only) || (options.quick && c.options.slow)) continue;
     runner.run(c);
   }
+  return runner.take();
+}
+
+std::vector<cli::ValidateCase> run_case(const Table& table, std::size_t index, const RunOptions& options) {
+  Runner runner(options, level_of(table));
+  runner.run(table.cases().at(index));
   return runner.take();
 }
 

@@ -23,6 +23,9 @@ struct RunOptions {
 // failed line.
 std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& options);
 
+// One of the table's cases, at the table's level.
+std::vector<cli::ValidateCase> run_case(const Table& table, std::size_t index, const RunOptions& options);
+
 // What each interval of the table may be wrong by, either way.
 double level_of(const Table& table);
 

@@ -6,6 +6,7 @@
 #include "cli/cases/case.h"
 #include "cli/cases/checks.h"
 #include "cli/cases/stages.h"
+#include "cli/validate_measure.h"
 
 namespace ls::cases {
 namespace {
@@ -84,11 +85,28 @@ void anywhere(Table& t) {
   }
 }
 
+// The very first point of every sequence.
+void first_samples(Table& t) {
+  for (const Way& way : all_ways()) {
+    t.exact("N70-first-samples-of-seed-0" + way.name(), "N70 N6",
+            "Seed 0, the first sample of each half: numbers at their very ends break nothing.",
+            [way](const Bench& b) -> Figure {
+              const auto p = shoot(miniature(way, 1), 2, 0, b.threads);
+              if (!p) return {.why = p.error().message};
+              Figure f;
+              for (const float x : p->sums) f.got += std::isfinite(x) && x >= 0 ? 0 : 1;
+              f.unhealthy = cli::samples_gone_wrong(p->health);
+              return f;
+            });
+  }
+}
+
 }  // namespace
 
 void add_scales(Table& t) {
   of_any_scale(t);
   anywhere(t);
+  first_samples(t);
 }
 
 }  // namespace ls::cases

@@ -25,7 +25,7 @@ void semi_infinite(Table& t) {
         t.mean(fmt::format("7.1-semi-infinite-a{:g}-mu{:g}{}", row.albedo, cosine, way.name()), "7.1",
                "An endless medium in a sky: 1 - sqrt(1 - a) H(mu).",
                [=] { return half_space(way, row.albedo, 40, cosine); },
-               grey(cosine == 1 ? row.normal : row.slanted), {.slack = kDigits});
+               grey(cosine == 1 ? row.normal : row.slanted), {.slack = kDigits, .slow = row.albedo < .9});
       t.mean(fmt::format("7.1-normal-to-normal-a{:g}{}", row.albedo, way.name()), "7.1",
              "An endless medium in the sun, both along the normal: L / E = a H(1)^2 / (8 pi).",
              [=] {
@@ -67,11 +67,11 @@ void isotropic(Table& t) {
       const bool thick = row.slab.tau > 10;
       t.mean(named("slab", row.slab, "R", way), "7.2", "What an isotropic slab reflects at normal incidence.",
              [=] { return column(way, row.slab, false); }, grey(row.r),
-             {.slack = kDigits * 10, .slow = row.r < .2});
+             {.slack = kDigits * 10, .slow = row.slab.albedo != .9});
       t.mean(named("slab", row.slab, "T", way), "7.2",
              "What an isotropic slab lets through at normal incidence.",
              [=] { return column(way, row.slab, true); }, grey(row.t),
-             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = thick});
+             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = row.slab.albedo != .9});
     }
   }
   t.mean("7.2-slab-split-by-a-boundary/homogeneous/volpath", "7.2 7.7",
@@ -79,7 +79,7 @@ void isotropic(Table& t) {
          [] {
            return column({}, {.9, 0, 1, 1, true}, false);
          },
-         grey(.267410), {.slack = kDigits * 10});
+         grey(.267410), {.slack = kDigits * 10, .slow = true});
 }
 
 // A white plate (1/2) in the column above the slab sees it under the cosine: with R and T the slab's for
@@ -111,10 +111,11 @@ void diffuse(Table& t) {
       t.mean(named("diffuse", row.slab, "T", way), "7.2",
              "A white plate over a slab that the sky shines through.",
              [=] { return plate_above(way, row.slab, true); }, grey(lit / 2),
-             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = thick});
+             {.band = thick ? .01 : .003, .slack = kDigits * 10, .slow = row.slab.albedo != .9 || way.grid});
       t.mean(named("diffuse", row.slab, "R", way), "7.2",
              "A shining white plate over a slab that reflects its light.",
-             [=] { return plate_above(way, row.slab, false); }, grey(1 + back / 2), {.slack = kDigits * 10});
+             [=] { return plate_above(way, row.slab, false); }, grey(1 + back / 2),
+             {.slack = kDigits * 10, .slow = row.slab.albedo != .9 || way.grid});
     }
   }
 }
@@ -126,17 +127,17 @@ void dielectric(Table& t) {
            [=] {
              return column(way, {.9, 0, 20, 1.5}, false);
            },
-           grey(.25992), {.slack = 4e-5});
+           grey(.25992), {.slack = 4e-5, .slow = way.grid});
     t.mean("7.5-water-slab-R" + way.name(), "7.5", "A slab of water that scatters forward.",
            [=] {
              return column(way, {.9, .75, 2, 1.33}, false);
            },
-           grey(.10931), {.slack = 1e-4});
+           grey(.10931), {.slack = 1e-4, .slow = true});
     t.mean("7.5-water-slab-T" + way.name(), "7.5", "A slab of water that scatters forward.",
            [=] {
              return column(way, {.9, .75, 2, 1.33}, true);
            },
-           grey(.55168), {.slack = 1e-4});
+           grey(.55168), {.slack = 1e-4, .slow = way.grid});
   }
 }
 

@@ -15,7 +15,7 @@ struct Case {
   std::string name;  // letters, digits and _
   SceneKit kit;
   std::array<double, 3> expected{};
-  std::uint64_t spp = 256;  // for each of the film's pixels
+  std::uint64_t spp = 256;  // at least, for each of the film's 16 x 16 pixels
   // The confidence interval must lie within this share of the expected value: a test without power fails.
   double band = .005;
   // Where the answer itself is only known to this share, derived beside the case.
@@ -24,18 +24,11 @@ struct Case {
   bool complement = false;
 };
 
-// One function a subject; the order is the order of the report, and a case's number is its seed: new cases go
-// to the end.
-void add_attenuation(std::vector<Case>& cases);
-void add_furnaces(std::vector<Case>& cases);
-void add_single_scattering(std::vector<Case>& cases);
-void add_slabs(std::vector<Case>& cases);
-void add_surfaces(std::vector<Case>& cases);
+// One function a subject; the order is the order of the report.
 void add_extremes(std::vector<Case>& cases);
 void add_environments(std::vector<Case>& cases);
 void add_materials(std::vector<Case>& cases);
 void add_distant(std::vector<Case>& cases);
-void add_emission(std::vector<Case>& cases);
 void add_overlaps(std::vector<Case>& cases);
 void add_points_in_grids(std::vector<Case>& cases);
 

@@ -4,6 +4,9 @@ import json
 
 import pytest
 from cli_kit import lightshaft
+from local_farm import ROOT
+
+SECTION_7 = ["7.1", "7.2", "7.5", "7.6a", "7.6b", "7.6c", "7.6d", "7.6e", "7.6f", "7.6g", "7.6h", "7.7"]
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +21,16 @@ def test_every_case_passes_with_figures_of_its_own(table):
     for case in table["cases"]:
         assert case["verdict"] == "pass" and case["nonfinite"] == 0
         assert case["kind"] in ("exact", "statistical") and case["about"] and case["rows"], case["name"]
+
+
+def test_every_row_of_the_list_is_a_case_or_a_test_that_is_named(table):
+    """N1 to N70 of the list of stiff and extreme cases, and the tables and closed forms of its section 7."""
+    rows = {row for case in table["cases"] + table["left_out"] for row in case["rows"].split()}
+    for other in table["elsewhere"]:
+        assert other["test"] in (ROOT / other["file"]).read_text(), f"{other['file']} has no {other['test']}"
+        rows.add(other["row"])
+    missing = [row for row in [f"N{n}" for n in range(1, 71)] + SECTION_7 + ["seed", "bug"] if row not in rows]
+    assert missing == []
 
 
 def test_cases_are_chosen_by_prefix_or_glob(tmp_path):

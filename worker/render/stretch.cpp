@@ -27,15 +27,19 @@ Stretch::Stretch(const Medium& m, const V3& o, const V3& d, float t_max)
 
 Stretch::Spot Stretch::grid_at(float t) const {
   double passed = 0;
+  Spot last{t, 0, 0, {0, 0, 0}};
   for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
     const auto local = static_cast<float>(t - w.entry());
     const float rate = rate_of(w.cell());
+    if (local < w.end() && !(rate > 0) && t == to_) break;
     if (local < w.end())
       return {t, static_cast<float>(passed + double{rate} * std::max(0.f, local - w.begin())), rate,
               w.index(std::max(local, w.begin()))};
     passed += double{rate} * (w.end() - w.begin());
+    last = {t, static_cast<float>(passed), rate, w.index(w.end())};
   }
-  return {t, total_, 0, {0, 0, 0}};
+  // A distance from far away may be rounded to the very end: of the last cell that is something.
+  return t <= to_ ? last : Spot{t, total_, 0, {0, 0, 0}};
 }
 
 Stretch::Spot Stretch::grid_after(float x) const {

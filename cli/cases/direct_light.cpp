@@ -1,9 +1,12 @@
 // Direct light on a white floor, and light between surfaces.
+#include <fmt/format.h>
+
 #include <cmath>
 
-#include "tests/statistical/case.h"
+#include "cli/cases/case.h"
+#include "cli/cases/stages.h"
 
-namespace ls::test {
+namespace ls::cases {
 namespace {
 
 constexpr double kReflectance = .5;
@@ -18,9 +21,12 @@ SceneKit floor() {
   return kit;
 }
 
-void direct(std::vector<Case>& cases) {
+void direct(Table& t) {
+  // Directions that the surface chooses meet the smallest light once in 40,000 paths, for as much of its
+  // light.
   const auto add = [&](const char* name, SceneKit kit, double irradiance) {
-    cases.push_back({name, std::move(kit), grey(irradiance * kReflectance / kPi), 1024});
+    t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
+           std::move(kit), grey(irradiance * kReflectance / kPi), {.slack = 5e-5});
   };
   const auto area = [](SceneKit& kit, const Geometry& g, const Transform& t) {
     const TextureIndex one = kit.texture(rgb(1));
@@ -33,27 +39,27 @@ void direct(std::vector<Case>& cases) {
     SceneKit kit = floor();
     area(kit, RectangleShape{}, translate({0, 0, 1.25}) * rotate_x(180) * scale(.8));
     const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
-    add("direct_square", kit, 4 * x / s * std::atan(x / s));
+    add("direct-square", kit, 4 * x / s * std::atan(x / s));
   }
   {
     SceneKit kit = floor();
     area(kit, DiskShape{}, translate({0, 0, 1.5}) * rotate_x(180) * scale(.7));
-    add("direct_disk", kit, kPi * .49 / (.49 + 2.25));
+    add("direct-disk", kit, kPi * .49 / (.49 + 2.25));
   }
   {
     SceneKit kit = floor();
     area(kit, SphereShape{}, translate({0, 0, 2}) * scale(.5));
-    add("direct_sphere", kit, kPi * .25 / 4);
+    add("direct-sphere", kit, kPi * .25 / 4);
   }
   {
     SceneKit kit = floor();  // 8e-5 sr
     area(kit, SphereShape{}, translate({0, 0, 1000}) * scale(5));
-    add("direct_distant_sphere", kit, kPi * 25 / 1e6);
+    add("direct-distant-sphere", kit, kPi * 25 / 1e6);
   }
   {
     SceneKit kit = floor();
     kit.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
-    add("direct_point", kit, 3 / std::pow(1.25, 1.5));
+    add("direct-point", kit, 3 / std::pow(1.25, 1.5));
   }
   {
     // Halfway between beam (10 degrees) and cutoff (30): half the intensity; aimed along -z, the point is 20
@@ -61,7 +67,7 @@ void direct(std::vector<Case>& cases) {
     const double tangent = std::tan(20 * kPi / 180), cosine = std::cos(20 * kPi / 180);
     SceneKit kit = floor();
     kit.scene.emitters.push_back(SpotEmitter{translate({tangent, 0, 1}) * rotate_x(180), rgb(2), 30, 10, {}});
-    add("direct_spot_falloff", kit, .5 * 2 * cosine * cosine * cosine);
+    add("direct-spot-falloff", kit, .5 * 2 * cosine * cosine * cosine);
   }
   {
     // Every kind at once: choice among lights.
@@ -69,11 +75,11 @@ void direct(std::vector<Case>& cases) {
     area(kit, SphereShape{}, translate({0, 0, 2}) * scale(.5));
     kit.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(.3)});
     kit.scene.emitters.push_back(DirectionalEmitter{{1, 0, -1}, rgb(.2)});
-    add("direct_three_lights", kit, kPi * .25 / 4 + .3 / std::pow(1.25, 1.5) + .2 / std::sqrt(2.));
+    add("direct-three-lights", kit, kPi * .25 / 4 + .3 / std::pow(1.25, 1.5) + .2 / std::sqrt(2.));
   }
 }
 
-void plates(std::vector<Case>& cases, int m) {
+void plates(Table& table, int m) {
   // m plates of n = 1.5 at normal incidence, each face reflecting r = .04: T = (1 - r) / (1 + (2m - 1) r).
   SceneKit kit;
   const BsdfIndex glass = kit.glass(1.5), black = kit.diffuse(0);
@@ -82,15 +88,16 @@ void plates(std::vector<Case>& cases, int m) {
   kit.environment();
   kit.look({0, 0, m + 1.}, {0, 0, 0}, 1e-3, {0, 1, 0});
   const double r = .04, t = (1 - r) / (1 + (2 * m - 1) * r);
-  cases.push_back({"plates_" + std::to_string(m), kit, grey(1 - t), 4096, .01});
+  table.mean(fmt::format("N42-{}-plates-of-glass", m), "N42 7.6g",
+             "Plates at normal incidence: R = 1 - (1 - r) / (1 + (2 m - 1) r).", kit, grey(1 - t),
+             {.slow = true});
 }
 
 }  // namespace
 
-void add_surfaces(std::vector<Case>& cases) {
-  direct(cases);
-  plates(cases, 1);
-  plates(cases, 10);
+void add_direct_light(Table& t) {
+  direct(t);
+  for (const int m : {1, 10, 100, 500}) plates(t, m);
   for (const bool sphere : {false, true}) {
     // A closed room that shines 1 and reflects half: 1 / (1 - .5).
     SceneKit kit;
@@ -100,8 +107,9 @@ void add_surfaces(std::vector<Case>& cases) {
     s.flip_normals = true;
     s.emitter = AreaEmitter{one};
     kit.look({.2, -.3, .1}, {.5, .9, 0}, 60);
-    cases.push_back({sphere ? "grey_room_sphere" : "grey_room_cube", kit, grey(2), 1024});
+    t.mean(sphere ? "7.6c-grey-room-sphere" : "7.6c-grey-room-cube", "7.6c N39",
+           "A closed room: Le / (1 - rho).", kit, grey(2));
   }
 }
 
-}  // namespace ls::test
+}  // namespace ls::cases

@@ -1,10 +1,13 @@
 // Media that give off light: closed forms of emission with absorption, and equilibria with scattering, in
 // which everything is as bright as the source.
+#include <fmt/format.h>
+
 #include <cmath>
 
-#include "tests/statistical/case.h"
+#include "cli/cases/case.h"
+#include "cli/cases/stages.h"
 
-namespace ls::test {
+namespace ls::cases {
 namespace {
 
 constexpr Rgb kSigma{0, 1, 16}, kEmission{1, 2.5, 4};
@@ -27,7 +30,7 @@ std::vector<float> hills(std::size_t n) {
 }
 
 // A cube of an absorbing medium in the dark, seen through its middle: a unit of it.
-void absorbing(std::vector<Case>& cases) {
+void absorbing(Table& t) {
   const auto add = [&](const char* name, bool grid, bool per_absorption, const Rgb& sigma) {
     SceneKit kit;
     const MediumIndex m =
@@ -35,31 +38,32 @@ void absorbing(std::vector<Case>& cases) {
     glow(kit, m, kEmission, per_absorption);
     kit.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), kit.null(), m);
     kit.look({-3, .5, .5}, {.5, .5, .5});
-    Case c{name, kit, {}, 16};
+    Channels expected;
     for (std::size_t k = 0; k < 3; ++k) {
       const double absorbed = -std::expm1(-sigma[k]);
-      c.expected[k] = kEmission[k] * (per_absorption ? absorbed : sigma[k] > 0 ? absorbed / sigma[k] : 1);
+      expected[k] = kEmission[k] * (per_absorption ? absorbed : sigma[k] > 0 ? absorbed / sigma[k] : 1);
     }
-    cases.push_back(std::move(c));
+    t.mean(std::string("7.6b-") + name, "7.6b N67",
+           "Light given off by a unit of an absorber, in two ways to tell it.", kit, expected,
+           {.band = .001});
   };
-  add("emission_without_extinction", false, false, rgb(0));
-  add("emission_homogeneous", false, false, kSigma);
-  add("emission_constant_grid", true, false, kSigma);
-  add("emission_source_homogeneous", false, true, {.5, 1, 16});
-  add("emission_source_constant_grid", true, true, {.5, 1, 16});
+  add("without-extinction", false, false, rgb(0));
+  add("per-length/homogeneous", false, false, kSigma);
+  add("per-length/grid", true, false, kSigma);
+  add("per-absorption/homogeneous", false, true, {.5, 1, 16});
+  add("per-absorption/grid", true, true, {.5, 1, 16});
 }
 
 // Walls of radiance B around a medium of source B that scatters, too: B in every direction (an isothermal
 // enclosure). Mirrors for walls are the same.
-void enclosures(std::vector<Case>& cases) {
-  const auto add = [&](const char* name, bool mirrors, auto medium, std::uint64_t spp, bool per_absorption) {
+void enclosures(Table& t) {
+  const auto add = [&](const char* name, bool mirrors, auto medium, bool per_absorption) {
     SceneKit kit;
     const MediumIndex m = medium(kit);
-    Case c{name, SceneKit(), {}, spp};
-    if (mirrors) c.band = .01;  // long paths
+    Channels expected;
     Rgb emission{};
     for (std::size_t k = 0; k < 3; ++k) {
-      c.expected[k] = kEmission[k];
+      expected[k] = kEmission[k];
       const auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[m.value]);
       emission[k] = kEmission[k] * (per_absorption ? 1 : h->sigma_t[k] * (1 - h->albedo[k]));
     }
@@ -71,23 +75,28 @@ void enclosures(std::vector<Case>& cases) {
     if (!mirrors) s.emitter = AreaEmitter{light};
     kit.scene.sensor.medium = m;
     kit.look({.2, -.3, .1}, {.5, .9, 0}, 60);
-    c.kit = std::move(kit);
-    cases.push_back(std::move(c));
+    for (const bool distant : {false, true}) {
+      const Way way{false, distant};
+      way.choose(kit);
+      t.mean(fmt::format("7.6b-{}/{}", name, way.integrator_name()), "7.6b",
+             "Isothermal: walls and a medium of one source, in every direction as bright as that.", kit,
+             expected, {.band = mirrors ? .01 : .003, .slow = mirrors});
+    }
   };
   const auto chromatic = [](SceneKit& k) { return k.homogeneous({.5, 1, 3}, {.8, .5, .9}, .6); };
   const auto grid = [](SceneKit& k) {
     return k.heterogeneous(k.grid({8, 8, 8}, hills(512), translate({-2, -2, -2}) * scale(4)), {.6, .6, .6}, 1,
                            .4);
   };
-  add("emission_enclosure_per_length", false, chromatic, 4096, false);
-  add("emission_enclosure_source", false, chromatic, 4096, true);
-  add("emission_enclosure_grid", false, grid, 1024, true);
-  add("emission_mirrored", true, chromatic, 4096, true);
+  add("enclosure-per-length/homogeneous", false, chromatic, false);
+  add("enclosure-source/homogeneous", false, chromatic, true);
+  add("enclosure/grid", false, grid, true);
+  add("enclosure-of-mirrors/homogeneous", true, chromatic, true);
 }
 
 // A scattering slab of source 1 before the dark: 1 - R - T (STABILITY section 7). Mirrors at the sides make
 // it endless.
-void slabs(std::vector<Case>& cases) {
+void slabs(Table& t) {
   const auto add = [&](const char* name, double albedo, double g, double tau, double expected) {
     SceneKit kit;
     const MediumIndex m = kit.homogeneous(rgb(1), rgb(albedo), g);
@@ -101,21 +110,21 @@ void slabs(std::vector<Case>& cases) {
     kit.container(RectangleShape{}, translate({0, 0, tau}) * scale(.6), null, m);
     kit.container(RectangleShape{}, rotate_x(180) * scale(.6), null, m);
     kit.look({.1, .15, tau + 1}, {.1, .15, 0}, 1e-3, {0, 1, 0});
-    Case c{name, kit, grey(expected), 4096, .01};
-    c.slack = 5e-6;
-    cases.push_back(std::move(c));
+    t.mean(std::string("7.6b-") + name, "7.6b 7.2",
+           "A scattering slab of source 1 before the dark: 1 - R - T.", kit, grey(expected),
+           {.slack = 5e-6, .slow = true});
   };
-  add("emission_slab_nine_tenths_1", .9, 0, 1, .140965);
-  add("emission_slab_forward_2", .9, .75, 2, .241647);
-  add("emission_slab_half_1", .5, 0, 1, .454823);
+  add("slab-a.9-tau1", .9, 0, 1, .140965);
+  add("slab-a.9-g.75-tau2", .9, .75, 2, .241647);
+  add("slab-a.5-tau1", .5, 0, 1, .454823);
 }
 
 }  // namespace
 
-void add_emission(std::vector<Case>& cases) {
-  absorbing(cases);
-  enclosures(cases);
-  slabs(cases);
+void add_emission(Table& t) {
+  absorbing(t);
+  enclosures(t);
+  slabs(t);
 }
 
-}  // namespace ls::test
+}  // namespace ls::cases
