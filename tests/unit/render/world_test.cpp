@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "tests/support/render_check.h"
-#include "worker/render/world.h"
 
 namespace ls::render {
 namespace {
@@ -348,86 +347,6 @@ TEST(World, CountsAlbedosOfAGridThatAreAboveOne) {
     });
     EXPECT_EQ(describe(*test::world_of(kit)).clamped_inputs, 2u);
   }
-}
-
-TEST(World, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
-  for (const double radiance : {1e30, 2e38}) {  // of the second even two are more than a float32 holds
-    SceneKit kit({2, 2});
-    kit.environment(radiance);
-    const auto world = test::world_of(kit);
-    const TileResult r = render_tile(*world, {0, 0, 2, 2}, {0, 16}, nullptr, nullptr);
-    for (const float s : r.sums) EXPECT_EQ(s, 0.f) << radiance;
-    EXPECT_EQ(r.health.nonfinite, 4u * 16) << radiance;
-    EXPECT_EQ(r.health.causes.at(HealthCause::too_large).first.back(), (HealthSpot{0, 0, 7})) << radiance;
-    EXPECT_FALSE(render_sample(*world, 0, 0, 0).finite) << radiance;
-  }
-  SceneKit kit({2, 2});
-  kit.environment(1e28);
-  const TileResult r = render_tile(*test::world_of(kit), {0, 0, 2, 2}, {0, 16}, nullptr, nullptr);
-  for (const float s : r.sums) EXPECT_FLOAT_EQ(s, 8e28f);
-  EXPECT_EQ(r.health.nonfinite, 0u);
-}
-
-// One pixel's samples see a lamp that is too bright, the others do not: exactly those are told of, each in its tile.
-TEST(World, RejectedSamplesAreLocatedByPixelAndReplayed) {
-  SceneKit kit({4, 4});
-  const TextureIndex light = kit.texture({1e30, 0, 0});
-  // Seen 1 wide and high from a distance of 2: a quarter of the picture a side, its second column and third row.
-  kit.shape(RectangleShape{}, test::translate({-.5, 0, -.5}) * test::rotate_x(90) * test::scale(.25), kit.diffuse(0))
-      .emitter = AreaEmitter{light};
-  kit.look({0, -2, 0}, {0, 0, 0}, 2 * std::atan(.5) * 180 / test::kPi);
-  const auto world = test::world_of(kit);
-  const TileResult all = render_tile(*world, {0, 0, 4, 4}, {0, 6}, nullptr, nullptr);
-  ASSERT_EQ(all.health.causes.size(), 1u);
-  const HealthEntry& entry = all.health.causes.at(HealthCause::too_large);
-  EXPECT_GT(entry.count, 0u);
-  Health sum;
-  for (int y = 0; y < 4; ++y)
-    for (int x = 0; x < 4; ++x)
-      for (const SampleRange range : {SampleRange{0, 2}, SampleRange{2, 6}}) {
-        Health pixel;
-        for (std::uint64_t s = range.s0; s < range.s1; ++s) {
-          const SampleValue value = render_sample(*world, x, y, s);
-          EXPECT_EQ(value.finite, value.health.clean());
-          if (!value.finite) EXPECT_GT(value.rgb[0], 0x1p96);
-          pixel.merge(value.health);
-        }
-        EXPECT_EQ(render_tile(*world, {x, y, x + 1, y + 1}, range, nullptr, nullptr).health, pixel);
-        sum.merge(pixel);
-      }
-  EXPECT_EQ(sum, all.health);
-  for (const HealthSpot& s : entry.first) EXPECT_FALSE(render_sample(*world, s.x, s.y, s.sample).finite);
-  EXPECT_LT(entry.count, 16u * 6) << "only some pixels see it";
-}
-
-// No scene that is accepted is known to give these: they are put into the finished world by hand.
-TEST(World, EveryKindOfBadSampleHasItsCause) {
-  const auto causes = [](auto spoil) {
-    SceneKit kit = with_medium([](SceneKit& k) { return k.homogeneous({1, 1, 1}, {.5, .5, .5}); });
-    const auto world = test::world_of(kit);
-    spoil(const_cast<World&>(*world));
-    return render_tile(*world, {0, 0, 2, 2}, {0, 16}, nullptr, nullptr).health;
-  };
-  const auto only = [](const Health& h, HealthCause cause) { return h.causes.size() == 1 && h.causes.contains(cause); };
-  EXPECT_TRUE(causes([](World&) {}).clean());
-  const Health nan = causes([](World& w) { w.media[0].sigma_s = C3(std::numeric_limits<float>::quiet_NaN()); });
-  EXPECT_TRUE(only(nan, HealthCause::not_a_number)) << canonical_json(nan);
-  EXPECT_EQ(nan.nonfinite, nan.causes.at(HealthCause::not_a_number).count);
-  const Health infinite = causes([](World& w) { w.media[0].sigma_s = C3(std::numeric_limits<float>::infinity()); });
-  EXPECT_TRUE(infinite.causes.contains(HealthCause::infinite)) << canonical_json(infinite);
-  const Health below = causes([](World& w) { w.media[0].sigma_s = C3(-.5f); });
-  EXPECT_TRUE(only(below, HealthCause::negative)) << canonical_json(below);
-  EXPECT_EQ(below.nonfinite, 0u);
-  EXPECT_GT(below.negative, 0u);
-}
-
-TEST(World, TellsOfChangedInputsByCause) {
-  SceneKit kit = with_medium([](SceneKit& k) {
-    return k.heterogeneous(k.grid({2, 1, 1}, {-1, 1}, kBox), {1, 1, 1});
-  });
-  Health expected;
-  expected.add(HealthCause::negative_density, 1);
-  EXPECT_EQ(changed_inputs(*test::world_of(kit)), expected);
 }
 
 TEST(World, AnEmptySceneIsItsSky) {
