@@ -11,7 +11,7 @@ const std::vector<Elsewhere>& answered_elsewhere() {
       {"N11", "tests/unit/render/grid_test.cpp", "CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar"},
       {"N12", "tests/unit/render/grid_test.cpp", "CellWalk, CoversTheRaysPartInTheDomainOnceAndInOrder"},
       {"N13", "tests/unit/render/grid_test.cpp", "CellWalk, MajorantDepthDoesNotDependOnHowARayIsCut"},
-      {"N18", "tests/unit/render/phase_test.cpp", "HenyeyGreenstein, SamplesAreDistributedAsTheDensitySays"},
+      {"N18", "tests/unit/sampling/phases_test.cpp", "Phases, SamplesFallAsTheDensitySays"},
       {"N18", "tests/unit/render/phase_test.cpp", "HenyeyGreenstein, IsNormalisedAndItsMeanCosineIsG"},
       {"N20", "tests/unit/render/numerics_test.cpp", "Frame, IsOrthonormalWhereverTheNormalPoints"},
       {"N20", "tests/unit/render/numerics_test.cpp",
