@@ -1,0 +1,255 @@
+// Images, meshes and volumes as scenes name them.
+#include <zlib.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include <jpeglib.h>
+
+#include "common/assets/image.h"
+#include "common/assets/mesh.h"
+#include "common/assets/raw_grid.h"
+#include "common/assets/vol.h"
+#include "common/image/exr_file.h"
+#include "common/image/fake_pixels.h"
+#include "common/image/final_image.h"
+#include "tests/fuzz/all_targets.h"
+#include "tests/unit/nvdb/nvdb_kit.h"
+#include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/refused.h"
+
+namespace ls::fuzz {
+namespace {
+
+constexpr std::uint64_t kMostPixels = 1 << 20,
+                        kMostValues = 1 << 20;  // what is refused above is quick and costs nothing
+
+template <class T>
+void put(std::string& to, const T& v) {
+  to.append(reinterpret_cast<const char*>(&v), sizeof v);
+}
+std::string text_of(const std::vector<std::byte>& b) {
+  return {reinterpret_cast<const char*>(b.data()), b.size()};
+}
+
+void check(const GridData& g) {
+  must(g.channels == 1 || g.channels == 3, "a grid has 1 or 3 channels");
+  must(g.values.size() == std::size_t{g.nx} * g.ny * g.nz * g.channels, "a grid has all of its values");
+  for (const float v : g.values)
+    must(std::isfinite(v) && v >= 0, "a grid's values are finite and not negative");
+}
+
+std::string jpeg() {
+  jpeg_compress_struct c{};
+  jpeg_error_mgr error{};
+  c.err = jpeg_std_error(&error);
+  jpeg_create_compress(&c);
+  unsigned char* out = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&c, &out, &size);
+  c.image_width = 9, c.image_height = 5, c.input_components = 3, c.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&c);
+  jpeg_start_compress(&c, TRUE);
+  unsigned char row[27];
+  for (int y = 0; y < 5; ++y) {
+    for (int i = 0; i < 27; ++i) row[i] = static_cast<unsigned char>(i * 9 + y);
+    unsigned char* rows[] = {row};
+    jpeg_write_scanlines(&c, rows, 1);
+  }
+  jpeg_finish_compress(&c);
+  jpeg_destroy_compress(&c);
+  std::string bytes(reinterpret_cast<char*>(out), size);
+  std::free(out);
+  return bytes;
+}
+
+std::string bmp() {
+  std::string b = "BM";
+  for (const std::uint32_t v : {54u + 16u, 0u, 54u, 40u, 2u, 2u}) put(b, v);
+  put(b, std::uint16_t{1}), put(b, std::uint16_t{24});
+  for (int i = 0; i < 6; ++i) put(b, std::uint32_t{0});
+  return b + std::string(16, '\x55');
+}
+
+std::string deflated(const std::string& raw) {
+  uLongf n = compressBound(raw.size());
+  std::string z(n, '\0');
+  compress(reinterpret_cast<Bytef*>(z.data()), &n, reinterpret_cast<const Bytef*>(raw.data()), raw.size());
+  z.resize(n);
+  return z;
+}
+
+std::string serialized(std::uint16_t version) {
+  std::string raw;
+  put(raw, std::uint32_t{0x1003});  // single precision, normals and uvs
+  if (version == 4) raw += std::string("mesh\0", 5);
+  put(raw, std::uint64_t{3}), put(raw, std::uint64_t{1});
+  for (int i = 0; i < 3 * 8; ++i) put(raw, static_cast<float>(i % 5));
+  for (const std::uint32_t i : {0u, 1u, 2u}) put(raw, i);
+  std::string file;
+  put(file, std::uint16_t{0x041c}), put(file, version);
+  file += deflated(raw);
+  version == 4 ? put(file, std::uint64_t{0}) : put(file, std::uint32_t{0});
+  put(file, std::uint32_t{1});
+  return file;
+}
+
+std::string vol(std::int32_t type, std::int32_t channels, std::size_t value_bytes) {
+  std::string b = "VOL\3";
+  for (const std::int32_t v : {type, 3, 2, 2, channels}) put(b, v);
+  for (const float v : {0.f, 0.f, 0.f, 1.f, 1.f, 1.f}) put(b, v);
+  return b + std::string(12 * static_cast<std::size_t>(channels) * value_bytes, '\x3c');
+}
+
+std::string raw_grid() {
+  std::string b;
+  for (const std::int32_t v : {3, 2, 2}) put(b, v);
+  for (const float v : {0.f, 0.f, 0.f, 1.f, 1.f, 1.f}) put(b, v);
+  for (int i = 0; i < 12; ++i) put(b, static_cast<float>(i) - 1);
+  return b;
+}
+
+// A whole NanoVDB file, most of it zeros, with what the input says written over it: rows of an offset and a
+// value, four bytes each.
+std::string patched(std::string bytes, Bytes patches) {
+  for (; patches.size() >= 8; patches = patches.subspan(8)) {
+    std::uint32_t at = 0;
+    std::memcpy(&at, patches.data(), 4);
+    if (at <= bytes.size() - 4) std::memcpy(bytes.data() + at, patches.data() + 4, 4);
+  }
+  return bytes;
+}
+
+void nvdb(std::string_view file, bool whole) {
+  LsVdbGrid grid{};
+  const auto bytes = std::as_bytes(std::span(file));
+  try {
+    whole ? render::decode_nvdb(bytes, "", kMostValues, grid)
+          : render::expand_nvdb("fuzz", bytes, kMostValues, grid);
+    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2]; ++i)
+      must(std::isfinite(grid.values[i]) && grid.values[i] >= 0,
+           "a grid's values are finite and not negative");
+  } catch (const render::Refused& refused) {
+    must(!refused.text.empty(), "what is refused is told why");
+  }
+  delete[] grid.values;
+}
+
+// Of six types of values: the buffer of a grid, and a file with it.
+const std::string& grid_of(std::uint8_t choice, bool whole_file) {
+  static const auto made = [] {
+    std::vector<std::string> all;
+    for (const std::uint32_t type : {1, 2, 9, 13, 15, 16}) {
+      test::NvdbKit kit;
+      kit.type = type;
+      all.push_back(kit.buffer());
+      all.push_back(kit.file());
+    }
+    return all;
+  }();
+  return made[2 * (choice % (made.size() / 2)) + (whole_file ? 1 : 0)];
+}
+
+}  // namespace
+
+void image(Bytes input) {
+  const auto data = decode_image("fuzz", bytes_of(input), kMostPixels);
+  if (!data) return must(!data.error().message.empty(), "what is refused is told why");
+  const std::size_t values = std::size_t{data->width} * data->height * data->channels;
+  must(data->u8.size() + data->f32.size() == values, "an image has all of its values, in one form");
+}
+
+Seeds image_seeds() {
+  Film film({{6, 4}, 4});
+  for (TileIndex t = 0; t < film.grid().count(); ++t)
+    (void)film.fold(t, 0, fake_partial({{}, {}, {}, film.grid().rect(t), {0, 2}}));
+  ExrPicture exr{{5, 3}, {}, {}};
+  for (const char* c : {"R", "G", "B"}) exr.channels[c] = ExrHalf{std::vector<float>(15, .5f)};
+  ExrPicture grey{{5, 3}, {}, {}};
+  grey.channels["Y"] = ExrFloat{std::vector<float>(15, .5f)};
+  return {text_of(preview_png(film, 0).value()),
+          text_of(write_exr(exr).value()),
+          text_of(write_exr(grey).value()),
+          jpeg(),
+          bmp(),
+          "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" + std::string(16, '\x40')};
+}
+
+void mesh(Bytes input) {
+  if (input.empty()) return;
+  const auto file = bytes_of(input);
+  const auto data = is_serialized(file) ? decode_serialized("fuzz", file, input.size() % 3 == 2)
+                    : text_of(input).starts_with("ply") ? decode_ply("fuzz", file)
+                                                        : decode_obj("fuzz", file);
+  if (!data) return must(!data.error().message.empty(), "what is refused is told why");
+  must(data->positions.size() % 3 == 0 && data->indices.size() % 3 == 0, "vertices and triangles are whole");
+  must(data->normals.empty() || data->normals.size() == data->positions.size(),
+       "a normal for each vertex, or none");
+  must(data->uvs.empty() || data->uvs.size() / 2 == data->vertex_count(), "a uv for each vertex, or none");
+  for (const std::uint32_t i : data->indices) must(i < data->vertex_count(), "indices are those of vertices");
+}
+
+Seeds mesh_seeds() {
+  std::string binary =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+      "float z\n"
+      "property uchar red\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) put(binary, static_cast<float>(i == k));
+    binary += 'r';
+  }
+  binary += '\3';
+  for (const std::int32_t i : {0, 1, 2}) put(binary, i);
+  return {
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3//1\nf -4 -3 -2 -1\ng a\nusemtl "
+      "b\n",
+      "ply\nformat ascii 1.0\ncomment c\nelement vertex 4\nproperty float x\nproperty float y\nproperty "
+      "double z\n"
+      "property float u\nproperty float v\nelement face 1\nproperty list uchar uint "
+      "vertex_index\nend_header\n"
+      "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3\n",
+      binary, serialized(3), serialized(4)};
+}
+
+void volume(Bytes input) {
+  if (input.empty()) return;
+  const Bytes rest = input.subspan(1);
+  const auto grid = [](const Result<GridData>& data) {
+    data ? check(*data) : must(!data.error().message.empty(), "told why");
+  };
+  switch (input[0]) {
+    case 'v':
+      return grid(decode_vol("fuzz", bytes_of(rest)));
+    case 'x':
+      return grid(decode_raw_grid("fuzz", bytes_of(rest), GridOrder::x_fastest));
+    case 'z':
+      return grid(decode_raw_grid("fuzz", bytes_of(rest), GridOrder::z_fastest));
+    case 'n':
+      return nvdb(text_of(rest), true);
+    case 'b':
+      if (!rest.empty()) nvdb(patched(grid_of(rest[0], false), rest.subspan(1)), false);
+      return;
+    case 'f':
+      if (!rest.empty()) nvdb(patched(grid_of(rest[0], true), rest.subspan(1)), true);
+      return;
+    default:
+      return;
+  }
+}
+
+Seeds volume_seeds() {
+  test::NvdbKit packed;
+  packed.codec = 1;
+  Seeds seeds{"v" + vol(1, 1, 4), "v" + vol(1, 3, 4), "v" + vol(2, 1, 2), "v" + vol(3, 3, 1),
+              "x" + raw_grid(),   "z" + raw_grid(),   "n" + packed.file()};
+  for (char i = 0; i < 6; ++i) seeds.push_back(std::string("b") + i), seeds.push_back(std::string("f") + i);
+  std::string patches = std::string("b") + '\0';
+  for (const std::uint32_t at : {16u, 632u, 636u, 696u, 736u, 760u, 816u, 4944u})
+    put(patches, at), put(patches, at);
+  seeds.push_back(patches);
+  return seeds;
+}
+
+}  // namespace ls::fuzz

@@ -1,0 +1,61 @@
+// Every seed, what becomes of seeds that are cut or have a bit turned, and every input that was ever a
+// finding (tests/fuzz/corpus/TARGET/*), through its target; each must come back.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "common/base/log.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace ls::fuzz {
+namespace {
+
+class Replay : public testing::TestWithParam<Target> {
+ protected:
+  void SetUp() override { log_level(LogLevel::off); }
+};
+
+TEST_P(Replay, SeedsComeBack) {
+  const auto seeds = GetParam().seeds();
+  ASSERT_FALSE(seeds.empty());
+  for (const std::string& seed : seeds) GetParam().run(input_of(seed));
+  GetParam().run({});
+}
+
+TEST_P(Replay, DamagedSeedsComeBack) {
+  constexpr int kTurns = 12;  // of each seed; a fuzzer makes many more
+  std::mt19937 random(1);
+  for (const std::string& seed : GetParam().seeds())
+    for (int turn = 0; turn < kTurns && !seed.empty(); ++turn) {
+      std::string damaged = seed;
+      if (turn % 3 == 0) damaged.resize(random() % seed.size());
+      for (int i = 0; i < turn % 4 && !damaged.empty(); ++i)
+        damaged[random() % damaged.size()] ^= static_cast<char>(1u << random() % 8);
+      GetParam().run(input_of(damaged));
+    }
+}
+
+TEST_P(Replay, FindingsOfThePastComeBack) {
+  const std::filesystem::path folder = std::filesystem::path(FUZZ_CORPUS) / GetParam().name;
+  std::vector<std::filesystem::path> files;
+  std::error_code none;  // of a target without findings
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const auto& path : files) {
+    SCOPED_TRACE(path);
+    std::ifstream file(path, std::ios::binary);
+    const std::string input{std::istreambuf_iterator<char>(file), {}};
+    ASSERT_FALSE(input.empty());
+    GetParam().run(input_of(input));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Fuzz, Replay, testing::ValuesIn(targets().begin(), targets().end()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace ls::fuzz
