@@ -128,6 +128,7 @@ Result<Numbers> numbers_of(const Flags& flags) {
 }
 
 int run(const Flags& flags) {
+  std::atomic<bool> stop{false};  // outlives the thread that sets it
   Interrupt interrupt;
   const auto numbers = numbers_of(flags);
   if (!numbers) return say_error(numbers.error());
@@ -147,7 +148,6 @@ int run(const Flags& flags) {
   const auto limit = render::limit_threads(threads);
   const auto world = build_world_again(*scene, image->settings, threads);
   if (!world) return say_rejected(world.error());
-  std::atomic<bool> stop{false};
   interrupt.on_signal([&] { stop = true; });
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
   const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);

@@ -26,6 +26,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "system")]
 from cli_kit import FOG, write_fog  # noqa: E402
 from local_farm import LocalFarm  # noqa: E402
+from processes import family  # noqa: E402
 
 SIZE, SPP = (48, 32), 8
 UNUSED = 100 << 20
@@ -76,14 +77,6 @@ def instructions(binary, scene, folder):
     assert run.returncode == 0, run.stderr[-2000:]
     collected = int(re.search(r"Collected : (\d+)", run.stderr)[1])
     return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
-
-
-def family(pid):
-    found = [pid]
-    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found += family(int(child))
-    return found
 
 
 def on_a_farm(scene, folder):

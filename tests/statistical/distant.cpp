@@ -2,6 +2,7 @@
 // everything else here.
 #include <cmath>
 
+#include "cli/cases/stages.h"
 #include "tests/statistical/case.h"
 #include "tests/support/sky_kit.h"
 
@@ -41,14 +42,7 @@ class Adder {
   std::vector<Case>& cases_;
 };
 
-// Composite Simpson; n even.
-template <class F>
-double integrate(F f, double a, double b, int n) {
-  const double h = (b - a) / n;
-  double sum = f(a) + f(b);
-  for (int i = 1; i < n; ++i) sum += (i % 2 ? 4 : 2) * f(a + i * h);
-  return sum * h / 3;
-}
+using cases::integrate;
 
 // Of 1 W at distance h from the ray's middle: albedo / (4 pi) int sigma e^(-sigma (t + 3 + d)) / (4 pi d^2)
 // dt.

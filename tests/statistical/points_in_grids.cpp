@@ -1,19 +1,13 @@
 // Lights without an extent inside grids: segments are sampled equi-angularly about them, too.
 #include <cmath>
 
+#include "cli/cases/stages.h"
 #include "tests/statistical/case.h"
 
 namespace ls::test {
 namespace {
 
-// Composite Simpson; n even.
-template <class F>
-double integrate(F f, double a, double b, int n) {
-  const double h = (b - a) / n;
-  double sum = f(a) + f(b);
-  for (int i = 1; i < n; ++i) sum += (i % 2 ? 4 : 2) * f(a + i * h);
-  return sum * h / 3;
-}
+using cases::integrate;
 
 // A ray of length 6 along z whose middle is the origin, ended by a black plate; a medium of density r(z) = 1
 // + z / 6, as a grid whose two nodes lie at z = -6 and 6; a light at (h, 0, 0) of intensity f(q) at the angle

@@ -12,7 +12,8 @@ def _text(data, at):
     return data[at:end].decode(), end + 1
 
 
-def _header(data):
+def read_header(data):
+    """Attributes {name: (type, bytes)} of a single-part scanline file, and where its line offsets begin."""
     assert data[:4] == b"\x76\x2f\x31\x01", "no EXR file"
     at, found = 8, {}
     while data[at]:
@@ -39,7 +40,7 @@ def _unzipped(block, size):
 def read(path):
     """({channel: rows of numbers}, {name: string of the header}, {channel: its type, one of "Ief"})."""
     data = path.read_bytes()
-    header, at = _header(data)
+    header, at = read_header(data)
     channels, raw, place = [], header["channels"][1], 0
     while raw[place]:
         name, place = _text(raw, place)

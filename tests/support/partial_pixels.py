@@ -3,22 +3,7 @@
 import json
 import struct
 
-
-def _header(data):
-    """Attributes {name: (type, bytes)} of a single-part scanline file, and where its line offsets begin."""
-    at, found = 8, {}
-    while data[at] != 0:
-        name, at = _text(data, at)
-        kind, at = _text(data, at)
-        size, = struct.unpack_from("<i", data, at)
-        found[name] = (kind, data[at + 4:at + 4 + size])
-        at += 4 + size
-    return found, at + 1
-
-
-def _text(data, at):
-    end = data.index(0, at)
-    return data[at:end].decode(), end + 1
+from exr_layers import read_header
 
 
 def green(folder, width, height):
@@ -27,7 +12,7 @@ def green(folder, width, height):
     samples = [[0] * width for _ in range(height)]
     for file in sorted(folder.glob("*.exr")):
         data = file.read_bytes()
-        header, at = _header(data)
+        header, at = read_header(data)
         x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"][1])
         unit = json.loads(header["lightshaft:unit"][1])
         columns, lines = x1 - x0 + 1, y1 - y0 + 1

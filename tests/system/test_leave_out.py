@@ -11,6 +11,7 @@ import sys
 import pytest
 from cli_kit import FOG, lightshaft, vol_bytes, write_fog
 from local_farm import ROOT, LocalFarm
+from processes import family
 
 UNUSED_BYTES = 5 << 20
 GRID = re.compile(r'<medium name="interior".*?</medium>', re.S)
@@ -145,15 +146,6 @@ def test_a_scene_may_be_sent_whole_and_nothing_beyond_its_needs_goes_to_workers(
 
 
 # ---- libraries ----
-
-def family(pid):
-    """A process and all below it."""
-    found = [pid]
-    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found += family(int(child))
-    return found
-
 
 def mapped(worker):
     return "".join(pathlib.Path(f"/proc/{pid}/maps").read_text() for pid in family(worker.popen.pid))
