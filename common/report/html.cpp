@@ -1,0 +1,95 @@
+#include "common/report/html.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+
+#include "common/base/digest.h"
+#include "common/base/plain_text.h"
+
+namespace ls::report {
+namespace {
+
+void append_escaped(std::string& out, std::string_view line) {
+  for (const char c : plain_text(line)) switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
+    }
+}
+
+}  // namespace
+
+std::string escape_html(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  for (std::size_t end = 0; (end = text.find('\n')) != std::string_view::npos; text.remove_prefix(end + 1)) {
+    append_escaped(out, text.substr(0, end));
+    out += '\n';
+  }
+  append_escaped(out, text);
+  return out;
+}
+
+std::string base64(std::span<const std::byte> bytes) {
+  static constexpr std::string_view kLetters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      word = word << 8 | (k < n ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k) out += k <= n ? kLetters[word >> (18 - 6 * k) & 63] : '=';
+  }
+  return out;
+}
+
+std::string data_url(std::string_view media_type, std::span<const std::byte> bytes) {
+  return fmt::format("data:{};base64,{}", media_type, base64(bytes));
+}
+
+std::string document_policy(std::string_view css) {
+  const Digest digest = sha256(std::as_bytes(std::span(css)));
+  return fmt::format(
+      "default-src 'none'; img-src data:; style-src 'sha256-{}'; base-uri 'none'; form-action 'none'",
+      base64(std::as_bytes(std::span(digest.bytes))));
+}
+
+std::string document(std::string_view title, std::string_view css, std::string_view body) {
+  return fmt::format(R"(<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta name="referrer" content="no-referrer">
+<title>{}</title>
+<style>{}</style>
+</head>
+<body>
+{}
+</body>
+</html>
+)",
+                     document_policy(css), escape_html(title), css, body);
+}
+
+}  // namespace ls::report

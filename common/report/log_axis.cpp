@@ -1,0 +1,93 @@
+#include "common/report/log_axis.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+constexpr double kMargin = 0.06;  // of the range, on either side
+constexpr double kShort = 2.2;    // decades; on a shorter axis 2 and 5 are labelled, too
+constexpr double kFine = 4.5;     // decades; on a shorter axis 2 to 9 have lines
+constexpr std::size_t kMostLabels = 8;
+constexpr std::size_t kFewTimes = 4;  // labels of time, before those between are added
+constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
+
+bool inside(const LogAxis& axis, double value) { return value >= axis.lo && value <= axis.hi; }
+
+std::string plain_label(int step, int exponent) {
+  if (exponent >= -3 && exponent <= 3) return fmt::format("{:g}", step * std::pow(10.0, exponent));
+  const std::string power = "10" + superscript(exponent);
+  return step == 1 ? power : fmt::format("{}·{}", step, power);
+}
+
+std::string time_label(double seconds) {
+  if (seconds < kMinute) return fmt::format("{:g} s", seconds);
+  if (seconds < kHour) return fmt::format("{:g} min", seconds / kMinute);
+  return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
+}
+
+// Times that people count in: `coarse` ones alone, or those between them, too.
+std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
+  std::vector<double> all;
+  const auto take = [&](double unit, std::initializer_list<double> steps) {
+    for (const double step : steps)
+      if (inside(axis, step * unit)) all.push_back(step * unit);
+  };
+  for (int n = static_cast<int>(std::floor(std::log10(axis.lo))); n < 0; ++n)
+    coarse ? take(std::pow(10.0, n), {1}) : take(std::pow(10.0, n), {1, 2, 5});
+  for (const double unit : {1.0, kMinute}) coarse ? take(unit, {1, 10}) : take(unit, {1, 2, 5, 10, 20});
+  coarse ? take(kHour, {1, 10}) : take(kHour, {1, 2, 5, 10});
+  for (double unit = kDay; unit <= axis.hi; unit *= 10) coarse ? take(unit, {1}) : take(unit, {1, 2, 5});
+  return all;
+}
+
+std::vector<Tick> time_ticks(const LogAxis& axis) {
+  std::vector<double> labelled = usual_times(axis, true);
+  if (labelled.size() < kFewTimes) labelled = usual_times(axis, false);
+  const std::size_t every = (labelled.size() + kMostLabels - 1) / kMostLabels;
+  std::vector<Tick> all;
+  for (std::size_t i = 0; i < labelled.size(); ++i)
+    all.push_back({labelled[i], i % every == 0 ? time_label(labelled[i]) : "", true});
+  return all;
+}
+
+std::vector<Tick> plain_ticks(const LogAxis& axis) {
+  const double decades = std::log10(axis.hi / axis.lo);
+  const int every = static_cast<int>(decades / kMostLabels) + 1;
+  std::vector<Tick> all;
+  const int first = static_cast<int>(std::floor(std::log10(axis.lo)));
+  const int last = static_cast<int>(std::ceil(std::log10(axis.hi)));
+  for (int n = first; n <= last; ++n)
+    for (int step = 1; step <= 9; ++step) {
+      const double value = step * std::pow(10.0, n);
+      if (!inside(axis, value) || (step > 1 && decades > kFine)) continue;
+      const bool between = decades < kShort && (step == 2 || step == 5);
+      const bool named = step == 1 ? (n % every + every) % every == 0 : between;
+      all.push_back({value, named ? plain_label(step, n) : "", step == 1});
+    }
+  return all;
+}
+
+}  // namespace
+
+double LogAxis::at(double value) const {
+  return from + std::log10(value / lo) / std::log10(hi / lo) * (to - from);
+}
+
+LogAxis log_axis(double lo, double hi, double from, double to) {
+  const double a = std::log10(lo), b = std::log10(hi);
+  const double margin = std::max((1 - (b - a)) / 2, kMargin * (b - a));
+  return {std::pow(10.0, a - margin), std::pow(10.0, b + margin), from, to};
+}
+
+std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
+  return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
+}
+
+}  // namespace ls::report

@@ -1,0 +1,22 @@
+// Figures as people read them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace ls::report {
+
+inline constexpr const char* kAbsent = "–";  // for what is not known: not finite
+
+std::string superscript(int n);  // "⁻⁴"
+// Three significant digits: "0.0213", "3.20 × 10⁻⁵".
+std::string figure(double x);
+std::string given(double x);  // a figure that a person chose, with the digits it was given: "0.001"
+// "0.4 s", "12 s", "4.2 min", "1 h 12 min", "3 d 4 h".
+std::string duration(double seconds);
+std::string count(double n);                 // "39,321,600"
+std::string byte_size(double n);             // "34.7 MiB"
+std::string percent(double part);            // "12 %"; 0 and 100 are kept for nothing and everything
+std::string date_time(double unix_seconds);  // "2026-11-21 18:26 UTC"
+
+}  // namespace ls::report
