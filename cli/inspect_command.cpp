@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "cli/inspection.h"
+#include "cli/instructions.h"
 #include "cli/job_options.h"
 #include "cli/local_world.h"
 #include "cli/say.h"
@@ -31,16 +32,24 @@ FrameSize small(FrameSize size) {
 }
 
 // The sums of a small image by every instantiation that covers the scene.
-tl::expected<std::vector<VariantBits>, coordinator::Rejected> render_variants(const LocalScene& scene,
-                                                                              JobSpec spec, FrameSize full) {
+tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene, JobSpec spec,
+                                                                     FrameSize full) {
   spec.size = small(full);
   const auto built = build_local_world(scene, spec, worker::usable_cpus());
   if (!built) return tl::unexpected(built.error());
-  std::vector<VariantBits> out;
+  VariantBitsList out;
+  const auto counter = InstructionCounter::open();
+  if (!counter) out.uncounted = counter.error().message;
+  const auto now = [&] { return counter ? counter->read().value_or(0) : 0; };
+  const PixelRect all{0, 0, spec.size->width, spec.size->height};
+  const double paths =
+      static_cast<double>(all.pixels()) * static_cast<double>(kSmallSamples.s1 - kSmallSamples.s0);
   for (const std::string& name : render::covering_variants(*built->world)) {
-    const auto tile = render::render_tile_as(*built->world, name, {0, 0, spec.size->width, spec.size->height},
-                                             kSmallSamples);
-    out.push_back({name, sha256(std::as_bytes(std::span(tile.sums)))});
+    const std::uint64_t before = now();
+    const auto tile = render::render_tile_as(*built->world, name, all, kSmallSamples);
+    const std::uint64_t executed = now() - before;
+    out.all.push_back({name, sha256(std::as_bytes(std::span(tile.sums))),
+                       executed > 0 ? std::optional(static_cast<double>(executed) / paths) : std::nullopt});
   }
   return out;
 }
@@ -83,7 +92,7 @@ int run(const Flags& flags) {
   if (!built) return say_rejected(built.error());
   for (const std::string& warning : built->job.warnings)
     fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
-  std::vector<VariantBits> variants;
+  VariantBitsList variants;
   if (flags.variants) {
     auto rendered = render_variants(*scene, spec, built->job.settings.size);
     if (!rendered) return say_rejected(rendered.error());
@@ -113,9 +122,10 @@ void add_inspect(CLI::App& app, Action& action) {
       ->type_name("name=value");
   inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   inspect->add_flag("--strict", flags->strict, "warnings are errors");
-  inspect->add_flag(
-      "--variants", flags->variants,
-      "renders a small image with every instantiation that covers the scene: their bits must be the same");
+  inspect->add_flag("--variants", flags->variants,
+                    "renders a small image with every instantiation that covers the scene: their bits must "
+                    "be the same; and "
+                    "counts their instructions, if this machine can");
   inspect->add_flag("--work", flags->work,
                     "counts the work of a small image (builds with LIGHTSHAFT_COUNT only)");
   inspect->add_flag("--json", flags->json, "as JSON");

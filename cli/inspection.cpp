@@ -74,9 +74,14 @@ std::string head(const ordered_json& j) {
 }
 
 std::string parts(const ordered_json& j, bool used) {
-  Table table(used ? "uses" : "leaves out");
+  Table table(used ? "uses, and the bytes of files that it reads" : "leaves out: no bytes");
   for (const auto& part : j.at("parts"))
-    if (part.at("used") == used) table.add({text_at(part, "part"), text_at(part, "why")});
+    if (part.at("used") == used) {
+      const std::uint64_t bytes = part.at("bytes");
+      std::vector<std::string> row{text_at(part, "part"), text_at(part, "why")};
+      if (used) row.insert(row.begin() + 1, bytes > 0 ? show_bytes(bytes) : "-");
+      table.add(std::move(row));
+    }
   return table.text();
 }
 
@@ -126,18 +131,32 @@ std::string memory(const ordered_json& j) {
   return table.text() + fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
+// What the parts that are left out would cost.
+std::string instructions(double per_path, double cheapest) {
+  const std::string more =
+      per_path == cheapest ? "" : fmt::format(", {:+.1f} %", 100 * (per_path / cheapest - 1));
+  return fmt::format("{:.0f} instructions a path{}", per_path, more);
+}
+
 std::string variants(const ordered_json& j) {
   const auto& rendered = j.find("variant_bits");
   if (rendered == j.end()) return "";
   Table table("every instantiation that covers the scene, on a small image");
-  for (const auto& v : *rendered) table.add({text_at(v, "variant"), text_at(v, "sums_sha256")});
-  return table.text() + (j.at("variants_agree") ? "the same bits\n" : "DIFFERENT BITS: this is a bug\n");
+  const auto& first = rendered->front().at("instructions_per_path");
+  for (const auto& v : *rendered) {
+    const auto& n = v.at("instructions_per_path");
+    table.add({text_at(v, "variant"), text_at(v, "sums_sha256"),
+               n.is_null() ? "" : instructions(n.get<double>(), first.get<double>())});
+  }
+  const std::string uncounted =
+      first.is_null() ? fmt::format("instructions are not counted: {}\n", text_at(j, "uncounted")) : "";
+  return table.text() + (j.at("variants_agree") ? "the same bits\n" : "DIFFERENT BITS: this is a bug\n") +
+         uncounted;
 }
 
 }  // namespace
 
-ordered_json inspection(const LocalScene& scene, const LocalWorld& built,
-                        const std::vector<VariantBits>& rendered) {
+ordered_json inspection(const LocalScene& scene, const LocalWorld& built, const VariantBitsList& rendered) {
   const coordinator::StoredJob& job = built.job;
   const render::WorldReport world = render::describe(*built.world);
   const auto size = job.settings.size;
@@ -170,14 +189,18 @@ ordered_json inspection(const LocalScene& scene, const LocalWorld& built,
                            {"uses", fmt::format("{}", fmt::join(file.uses, ", "))}});
   for (const auto& s : world.structures)
     j["structures"].push_back({{"name", s.name}, {"bytes", s.bytes}, {"detail", s.detail}});
-  if (rendered.empty()) return j;
+  if (rendered.all.empty()) return j;
   j["variant_bits"] = ordered_json::array();
   bool same = true;
-  for (const VariantBits& v : rendered) {
-    j["variant_bits"].push_back({{"variant", v.name}, {"sums_sha256", v.sums.hex()}});
-    same = same && v.sums == rendered.front().sums;
+  for (const VariantBits& v : rendered.all) {
+    j["variant_bits"].push_back(
+        {{"variant", v.name},
+         {"sums_sha256", v.sums.hex()},
+         {"instructions_per_path", v.instructions ? ordered_json(*v.instructions) : ordered_json()}});
+    same = same && v.sums == rendered.all.front().sums;
   }
   j["variants_agree"] = same;
+  if (!rendered.uncounted.empty()) j["uncounted"] = rendered.uncounted;
   return j;
 }
 

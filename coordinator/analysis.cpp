@@ -1,5 +1,7 @@
 #include "coordinator/analysis.h"
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/scene/integrators.h"
@@ -8,6 +10,22 @@ namespace ls::coordinator {
 namespace {
 
 constexpr std::size_t kMostListed = 64;  // of what was pruned: more are of one kind, and a record stays small
+
+// Of the files that only this part of the renderer reads.
+std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part) {
+  static const std::map<std::string, std::string> kReads = {{"meshes", "mesh"},
+                                                            {"bitmap textures", "texture"},
+                                                            {"environment map", "environment map"},
+                                                            {"volume grids", "grid"}};
+  const auto reads = kReads.find(part);
+  if (reads == kReads.end()) return 0;
+  std::uint64_t sum = 0;
+  for (const scene::FileNeed& f : needs.files) {
+    const auto used_so = [&](const std::string& use) { return use.starts_with(reads->second); };
+    if (std::any_of(f.uses.begin(), f.uses.end(), used_so)) sum += f.bytes;
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -18,7 +36,10 @@ void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, 
   json parts = json::array(), left_out = json::array();
   for (const scene::Need& part : in_words(needs)) {
     (part.used ? job.features_used : job.features_left_out).push_back(part.part);
-    parts.push_back({{"part", part.part}, {"used", part.used}, {"why", part.why}});
+    parts.push_back({{"part", part.part},
+                     {"used", part.used},
+                     {"why", part.why},
+                     {"bytes", bytes_of_files(needs, part.part)}});
   }
   for (const scene::LeftOut& x : pruned.left_out) {
     if (left_out.size() == kMostListed) break;

@@ -3,9 +3,10 @@
 
 usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone]
 
-For a vacuum, a homogeneous, a grid and a textured scene:
+For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
 - instructions per path (callgrind, within render_tile, one thread) of the release build, against a build of the same sources
-  without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...);
+  without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...), and against one without the guards of health;
+- the same of every instantiation of the integrator that covers the scene;
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
 - what a worker on a farm keeps resident and which libraries it has mapped;
 - bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
@@ -31,20 +32,31 @@ from processes import family  # noqa: E402
 SIZE, SPP = (48, 32), 8
 UNUSED = 100 << 20
 ALL = ["media", "grids", "chromatic", "emission", "overlaps", "boundaries", "coincident", "veils", "textures", "user_geometries", "instances", "environment_maps",
-       "equiangular", "light_trees", "lenses"]
+       "equiangular", "light_trees", "lenses", "found_lights"]
 GRID = re.compile(r'  <shape type="cube">.*?</shape>\n', re.S)
 BOX = '<shape type="cube"><transform name="to_world"><scale value="0.6"/></transform><bsdf type="diffuse">{}</bsdf></shape>\n'
 HOMOGENEOUS = """  <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="1.5"/>
     <rgb name="albedo" value="0.9, 0.8, 0.6"/></medium></shape>
 """
+# A closed room: every path meets something.
+ROOM = '<shape type="cube"><transform name="to_world"><scale value="5"/></transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>\n'
+POINT = '<emitter type="spot"><transform name="to_world"><lookat origin="2,3,2" target="0,0,0" up="0,1,0"/></transform><rgb name="intensity" value="30"/></emitter>\n'
 TEXTURE = '<texture type="bitmap" name="reflectance"><string name="filename" value="checks.png"/></texture>'
-LIT = FOG.replace('<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>', "").replace('<default name="density" value="2"/>', "")
+LIT = FOG.replace('<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>', ROOM)
+UNLIT = re.sub(r'  <shape type="rectangle">.*?</shape>\n', POINT, LIT, flags=re.S)
+INSIDE = BOX.format("").replace("0.6", "0.3")
 SCENES = {  # text, the parts that it needs
-    "vacuum": (GRID.sub(BOX.format(""), LIT), []),
-    "homogeneous": (GRID.sub(HOMOGENEOUS + BOX.format("").replace("0.6", "0.3"), LIT), ["media", "boundaries", "equiangular"]),
-    "grid": (FOG.replace("</scene>", BOX.format("").replace("0.6", "0.3") + "</scene>"), ["media", "grids", "boundaries"]),
-    "textured": (GRID.sub(BOX.format(TEXTURE), LIT), ["textures"]),
+    "vacuum": (GRID.sub(BOX.format(""), LIT, count=1), ["found_lights"]),
+    "homogeneous": (GRID.sub(HOMOGENEOUS + INSIDE, LIT, count=1), ["media", "boundaries", "equiangular", "found_lights"]),
+    "grid": (LIT.replace("</scene>", INSIDE + "</scene>"), ["media", "grids", "boundaries", "found_lights"]),
+    "textured": (GRID.sub(BOX.format(TEXTURE), LIT, count=1), ["textures", "found_lights"]),
+    "delta": (GRID.sub(HOMOGENEOUS + INSIDE, UNLIT, count=1), ["media", "boundaries", "equiangular"]),
 }
+
+
+def scene_text(name):
+    text = SCENES[name][0]
+    return text if "$density" in text else text.replace('<default name="density" value="2"/>', "")
 
 
 def png(width, height):
@@ -57,8 +69,8 @@ def png(width, height):
 def write(folder):
     write_fog(folder, n=32)
     (folder / "checks.png").write_bytes(png(256, 256))
-    for name, (text, _) in SCENES.items():
-        (folder / f"{name}.xml").write_text(text)
+    for name in SCENES:
+        (folder / f"{name}.xml").write_text(scene_text(name))
 
 
 def build(name, *options, jobs):
@@ -77,6 +89,25 @@ def instructions(binary, scene, folder):
     assert run.returncode == 0, run.stderr[-2000:]
     collected = int(re.search(r"Collected : (\d+)", run.stderr)[1])
     return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
+
+
+def by_instantiation(binary, scene, folder):
+    """(name, instructions per path) of every instantiation that covers the scene, in a small image: callgrind begins anew with each."""
+    out = folder / "variants.out"
+    said = subprocess.run(["valgrind", "--tool=callgrind", "--toggle-collect=ls::render::render_tile_as(*", "--dump-before=ls::render::render_tile_as(*",
+                           f"--callgrind-out-file={out}", binary, "inspect", scene, "--json", "--variants"], check=True, capture_output=True, text=True)
+    told = json.loads(said.stdout)
+    assert told["variants_agree"], told["variant_bits"]
+    longer = max(told["size"])
+    paths = 4 * (told["size"][0] * 32 // longer) * (told["size"][1] * 32 // longer)  # as cli/inspect_command.cpp has it
+    names = [v["variant"] for v in told["variant_bits"]]
+    # The first dump is of what came before; the last of all is written at the end.
+    dumps = sorted(folder.glob("variants.out*"), key=lambda p: int((re.search(r"(\d+)$", p.name) or [0, 10 ** 6])[1]))
+    totals = [int(re.search(r"^(?:totals|summary): (\d+)", p.read_text(), re.M)[1]) for p in dumps]
+    for dump in dumps:
+        dump.unlink()
+    totals = totals[-len(names):]
+    return [(name, total / paths) for name, total in zip(names, totals)]
 
 
 def on_a_farm(scene, folder):
@@ -118,20 +149,26 @@ def work(binary, scene):
     return json.loads(done.stdout)["work"]
 
 
-def compute(name, release, counting, jobs, scene, folder):
+def compute(name, release, unguarded, counting, jobs, scene, folder):
     without = [part for part in ALL if part not in SCENES[name][1]]
     bare = build(name, "-DLIGHTSHAFT_WITHOUT=" + ",".join(without), jobs=jobs)
     full, pixels = instructions(release, scene, folder)
     least, same = instructions(bare, scene, folder)
     assert pixels == same, f"{name}: the build without {without} gives another image"
     print(name, f"{full:.0f} instructions a path, {least:.0f} without: {100 * (full / least - 1):+.2f} %", flush=True)
-    return {"full": full, "bare": least, "without": without, "work": work(counting, scene)}
+    trusting, same = instructions(unguarded, scene, folder)
+    assert pixels == same, f"{name}: the build without guards gives another image"
+    print(name, f"{trusting:.0f} without the guards of health: {100 * (full / trusting - 1):+.2f} %", flush=True)
+    return {"full": full, "bare": least, "without": without, "unguarded": trusting, "work": work(counting, scene),
+            "variants": by_instantiation(release, scene, folder)}
 
 
 def measure(names, jobs, folder, bytes_alone):
     write(folder)
     release = ROOT / "build" / "release" / "bin" / "lightshaft"
-    counting = None if bytes_alone else build("counting", "-DLIGHTSHAFT_COUNT=ON", jobs=jobs)
+    if not bytes_alone:
+        counting = build("counting", "-DLIGHTSHAFT_COUNT=ON", jobs=jobs)
+        unguarded = build("unguarded", "-DLIGHTSHAFT_WITHOUT=health", jobs=jobs)
     rows = {}
     for name in names:
         scene = folder / f"{name}.xml"
@@ -139,8 +176,12 @@ def measure(names, jobs, folder, bytes_alone):
         rows[name] = {"variant": told["variant"], "needed": sum(s["bytes"] for s in told["structures"]),
                       "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, folder), folder / f"farm-{name}-fat")}
         if not bytes_alone:
-            rows[name] |= compute(name, release, counting, jobs, scene, folder)
+            rows[name] |= compute(name, release, unguarded, counting, jobs, scene, folder)
     return rows
+
+
+def percent(n, of):
+    return f"{100 * (n / of - 1):+.2f} %"
 
 
 def computed(rows):
@@ -149,9 +190,21 @@ def computed(rows):
            "with these parts compiled out (`cmake -DLIGHTSHAFT_WITHOUT=...`); both give the same pixels, bit for bit.", "",
            "| scene | instantiation | instructions | without the unused parts | difference |", "|---|---|---|---|---|"]
     for name, r in rows.items():
-        out.append(f"| {name} | {r['variant']} | {r['full']:.0f} | {r['bare']:.0f} | {100 * (r['full'] / r['bare'] - 1):+.2f} % |")
-    out += ["", "Compiled out were: " + "; ".join(f"for *{n}* {', '.join(r['without'])}" for n, r in rows.items()) + ".", "",
-            "## Work that is not done", "", "Counted in a build with `-DLIGHTSHAFT_COUNT=ON` (`lightshaft inspect SCENE --work`), in a small image.", "",
+        out.append(f"| {name} | {r['variant']} | {r['full']:.0f} | {r['bare']:.0f} | {percent(r['full'], r['bare'])} |")
+    out += ["", "Compiled out were: " + "; ".join(f"for *{n}* {', '.join(r['without'])}" for n, r in rows.items()) + ".", ""]
+    out += ["### By instantiation", "",
+            "The same bits at another price, in a small image (`lightshaft inspect SCENE --variants`, which names the prices itself where the machine has a "
+            "counter of instructions; here again callgrind): the first is the one that the scene is rendered with. What it saves over the general one is "
+            "what the parts that it leaves out would cost. *everything, and light in parts* is the price of AOVs of light, for those who ask for them.", ""]
+    for name, r in rows.items():
+        cheapest = r["variants"][0][1]
+        out.append(f"- {name}: " + "; ".join(f"{v} {n:.0f}" + ("" if n == cheapest else f" ({percent(n, cheapest)})") for v, n in r["variants"]) + ".")
+    out += ["", "### The guards of numeric health", "",
+            "Against a build without them (`-DLIGHTSHAFT_WITHOUT=health`): each sample's test, the bounds of densities, directions that are none.", "",
+            "| scene | instructions | without the guards | difference |", "|---|---|---|---|"]
+    for name, r in rows.items():
+        out.append(f"| {name} | {r['full']:.0f} | {r['unguarded']:.0f} | {percent(r['full'], r['unguarded'])} |")
+    out += ["", "## Work that is not done", "", "Counted in a build with `-DLIGHTSHAFT_COUNT=ON` (`lightshaft inspect SCENE --work`), in a small image.", "",
             "| work | " + " | ".join(rows) + " |", "|---|" + "---|" * len(rows)]
     for key in next(iter(rows.values()))["work"]:
         out.append(f"| {key.replace('_', ' ')} | " + " | ".join(str(r["work"][key]) for r in rows.values()) + " |")

@@ -25,12 +25,37 @@ def inspect(scene, *flags):
 
 HOMOGENEOUS = '<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{}"/><rgb name="albedo" value="0.9, 0.8, 0.6"/></medium>'
 GLOWING = HOMOGENEOUS.format("1").replace("</medium>", '<rgb name="emission" value="0.3, 0.2, 0"/></medium>')
+LAMP = re.compile(r'  <shape type="rectangle">.*?</shape>\n', re.S)
+SPOT = ('<emitter type="spot"><transform name="to_world"><lookat origin="1, 2, 1" target="0, 0, 0" up="0, 1, 0"/></transform>'
+        '<rgb name="intensity" value="30, 28, 24"/></emitter>\n')
+SUN = '<emitter type="directional"><vector name="direction" x="0.5" y="-0.7" z="-0.5"/><rgb name="irradiance" value="8, 7.4, 6.4"/></emitter>\n'
+SKY = '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>'
+PLAIN = '<integrator type="volpath"/>'
+DEEP = '<integrator type="volpathmis"><integer name="max_depth" value="64"/><integer name="rr_depth" value="5"/></integrator>'
+AROUND = ('<medium type="heterogeneous" id="around"><volume name="sigma_t" type="gridvolume"><string name="filename" value="fog.vol"/>'
+          '<transform name="to_world"><scale value="9"/><translate x="-4.5" y="-4.5" z="-4.5"/></transform></volume><float name="scale" value="0.5"/></medium>')
+STILL_LIFE = """<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/><translate y="-1"/></transform>
+  <bsdf type="twosided"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf></bsdf></shape>
+<shape type="sphere"><float name="radius" value="0.6"/><bsdf type="roughconductor"><float name="alpha" value="0.1"/></bsdf></shape>
+<shape type="sphere"><float name="radius" value="0.4"/><point name="center" x="1" y="-0.5" z="0.5"/><bsdf type="roughplastic"/></shape>
+<shape type="sphere"><float name="radius" value="0.4"/><point name="center" x="-1" y="-0.5" z="0.5"/><bsdf type="dielectric"/></shape>
+"""
 VARIED = {
     "grid": (FOG, 2),
     "homogeneous": (GRID.sub(HOMOGENEOUS.format("1.5"), FOG), 4),
     "chromatic": (GRID.sub(HOMOGENEOUS.format("0.5, 1.5, 3"), FOG), 2),
     "glowing": (GRID.sub(GLOWING, FOG), 1),
     "vacuum": (GRID.sub("", FOG), 5),
+    # What the scenes are like that are used to compare renderers.
+    "spot in fog": (LAMP.sub(SPOT, GRID.sub(HOMOGENEOUS.format("0.25"), FOG)).replace(SKY, ""), 4),
+    "extinctions of 1 to 16": (GRID.sub(HOMOGENEOUS.format("0.3, 1.2, 4.8"), FOG.replace('<shape type="cube">', '<shape type="sphere">')), 2),
+    "cloud under sun and sky": (LAMP.sub(SUN, FOG.replace(PLAIN, DEEP)), 3),
+    "sunlit room of steam": (LAMP.sub(SUN + STILL_LIFE, GRID.sub('<ref name="interior" id="around"/>', FOG).replace(PLAIN, PLAIN + AROUND))
+                             .replace('<float name="fov"', '<ref name="medium" id="around"/><float name="fov"')
+                             .replace('<shape type="cube">', '<shape type="cube"><transform name="to_world"><scale value="4.5"/></transform>'), 3),
+    "still life through a lens": (re.sub(r'  <shape type="cube">.*?</shape>\n', STILL_LIFE, FOG, flags=re.S)
+                                  .replace('<sensor type="perspective">', '<sensor type="thinlens"><float name="aperture_radius" value="0.1"/>'
+                                           '<float name="focus_distance" value="4"/>'), 7),
     "chosen by distance": (FOG.replace('<integrator type="volpath"/>', '<integrator type="volpath_distant_mis"/>'), 2),
 }
 
@@ -60,6 +85,7 @@ def test_every_instantiation_gives_the_same_bits_of_the_demo_scenes(tmp_path):
     bath = tmp_path / "bath"
     subprocess.run([sys.executable, "-B", ROOT / "scenes" / "bath" / "make_bath.py", bath, "--setting", "sketch"], check=True)
     agree(bath / "bath.xml", 2)
+    agree(ROOT / "scenes" / "mirror_focus" / "scene.xml", 2)
 
 
 def test_every_instantiation_gives_the_same_bits_of_the_validation_scenes(tmp_path):

@@ -271,8 +271,8 @@ void attach_instances(const Geometry& g, Accel::State& st) {
   }
 }
 
-PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned primitive,
-                         unsigned instance_id) {
+inline PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned primitive,
+                                unsigned instance_id) {
   const unsigned side = geometry / kKinds, kind = geometry % kKinds;
   const Scenes* in = &*st.own;
   std::uint32_t instance = kNone;

@@ -25,6 +25,9 @@ struct Built {
   bool equiangular = true;
   bool light_trees = true;
   bool lenses = true;
+  bool found_lights = true;  // lights that rays can meet: with an extent, or the surroundings
+  // What no scene can do without, but whose price is to be known: the guards that count what goes wrong.
+  bool health = true;
 };
 
 // Names with commas between them; an unknown one does not compile.
@@ -51,7 +54,9 @@ constexpr Built built_without(std::string_view list) {
                  {"environment_maps", b.environment_maps},
                  {"equiangular", b.equiangular},
                  {"light_trees", b.light_trees},
-                 {"lenses", b.lenses}};
+                 {"lenses", b.lenses},
+                 {"found_lights", b.found_lights},
+                 {"health", b.health}};
     bool known = false;
     for (const auto& p : parts)
       if (p.name == name) p.part = false, known = true;

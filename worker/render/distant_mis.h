@@ -140,12 +140,13 @@ class SegmentLight {
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
                       const LightChoice& choice, bool by_angle, std::uint32_t bits) {
     const Stretch& s = plan.stretch;
+    const V3 pivot = choice.has_place ? path.world_.lights.pivot(choice) : V3(0);
     Stretch::Spot spot;
     V3 p;
     float e_angle = 0;
     if (by_angle) {
       const V3 o = path.start_ + path.d_ * s.from();
-      const auto a = EquiAngular(o, path.d_, s.to() - s.from(), choice.pivot).sample(unit_float(bits));
+      const auto a = EquiAngular(o, path.d_, s.to() - s.from(), pivot).sample(unit_float(bits));
       spot = s.at(s.from() + a.t);
       p = a.p;
       e_angle = a.pdf;
@@ -164,13 +165,13 @@ class SegmentLight {
     const Vertex v = vertex_at(path, medium, plan, spot);
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = spot.rate * depth_pdf(path, medium, plan, spot.x);
-    if (both && !by_angle) e_angle = v.angle_pdf(choice.pivot);
+    if (both && !by_angle) e_angle = v.angle_pdf(pivot);
     const float own = by_angle ? e_angle : e_depth;
     if (!(own > 0)) return;
     float weight = both ? share(path.world_.heuristic, own, by_angle ? e_depth : e_angle) : 1.f;
     const float phase = medium.phase.value(path.d_, light->direction);
     if (!light->delta) {
-      const float found = choice.has_place ? v.found_as_light(choice.pivot) : v.found_as_light();
+      const float found = choice.has_place ? v.found_as_light(pivot) : v.found_as_light();
       weight *= 1 / (1 + phase / (light->pdf * found));
     }
     RandomStream stream =

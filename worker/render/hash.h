@@ -13,9 +13,11 @@ constexpr std::uint64_t mix64(std::uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
   return z ^ (z >> 31);
 }
-constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) {
-  return mix64(a + 0x9e3779b97f4a7c15ull + mix64(b));
+// combine(a, b), of b's mix64.
+constexpr std::uint64_t combine_mixed(std::uint64_t a, std::uint64_t mixed_b) {
+  return mix64(a + 0x9e3779b97f4a7c15ull + mixed_b);
 }
+constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) { return combine_mixed(a, mix64(b)); }
 
 // 32 random bits as a float in [0, 1); 24 bits are kept, so the largest value is 1 - 2^-24.
 inline float unit_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }

@@ -27,41 +27,16 @@ float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
 std::vector<V3> Lights::points() const {
   std::vector<V3> list;
   for (const Light& l : lights_) {
-    if (l.kind == Kind::point || l.kind == Kind::spot || l.kind == Kind::projector)
-      list.push_back(l.position);
+    if (is_point(l.kind)) list.push_back(l.position);
   }
   return list;
 }
 
-LightChoice Lights::chosen(const LightNumbers& numbers, const Drawn& drawn) const {
-  LightChoice c;
-  c.light = drawn.light;
-  c.probability = drawn.probability;
-  const Light& l = lights_[c.light];
-  c.numbers = numbers;
-  c.has_place = has_place(l.kind);
-  switch (l.kind) {
-    case Kind::point:
-    case Kind::spot:
-    case Kind::projector:
-      c.pivot = l.position;
-      c.is_point = true;
-      break;
-    case Kind::sphere:
-      c.pivot = V3(geometry_->spheres[l.primitive].center);
-      break;
-    case Kind::parallelogram:
-    case Kind::mesh:
-    case Kind::disk:
-    case Kind::cylinder:
-      c.pivot = area_point(l, numbers).p;
-      break;
-    case Kind::directional:
-    case Kind::sun:
-    case Kind::map:
-      break;
-  }
-  return c;
+V3 Lights::pivot(const LightChoice& choice) const {
+  const Light& l = lights_[choice.light];
+  if (choice.is_point) return l.position;
+  if (l.kind == Kind::sphere) return V3(geometry_->spheres[l.primitive].center);
+  return area_point(l, choice.numbers).p;
 }
 
 Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) const {
@@ -69,7 +44,9 @@ Lights::Point Lights::area_point(const Light& l, const LightNumbers& numbers) co
   const V2 u(unit_float(numbers.x), unit_float(numbers.y));
   if (l.kind == Kind::cylinder) return cylinder_point(l, u);
   if (l.kind == Kind::parallelogram) {
-    return {l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, l.uv0 + l.uv_u * u.x + l.uv_v * u.y, {}};
+    Point y{l.position + l.axis_u * u.x + l.axis_v * u.y, l.normal, {0, 0}, {}};
+    if (l.textured) y.uv = l.uv0 + l.uv_u * u.x + l.uv_v * u.y;
+    return y;
   }
   const V2 q = concentric_disk(u);
   float angle = std::atan2(q.y, q.x);

@@ -42,7 +42,6 @@ struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
   bool has_place = false, is_point = false;  // is_point: a place without an extent
-  V3 pivot;
   LightNumbers numbers;
 };
 
@@ -62,6 +61,8 @@ class Lights {
   LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
     return chosen(numbers, by_tree(n) ? draw(numbers.light, x, n) : draw(numbers.light));
   }
+  // Only of a light with a place.
+  V3 pivot(const LightChoice& choice) const;
   // Light arriving at x from the chosen light; nothing if none can (behind, outside the cone, zero solid
   // angle).
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
@@ -117,6 +118,9 @@ class Lights {
   static bool has_place(Kind kind) {
     return kind != Kind::directional && kind != Kind::sun && kind != Kind::map;
   }
+  static bool is_point(Kind kind) {
+    return kind == Kind::point || kind == Kind::spot || kind == Kind::projector;
+  }
   struct Light {
     Kind kind = Kind::point;
     C3 value;  // intensity (point, spot), irradiance (directional; projector: of a texture of 1 on
@@ -140,7 +144,7 @@ class Lights {
   };
   struct Point {  // on an area light
     V3 p, n;
-    V2 uv;
+    V2 uv{0, 0};  // only where that matters: of textured lights
     FacePoint face;
   };
 
@@ -169,11 +173,18 @@ class Lights {
   bool by_tree(const V3& n) const {
     return kBuilt.light_trees && !tree_.empty() && (tree_in_media_ || dot(n, n) > 0);
   }
-  Drawn draw(std::uint32_t word) const;
+  Drawn draw(std::uint32_t word) const {
+    const std::uint32_t i = last_.size() == 1 ? 0 : by_table(word);
+    return {i, lights_[i].probability};
+  }
+  std::uint32_t by_table(std::uint32_t word) const;
   Drawn draw(std::uint32_t word, const V3& x, const V3& n) const;
   float probability_at(std::uint32_t light, const V3& x, const V3& n) const;
   std::uint64_t table_words(std::uint32_t light) const;
-  LightChoice chosen(const LightNumbers& numbers, const Drawn& drawn) const;
+  LightChoice chosen(const LightNumbers& numbers, const Drawn& drawn) const {
+    const Kind kind = lights_[drawn.light].kind;
+    return {drawn.light, drawn.probability, has_place(kind), is_point(kind), numbers};
+  }
   Point area_point(const Light& light, const LightNumbers& numbers) const;
   Point mesh_point(const Light& light, const LightNumbers& numbers) const;
   Point cylinder_point(const Light& light, V2 u) const;

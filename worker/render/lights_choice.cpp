@@ -132,10 +132,8 @@ std::uint64_t Lights::table_bytes() const {
   return n;
 }
 
-Lights::Drawn Lights::draw(std::uint32_t word) const {
-  const auto it = std::lower_bound(last_.begin(), last_.end() - 1, word);
-  const auto i = static_cast<std::uint32_t>(it - last_.begin());
-  return {i, lights_[i].probability};
+std::uint32_t Lights::by_table(std::uint32_t word) const {
+  return static_cast<std::uint32_t>(std::lower_bound(last_.begin(), last_.end() - 1, word) - last_.begin());
 }
 
 // Of the words below table_words_, w stands for the table's word kTableShare w.

@@ -15,6 +15,7 @@
 #include <limits>
 #include <vector>
 
+#include "worker/render/built.h"
 #include "worker/render/counters.h"
 #include "worker/render/features.h"
 #include "worker/render/grid.h"
@@ -155,7 +156,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       for (; gone < room; gone += stream.exponential()) {
         const float t = std::min(w.begin() + gone / rate, w.end());
         const float rho = m.density->value<kFilter>(w.index(t));
-        if (rho > hi) ++counters.majorant_violations;
+        if (kBuilt.health && rho > hi) ++counters.majorant_violations;
         if (stream.uniform() * hi < rho) return scatter(w.entry() + t, passed + double{gone} / s);
         if constexpr (kChromatic) ++nulls;
       }
@@ -173,8 +174,8 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 // Where so little light is left, the rest of the way is walked by few: below e^-4 a tracker survives with the
 // share that is left of that, and goes on with e^-4. It is the estimate so far that decides, not the
 // control's depth alone: a ray that misses the hot voxel of an otherwise empty cell has a deep control there
-// and a transmittance of 1, made up for by its factors (STABILITY N10). Only where there is something to track:
-// constant densities cost nothing, and their tails are exact (N5).
+// and a transmittance of 1, made up for by its factors (STABILITY N10). Only where there is something to
+// track: constant densities cost nothing, and their tails are exact (N5).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -270,8 +271,8 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
 
-// As of a flight that is known to have come to t unscattered: the other media of a place ended it there. Grids
-// are asked for their exact depth, so that it does not matter how that came to be known.
+// As of a flight that is known to have come to t unscattered: the other media of a place ended it there.
+// Grids are asked for their exact depth, so that it does not matter how that came to be known.
 Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 
 // Unbiased estimate (exact where homogeneous) of the transmittance between t0 and t1.

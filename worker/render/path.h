@@ -100,11 +100,12 @@ class PathTracer {
                         RandomStream stream);
   C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
   Within start_medium() const;
-  Within beyond(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
+  [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const V3& w, const V3& from,
+                                              Within in) const;
   void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
   Together others_at(const SurfaceHit& hit, const V3& from, const V3& w) const;
-  Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
-  void prefer_scatterer(SurfaceHit& hit) const;
+  [[gnu::noinline]] Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
+  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit) const;
   bool survives(float u);
 
   // `ahead`: of light that is scattered once more than the path so far, in the medium ahead of it.
@@ -180,14 +181,14 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     }
     if (!met) {
       // A direction that is none meets nothing: a rejected sample, as one that was cut off before stays.
-      if (is_finite(d_))
+      if (!kBuilt.health || is_finite(d_))
         add_environment();
       else
         outcome_.reject(HealthCause::no_direction);
       break;
     }
-    add_emission(hit);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (kBuilt.found_lights && surface.light != kNone) add_emission(hit);
     if ((kBuilt.boundaries && surface.null) || (kBuilt.veils && surface.veil && passes_veil(hit))) {
       if (!may_go_on(depth_, ++passed_)) break;
       pass_boundary(hit);
@@ -255,7 +256,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
-  const float weight = light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
+  const float weight = !kBuilt.found_lights || light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
   const V3 p = offset_point(hit, light->direction);
   const Within medium = beyond(hit, light->direction, d_, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
@@ -318,7 +319,7 @@ void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit) {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
-  if (world_.geometry.surfaces[hit.surface].light == kNone || (depth_ == 0 && world_.hide_emitters)) return;
+  if (depth_ == 0 && world_.hide_emitters) return;
   const C3 emitted = world_.lights.emitted(hit, -d_);
   if (is_black(emitted)) return;
   float weight = 1;
@@ -331,7 +332,8 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
-  if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  if (!kBuilt.found_lights || !world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters))
+    return;
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
   add(beta_ * world_.lights.environment(d_, last_.delta ? kInfinity : pdf));
 }

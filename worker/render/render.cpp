@@ -2,6 +2,7 @@
 
 #include <immintrin.h>
 
+#include <bit>
 #include <cmath>
 
 #include "worker/render/aov_pixel.h"
@@ -55,6 +56,15 @@ bool usable(const SampleOutcome& s) {
   return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
          std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
 }
+// The same, and nothing to be counted of it: what nearly every sample is. As bit patterns the floats from 0
+// up to the limit are ordered as they are as numbers, and negative ones and NaN lie beyond.
+bool clean(const SampleOutcome& s) {
+  const auto fine = [](float x) {
+    return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(kLargestRadiance);
+  };
+  const C3& c = s.radiance;
+  return fine(c.x) && fine(c.y) && fine(c.z) && s.cut_off == HealthCause::none && s.majorant_violations == 0;
+}
 bool negative(const SampleOutcome& s) { return s.radiance.x < 0 || s.radiance.y < 0 || s.radiance.z < 0; }
 
 // Why it is not usable; none if it is.
@@ -97,10 +107,9 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
     aovs.end_sample(x, y, s, usable(out));
     // A sample that went wrong is counted, contributes zero and stays in N: never drawn again (STABILITY
     // N54).
-    const bool add = usable(out);
-    if (!add || out.majorant_violations > 0 || negative(out)) [[unlikely]] {
+    if (kBuilt.health && !clean(out)) [[unlikely]] {
       count(out, {x, y, s}, health);
-      if (!add) continue;
+      if (!usable(out)) continue;
     }
     for (int c = 0; c < 3; ++c) sums.half[s & 1][c] += static_cast<double>(out.radiance[c]);
   }

@@ -28,7 +28,8 @@ enum class Purpose : std::uint32_t {
   track_distance,
   overlap,
   overlap_emission,
-  albedo
+  albedo,
+  end  // none: how many there are
 };
 
 // Four numbers of one purpose at one path vertex.
@@ -44,32 +45,55 @@ class SampleStream {
   static constexpr int kSobolVertices = 6;
 
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
-      : index_(sample >> 1),
-        sequence_(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1)),
-        sample_(combine(sequence_, index_)),
-        reversed_(reverse_bits(static_cast<std::uint32_t>(index_))) {}
+      : SampleStream(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1), sample >> 1) {}
 
   Group group(int vertex, Purpose purpose) const {
-    const auto slot = (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose);
-    // A Sobol sequence of 32-bit points has 2^32 members; samples beyond are drawn by hash.
-    if (vertex < kSobolVertices && index_ >> 32 == 0) {
-      return {sobol4_reversed(reversed_, combine(sequence_, slot))};
-    }
+    if (static_cast<std::uint32_t>(vertex) < by_sobol_)
+      return {sobol4_reversed(
+          reversed_,
+          combine_mixed(sequence_,
+                        kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
+    return hashed(slot(vertex, purpose));
+  }
+  // As many numbers as a tracker wants.
+  RandomStream stream(int vertex, Purpose purpose) const {
+    return RandomStream(combine(sample_, slot(vertex, purpose)));
+  }
+
+ private:
+  static constexpr int kPurposes = static_cast<int>(Purpose::end);
+  static constexpr std::uint64_t slot(int vertex, Purpose purpose) {
+    return (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose);
+  }
+  struct MixedSlots {
+    std::uint64_t value[kSobolVertices][kPurposes];
+  };
+  static constexpr MixedSlots mixed_slots() {
+    MixedSlots m{};
+    for (int v = 0; v < kSobolVertices; ++v)
+      for (int p = 0; p < kPurposes; ++p) m.value[v][p] = mix64(slot(v, static_cast<Purpose>(p)));
+    return m;
+  }
+  static const MixedSlots kMixedSlots;
+
+  // A Sobol sequence of 32-bit points has 2^32 members; samples beyond are drawn by hash.
+  SampleStream(std::uint64_t sequence, std::uint64_t index)
+      : sequence_(sequence),
+        sample_(combine(sequence, index)),
+        reversed_(reverse_bits(static_cast<std::uint32_t>(index))),
+        by_sobol_(index >> 32 == 0 ? kSobolVertices : 0) {}
+
+  Group hashed(std::uint64_t slot) const {
     const std::uint64_t a = combine(sample_, slot), b = mix64(a + 0x9e3779b97f4a7c15ull);
     return {{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a >> 32),
              static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b >> 32)}};
   }
-  // As many numbers as a tracker wants.
-  RandomStream stream(int vertex, Purpose purpose) const {
-    return RandomStream(
-        combine(sample_, (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose)));
-  }
 
- private:
-  std::uint64_t index_;     // within the half
   std::uint64_t sequence_;  // names the half of the pixel
   std::uint64_t sample_;    // names the sample
-  std::uint32_t reversed_;  // the index, its bits reversed
+  std::uint32_t reversed_;  // the index within the half, its bits reversed
+  std::uint32_t by_sobol_;  // vertices whose numbers are
 };
+inline constexpr SampleStream::MixedSlots SampleStream::kMixedSlots = SampleStream::mixed_slots();
 
 }  // namespace ls::render

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 
 #include "worker/render/hash.h"
@@ -53,14 +54,15 @@ constexpr std::array<std::array<std::uint32_t, 32>, 3> direction_numbers() {
 }
 
 using U32x4 = std::uint32_t __attribute__((vector_size(16)));
+using U64x2 = std::uint64_t __attribute__((vector_size(16)));
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 
 // In all four lanes; half bytes are looked up.
 inline U32x4 reverse_bits(U32x4 x) {
-  constexpr U8x16 kNibble = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15};
+  constexpr U8x16 kNibble = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15}, kUpper = kNibble << 4;
   constexpr U8x16 kBytes = {3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12};
   const auto bytes = __builtin_shuffle(reinterpret_cast<U8x16>(x), kBytes);
-  return reinterpret_cast<U32x4>((__builtin_shuffle(kNibble, bytes & 15) << 4) |
+  return reinterpret_cast<U32x4>(__builtin_shuffle(kUpper, bytes & 15) |
                                  __builtin_shuffle(kNibble, bytes >> 4));
 }
 
@@ -90,8 +92,10 @@ constexpr SobolTables sobol_tables() {
 inline constexpr SobolTables kSobol = sobol_tables();
 
 inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
-  const auto row = [&](int byte) {
-    return *reinterpret_cast<const U32x4*>(kSobol.value[byte][(reversed_index >> (8 * byte)) & 255]);
+  const std::size_t index = reversed_index;
+  const auto row = [&](int byte) {  // 16 bytes each
+    const std::size_t at = (byte == 0 ? index << 4 : index >> (8 * byte - 4)) & 0xff0;
+    return *reinterpret_cast<const U32x4*>(reinterpret_cast<const char*>(kSobol.value[byte]) + at);
   };
   return row(0) ^ row(1) ^ row(2) ^ row(3);
 }
@@ -101,13 +105,10 @@ inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
 // Four coordinates of a point of the sequence named by `key`, as 32-bit fractions. `reversed_index` is the
 // point's index with its bits reversed.
 inline std::array<std::uint32_t, 4> sobol4_reversed(std::uint32_t reversed_index, std::uint64_t key) {
-  using detail::U32x4;
   const std::uint32_t i = scramble_reversed(reversed_index, static_cast<std::uint32_t>(key));
-  const std::uint64_t k1 = mix64(key), k2 = mix64(key + 1);
-  const U32x4 seeds = {static_cast<std::uint32_t>(k1), static_cast<std::uint32_t>(k1 >> 32),
-                       static_cast<std::uint32_t>(k2), static_cast<std::uint32_t>(k2 >> 32)};
-  const U32x4 x = detail::reverse_bits(scramble_reversed(detail::sobol_reversed(i), seeds));
-  return {x[0], x[1], x[2], x[3]};
+  const detail::U64x2 seeds = {mix64(key), mix64(key + 1)};
+  return std::bit_cast<std::array<std::uint32_t, 4>>(detail::reverse_bits(
+      scramble_reversed(detail::sobol_reversed(i), reinterpret_cast<detail::U32x4>(seeds))));
 }
 inline std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
   return sobol4_reversed(reverse_bits(index), key);

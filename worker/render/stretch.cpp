@@ -10,16 +10,14 @@ float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0
 
 }  // namespace
 
-Stretch::Stretch(const Medium& m, const V3& o, const V3& d, float t_max)
-    : medium_(&m), o_(o), d_(d), t_max_(t_max), to_(t_max), total_(t_max) {
-  if (!m.grid) return;
+void Stretch::measure() {
   double total = 0;
   to_ = 0;
-  for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
     const float rate = rate_of(w.cell());
     if (!(rate > 0)) continue;
     if (!(total > 0)) from_ = static_cast<float>(w.entry() + w.begin());
-    to_ = std::min(t_max, static_cast<float>(w.entry() + w.end()));
+    to_ = std::min(t_max_, static_cast<float>(w.entry() + w.end()));
     total += double{rate} * (w.end() - w.begin());
   }
   total_ = static_cast<float>(total);
@@ -56,8 +54,7 @@ Stretch::Spot Stretch::grid_after(float x) const {
   return {to_, total_, 0, {0, 0, 0}};  // rounding put x beyond the end
 }
 
-C3 Stretch::scattering(const Spot& spot, const V3& p) const {
-  if (!medium_->grid) return medium_->sigma_s;
+C3 Stretch::grid_scattering(const Spot& spot, const V3& p) const {
   const Grid& g = *medium_->density;
   const float density =
       g.filter() == VolumeFilter::trilinear ? g.trilinear(spot.index) : g.nearest(spot.index);

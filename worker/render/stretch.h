@@ -18,7 +18,10 @@ class Stretch {
   };
 
   // Along o + t d, d of unit length, up to t_max, which may be infinite.
-  Stretch(const Medium& m, const V3& o, const V3& d, float t_max);
+  Stretch(const Medium& m, const V3& o, const V3& d, float t_max)
+      : medium_(&m), o_(o), d_(d), t_max_(t_max), to_(t_max), total_(t_max) {
+    if (m.grid) measure();
+  }
 
   // The part of the ray outside of which nothing scatters; to() is infinite where the medium has no end.
   float from() const { return from_; }
@@ -30,9 +33,13 @@ class Stretch {
   Spot after(float x) const { return medium_->grid ? grid_after(x) : Spot{x, x, 1, {0, 0, 0}}; }
 
   // Scattering coefficients there; p is the spot in the world.
-  C3 scattering(const Spot& spot, const V3& p) const;
+  C3 scattering(const Spot& spot, const V3& p) const {
+    return medium_->grid ? grid_scattering(spot, p) : medium_->sigma_s;
+  }
 
  private:
+  void measure();
+  C3 grid_scattering(const Spot& spot, const V3& p) const;
   Spot grid_at(float t) const;
   Spot grid_after(float x) const;
 

@@ -47,13 +47,11 @@ class VertexLight {
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
 
-    // e / f for a light with this pivot.
-    float focus(const V3& pivot, bool is_point) const {
-      return focused && (is_point || !points_only) ? EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf
-                                                   : 0.f;
-    }
+    bool focuses(bool is_point) const { return focused && (is_point || !points_only); }
+    // e / f for a light with this pivot, where it focuses on such.
+    float focus(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf; }
     // Of a light that was hit: no point.
-    float found_as_light(const V3& pivot) const { return 1 + focus(pivot, false); }
+    float found_as_light(const V3& pivot) const { return focuses(false) ? 1 + focus(pivot) : 1.f; }
     static float found_as_light() { return 1; }
   };
 
@@ -96,9 +94,12 @@ class VertexLight {
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);
+    const Vertex& v = path.last_.in_medium;
     const float with_focus =
-        1 + (choice.has_place ? path.last_.in_medium.focus(choice.pivot, choice.is_point) : 0.f);
-    const float weight = light->delta ? 1 / with_focus : light->pdf / (light->pdf * with_focus + phase);
+        choice.has_place && v.focuses(choice.is_point) ? 1 + v.focus(lights.pivot(choice)) : 1.f;
+    const float weight = !kBuilt.found_lights || light->delta
+                             ? 1 / with_focus
+                             : light->pdf / (light->pdf * with_focus + phase);
     const C3 arriving =
         path.unoccluded(p, p, *light, path.medium_, path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
@@ -116,7 +117,7 @@ class VertexLight {
     const float length = stretch.to() - stretch.from();
     if (!(length > 0)) return;
     const V3 o = path.start_ + path.d_ * stretch.from();
-    const EquiAngular::Sample s = EquiAngular(o, path.d_, length, choice.pivot).sample(g.u(3));
+    const EquiAngular::Sample s = EquiAngular(o, path.d_, length, lights.pivot(choice)).sample(g.u(3));
     const Stretch::Spot spot = stretch.at(stretch.from() + s.t);
     const V3 p = path.clear_of_ends(s.p, segment, spot.t);
     const C3 scattering = spot.rate > 0 ? stretch.scattering(spot, p) : C3(0);
@@ -126,9 +127,10 @@ class VertexLight {
     const float phase = medium.phase.value(path.d_, light->direction);
     // e / f; infinite where no flight gets to
     const float ratio = s.pdf / flight_pdf<F>(medium, path.density_, spot);
-    const float share = light->delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
-    const float weight = light->delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f)
-                                      : (std::isfinite(ratio) ? share : 1.f);
+    const bool delta = !kBuilt.found_lights || light->delta;
+    const float share = delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
+    const float weight =
+        delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f) : (std::isfinite(ratio) ? share : 1.f);
     const C3 arriving = path.unoccluded(p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;

@@ -113,6 +113,8 @@ Result<void> check_built(const World& w) {
                    (kBuilt.instances || w.geometry.instances.empty()) &&
                    (kBuilt.environment_maps || !w.lights.map()) &&
                    (kBuilt.light_trees || !w.lights.has_tree()) && (kBuilt.lenses || !w.camera.has_lens()) &&
+                   (kBuilt.found_lights || w.needs.only_delta_lights ||
+                    (w.needs.lights.empty() && w.needs.area_lights == 0)) &&
                    (kBuilt.textures || w.needs.textures.size() <= w.needs.textures.count("constant")) &&
                    (kBuilt.user_geometries || w.geometry.triangle_count() == w.geometry.primitive_count());
   if (has) return {};
