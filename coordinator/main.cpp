@@ -60,14 +60,6 @@ void add_limits(CLI::App& app, ls::http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-Result<void> check_store(const std::string& store) {
-  if (store == "sqlite") return {};
-  if (store.starts_with("redis://"))
-    return fail(Errc::invalid_argument,
-                "--store redis:// is not in this version; use --store sqlite (the default)");
-  return fail(Errc::invalid_argument, fmt::format("--store '{}' is unknown; use sqlite", store));
-}
-
 // Held for the life of the process: two coordinators on one folder would destroy each other's work.
 Result<int> lock_folder(const fs::path& folder) {
   std::error_code ec;
@@ -141,6 +133,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
 
   ls::coordinator::Coordinator::Options options;
   options.data = data;
+  options.store = flags.store;
   options.join_token = *join_token;
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
@@ -182,7 +175,7 @@ int main(int argc, char** argv) {
   app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any")
       ->capture_default_str();
   app.add_option("--data", flags.data, "folder for jobs, blobs, images and tokens")->capture_default_str();
-  app.add_option("--store", flags.store, "sqlite, or redis://HOST:PORT/DB (not in this version)")
+  app.add_option("--store", flags.store, "where jobs are kept: sqlite, or redis://[USER:PASSWORD@]HOST[:PORT][/DB]")
       ->capture_default_str();
   app.set_config("--config", "", "file with these options, one 'name = value' a line");
   app.allow_config_extras(false);
@@ -192,7 +185,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
-  if (const auto known = check_store(flags.store); !known) {
+  if (const auto known = ls::coordinator::check_store(flags.store); !known) {
     fmt::print(stderr, "lightshaft-coordinator: error: {}\n", known.error().message);
     return kUsage;
   }

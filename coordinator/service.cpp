@@ -9,12 +9,33 @@
 #include "coordinator/service_impl.h"
 #include "coordinator/store/disk_blobs.h"
 #include "coordinator/store/memory_blobs.h"
+#include "coordinator/store/redis_job_store.h"
 
 namespace ls::coordinator {
 
 double unix_now() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
+
+Result<void> check_store(const std::string& store) {
+  if (store == "sqlite") return {};
+  if (!store.starts_with("redis"))
+    return fail(Errc::invalid_argument,
+                fmt::format("--store '{}' is unknown; use sqlite, or redis://HOST:PORT/DB", store));
+  const auto address = parse_redis_url(store);
+  return address ? Result<void>() : tl::unexpected(address.error());
+}
+
+namespace {
+
+Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options) {
+  if (auto known = check_store(options.store); !known) return tl::unexpected(known.error());
+  auto local = open_sqlite_job_store(options.data / "jobs.sqlite");
+  if (!local || options.store == "sqlite") return local;
+  return open_redis_job_store(std::move(*local), {.address = *parse_redis_url(options.store)});
+}
+
+}  // namespace
 
 Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
   return Service::open(std::move(options));
@@ -33,7 +54,7 @@ Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
     auto locked = lock_folder(options.data);
     if (!locked) return tl::unexpected(locked.error());
     lock = std::move(*locked);
-    auto opened = open_sqlite_job_store(options.data / "jobs.sqlite");
+    auto opened = open_store(options);
     if (!opened) return tl::unexpected(opened.error());
     store = std::move(*opened);
     if (!blobs) {

@@ -185,10 +185,21 @@ class BlobStore {
   virtual Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) = 0;
 };
 
+// Of a store of jobs that tells another one (Redis) what it keeps.
+struct StoreStatus {
+  std::string mirror;        // its address; empty: there is none
+  std::string trouble;       // why it cannot be told now; empty: it can
+  std::uint64_t behind = 0;  // jobs of which it has not been told all
+};
+
+// Whether --store can be taken: sqlite, or a redis:// address.
+Result<void> check_store(const std::string& store);
+
 class Coordinator {
  public:
   struct Options {
     std::filesystem::path data;        // empty: everything in memory, nothing survives (`lightshaft render`)
+    std::string store = "sqlite";      // where jobs are kept: sqlite, or a redis:// address (store/redis_link.h)
     std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made under `data`
     std::string join_token;            // empty: any worker may join
     std::shared_ptr<const Clock> clock;
@@ -234,6 +245,7 @@ class Coordinator {
 
   virtual BlobStore& blobs() = 0;
   virtual bool ready(std::string* why_not) const = 0;
+  virtual StoreStatus store_status() const { return {}; }
   virtual void tick() = 0;
 };
 

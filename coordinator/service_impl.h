@@ -122,6 +122,7 @@ class Service final : public Coordinator {
   std::uint64_t last_event_id() const override;
   BlobStore& blobs() override { return *blobs_; }
   bool ready(std::string* why_not) const override;
+  StoreStatus store_status() const override { return store_->status(); }
   void tick() override;
 
   // ---- from sessions (service_workers.cpp) ----
@@ -153,6 +154,9 @@ class Service final : public Coordinator {
   EntryPtr make_entry(StoredJob stored) const;
   Result<void> take_up_locked(JobEntry& entry, JobState state);
   void set_aside_locked(JobEntry& entry, const Error& why);
+  bool image_is_lost(const StoredJob& job) const;
+  static void begin_again(StoredJob& job);
+  Result<void> files_are_there(const StoredJob& job) const;
   void remove_leftovers() const;
 
   // ---- sequences (service_sequence.cpp, service_sequence_views.cpp) ----

@@ -29,6 +29,7 @@ Result<void> Service::restore() {
   if (!jobs) return tl::unexpected(jobs.error());
   restoring_ = true;
   for (StoredJob& job : *jobs) {
+    if (image_is_lost(job)) begin_again(job);
     const JobState state = job.state;
     const bool ended = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
     const auto entry = make_entry(std::move(job));
@@ -49,6 +50,7 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
   if (!points) return tl::unexpected(points.error());
   entry.points = std::move(*points);
   if (entry.dormant) return {};
+  if (auto there = files_are_there(entry.stored); !there) return there;
   if (on_disk()) {
     auto log = PartialLog::open(folder(id));
     if (!log) return tl::unexpected(log.error());
@@ -69,6 +71,32 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
   run_locked(std::move(*event));
   entry.replay.clear();
   entry.replay_at.clear();
+  return {};
+}
+
+// A record from Redis can outlive the disk that had the pixels.
+bool Service::image_is_lost(const StoredJob& job) const {
+  return on_disk() && !job.damaged && job.state == JobState::done &&
+         !std::filesystem::exists(folder(job.id) / "image.exr");
+}
+
+// The same samples give the same bits, so that nothing but time is lost.
+void Service::begin_again(StoredJob& job) {
+  log_warn(fmt::format("job={}", job.id.value), "its image is not in --data any more: it is rendered again");
+  job.state = JobState::queued;
+  job.stopped.reset();
+  job.totals = {};
+}
+
+Result<void> Service::files_are_there(const StoredJob& job) const {
+  std::vector<BlobRef> files = job.assets;
+  files.push_back({job.scene, 0, job.name});
+  for (const BlobRef& file : files)
+    if (!blobs_->has(file.digest))
+      return fail(Errc::not_found,
+                  fmt::format("its file '{}' ({}) is not among the blobs in --data; send the job again, or bring "
+                              "the folder back",
+                              file.name, file.digest.hex()));
   return {};
 }
 

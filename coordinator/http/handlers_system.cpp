@@ -49,7 +49,8 @@ Response get_metrics(Api& api, const Request&, const Params&) {
   auto& coordinator = api.coordinator();
   return text_response(
       200, "text/plain; version=0.0.4; charset=utf-8",
-      metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(), api.counters()));
+      metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(), api.counters(),
+                   coordinator.store_status()));
 }
 
 Response get_openapi(Api&, const Request&, const Params&) {

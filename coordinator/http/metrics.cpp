@@ -87,7 +87,7 @@ std::map<std::pair<Method, int>, std::uint64_t> Counters::requests() const {
 
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters) {
+                         const Counters& counters, const coordinator::StoreStatus& store) {
   std::string out;
   write_jobs(out, jobs);
   write_workers(out, workers);
@@ -103,6 +103,10 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
          "Event streams closed because the reader was too slow.", counters.events_dropped.load());
   single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
          counters.body_bytes.load());
+  if (!store.mirror.empty()) {
+    single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
+    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.", store.behind);
+  }
   return out;
 }
 

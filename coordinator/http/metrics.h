@@ -32,6 +32,6 @@ class Counters {
 
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters);
+                         const Counters& counters, const coordinator::StoreStatus& store = {});
 
 }  // namespace ls::http

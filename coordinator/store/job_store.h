@@ -54,6 +54,7 @@ struct StoredJob {
   std::optional<Digest> numeric_class;
   std::string build;  // of the worker that the job was pinned with
   JobTotals totals;
+  std::uint64_t revision = 0;  // number of the change, where a store counts them (Redis)
   bool damaged = false;  // its record can't be read: id, `failed` and `error` are all that is known
   bool operator==(const StoredJob&) const = default;
 };
@@ -87,6 +88,8 @@ class JobStore {
   // Adds `amount` to a named counter and returns its value before; durable. For ids that must never come
   // twice.
   virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
+
+  virtual StoreStatus status() const { return {}; }
 };
 
 Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file);

@@ -96,6 +96,7 @@ StoredJob stored_from(const json& j) {
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
   job.totals = totals_of(j.at("totals"));
+  job.revision = j.value("revision", std::uint64_t{0});
   return job;
 }
 
@@ -124,6 +125,7 @@ std::string to_json(const StoredJob& job) {
          {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
          {"build", job.build},
          {"totals", to_value(job.totals)}};
+  if (job.revision != 0) j["revision"] = job.revision;
   // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }

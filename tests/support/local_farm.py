@@ -87,7 +87,8 @@ class Process:
 
 
 class LocalFarm:
-    def __init__(self, folder=None, bin=None):
+    def __init__(self, folder=None, bin=None, flags=()):
+        self.flags = list(flags)  # of the coordinator, besides its ports and folder
         self.bin = pathlib.Path(bin) if bin else bin_dir()
         self._temporary = tempfile.TemporaryDirectory(prefix="lightshaft-farm-") if folder is None else None
         self.folder = pathlib.Path(folder or self._temporary.name)
@@ -121,7 +122,7 @@ class LocalFarm:
         self.coordinator = Process(
             "coordinator",
             [self.bin / "lightshaft-coordinator", "--http", f"127.0.0.1:{self.http or 0}",
-             "--grpc", f"127.0.0.1:{self.grpc or 0}", "--data", self.data],
+             "--grpc", f"127.0.0.1:{self.grpc or 0}", "--data", self.data] + self.flags,
             self.folder / "coordinator.log")
         wait_until(lambda: (self.data / "ports.json").exists() or not self.coordinator.alive(), "the coordinator listens")
         assert self.coordinator.alive(), self.coordinator.output()

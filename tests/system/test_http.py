@@ -241,8 +241,7 @@ def test_a_taken_port_and_a_taken_folder_are_told(farm, tmp_path):
     assert port.returncode == 1 and "another program uses this port" in port.stderr
     folder = start("--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0", "--data", str(farm.data))
     assert folder.returncode == 1 and "another coordinator" in folder.stderr
-    redis = start("--store", "redis://localhost:6379/0")
-    assert redis.returncode == 2 and "not in this version" in redis.stderr
+    assert start("--store", "redis://localhost:port").returncode == 2
     assert start("--colour", "red").returncode == 2
     assert start("--http", "nowhere").returncode == 2
     (tmp_path / "c.toml").write_text("htp = 'x'\n")

@@ -60,7 +60,7 @@ DOORS = [
     Door("Boost", r"^boost/", r"^coordinator/http/", "the HTTP server"),
     Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/archive\.(h|cpp)$", "one file pair of the HTTP door"),
     Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
-    Door("hiredis", r"^hiredis/", r"^$", "nowhere yet"),
+    Door("hiredis", r"^hiredis/", r"^coordinator/store/redis_link\.cpp$", "the link to Redis"),
     Door("pugixml", r"^pugixml\.hpp$", r"^common/scene/", "the scene reader"),
     Door("spdlog", r"^spdlog/", r"^common/base/log\.cpp$", "the log"),
     Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/preview)\.cpp$", "its decoder, and the preview"),

@@ -1,0 +1,31 @@
+// A job's record with something in every field.
+#pragma once
+
+#include <string>
+
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+
+inline StoredJob sample_job(std::string id) {
+  StoredJob job;
+  job.id.value = std::move(id);
+  job.name = "steam.xml";
+  job.submitted_unix = 1.7e9 + .25;
+  job.scene = sha256("scene");
+  job.settings.size = {64, 32};
+  job.settings.integrator = "volpath";
+  job.spec.target_error = .01;
+  job.spec.defines = {{"density", "2"}};
+  job.assets = {{sha256("grid"), 4, "grid.vol"}};
+  job.warnings = {"a \"quoted\" warning\n"};
+  job.features_used = {"volume grids"};
+  job.state = JobState::running;
+  job.stopped = StopReason::error;
+  job.numeric_class = sha256("class");
+  job.totals.core_seconds = 12.125;
+  job.totals.health.add(HealthCause::infinite, 3, {4, 5, 6});
+  return job;
+}
+
+}  // namespace ls::coordinator
