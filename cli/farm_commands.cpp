@@ -20,7 +20,7 @@ using nlohmann::json;
 
 struct Flags {
   FarmOptions farm;
-  std::string id, frame, spp, out, report;
+  std::string id, frame, spp, target_error, out, report;
   bool quiet = false;
 };
 using Run = int (*)(FarmApi& api, const Flags& flags);
@@ -52,6 +52,13 @@ int resume(FarmApi& api, const Flags& flags) { return change(api, flags, {{"stat
 int cancel(FarmApi& api, const Flags& flags) { return change(api, flags, {{"state", "cancelled"}}); }
 
 int extend(FarmApi& api, const Flags& flags) {
+  if (flags.spp.empty() == flags.target_error.empty())
+    return usage_error("extend needs either --spp TOTAL or a smaller --target-error E");
+  if (!flags.target_error.empty()) {
+    const auto target = parse_positive("--target-error", flags.target_error, kMaxTargetError);
+    if (!target) return say_error(target.error());
+    return change(api, flags, {{"target_error", *target}});
+  }
   const auto spp = parse_whole("--spp", flags.spp, 1, kMaxSpp);
   if (!spp) return say_error(spp.error());
   return change(api, flags, {{"spp", *spp}});
@@ -113,10 +120,13 @@ void add_farm_commands(CLI::App& app, Action& action) {
   plain("resume", "go on with a paused job", resume, true);
   plain("cancel", "end a job for good", cancel, true);
   auto extending = std::make_shared<Flags>();
-  add(app, action, "extend", "more samples for a job, done or not", extend, extending, true)
-      ->add_option("--spp", extending->spp, "the new total per pixel")
-      ->required()
-      ->type_name("TOTAL");
+  CLI::App* extend_command =
+      add(app, action, "extend", "more samples or less error for a job, done or not", extend, extending, true);
+  extend_command->add_option("--spp", extending->spp, "the new total per pixel")->type_name("TOTAL");
+  extend_command
+      ->add_option("--target-error", extending->target_error,
+                   "of a job that has one: go on until the image's relMSE is below this")
+      ->type_name("E");
   auto fetching = std::make_shared<Flags>();
   CLI::App* fetch_command =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);

@@ -99,6 +99,7 @@ void add_up(JobView& v, std::span<const JobView> frames) {
     v.units_done += f.units_done;
     v.units_total += f.units_total;
     v.core_seconds += f.core_seconds;
+    v.time.add(f.time);
     v.health.nonfinite += f.health.nonfinite;
     v.health.negative += f.health.negative;
     v.health.majorant_violations += f.health.majorant_violations;

@@ -32,6 +32,21 @@ struct ErrorFigures {  // of the image as folded up to one complete round over a
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % interval for the realised error
 };
+// Where the time of a job went, in core seconds: of the workers, but for `merge`. What was counted since the
+// job was last stored is lost when the coordinator is killed; `render` never is.
+struct TimeSplit {
+  double load = 0;      // getting files
+  double build = 0;     // reading them, making worlds
+  double render = 0;    // CPU time of units: JobView::core_seconds
+  double transfer = 0;  // packing results
+  double merge = 0;     // of the coordinator: checking and folding results
+  double idle = 0;      // threads between two units of the job
+  void add(const TimeSplit& o) {
+    load += o.load, build += o.build, render += o.render;
+    transfer += o.transfer, merge += o.merge, idle += o.idle;
+  }
+  bool operator==(const TimeSplit&) const = default;
+};
 struct ConvergencePoint {
   double seconds = 0;       // since the first ray
   double core_seconds = 0;  // CPU time of workers
@@ -77,14 +92,15 @@ struct JobView {
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
   std::string error;                                  // why it failed
-  std::vector<std::string> warnings;  // of the scene
+  std::vector<std::string> warnings;                  // of the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
   std::uint64_t units_done = 0, units_total = 0;
   double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
   double elapsed_seconds = 0, core_seconds = 0;
-  double submitted_unix = 0;  // wall clock, for people
+  TimeSplit time;
+  double submitted_unix = 0;      // wall clock, for people
   Health health;                  // of what is folded; of a sequence its totals alone
   std::vector<HealthNote> notes;  // the same for people; none: all is well
   // Of a sequence; its other figures are those of all frames together: sums, means over pixels, and
@@ -96,8 +112,9 @@ struct JobView {
 struct JobChange {
   std::optional<JobState> state;  // paused, running or cancelled
   std::optional<int> priority;
-  std::optional<std::uint64_t> spp;    // the new total
-  std::optional<double> target_error;  // of a job that has one and whose end is not decided yet
+  std::optional<std::uint64_t> spp;  // the new total
+  std::optional<double>
+      target_error;  // of a job that has one and was not stopped otherwise; a smaller one goes on
 };
 
 struct TileView {

@@ -37,17 +37,13 @@ Result<void> Service::change(const JobId& id, const JobChange& change) {
   if (change.priority)
     if (auto ok = check_priority(*change.priority); !ok) return ok;
   if (change.state)
-    if (auto ok = may_become_locked(**entry, *change.state, change.spp.has_value()); !ok) return ok;
-  if (change.target_error) {
-    if ((*entry)->dormant || (*entry)->finishing)
-      return fail(
-          Errc::failed_precondition,
-          fmt::format("job {} has ended: its target error can no longer be changed; extend its samples "
-                      "(spp), or submit it again",
-                      id.value));
-    if (auto ok = farm_.may_retarget(id, *change.target_error); !ok) return ok;
-  }
-  // The only one whose checks are its own; when it says no, nothing has been done.
+    if (auto ok = may_become_locked(**entry, *change.state, change.spp || change.target_error); !ok)
+      return ok;
+  if (change.spp && change.target_error)
+    return fail(Errc::invalid_argument,
+                "samples (spp) and target_error cannot be changed at once: one decides "
+                "how far the job goes; change one, then the other");
+  // These check for themselves; when one says no, nothing has been done.
   if (change.spp)
     if (auto done = extend_locked(**entry, *change.spp); !done) return done;
   if (change.target_error)
@@ -108,16 +104,46 @@ Result<void> Service::set_priority_locked(JobEntry& entry, int priority) {
   return {};
 }
 
-Result<void> Service::set_target_locked(JobEntry& entry, double target_error) {
-  const auto before = std::exchange(entry.stored.spec.target_error, target_error);
-  if (auto put = store_->put_job(entry.stored); !put) {
-    entry.stored.spec.target_error = before;
-    return put;
+// What a job is once more samples or a smaller target have been asked for, in the farm's books and ours.
+Result<void> Service::go_on_locked(JobEntry& entry, const Result<void>& possible, const Event& change,
+                                   std::string told) {
+  const JobState state = shown_state(entry);
+  if (!possible) {
+    if (state == JobState::done && !entry.finishing) forget_locked(entry);
+    return possible;
   }
-  run_locked(JobRetargeted{entry.stored.id, target_error});
-  log_job(entry.stored.id, fmt::format("target error {} from now on", target_error));
+  const JobId id = entry.stored.id;
+  const auto spp = entry.stored.spp;
+  const bool at_end = entry.finishing != 0 || state == JobState::done;
+  if (at_end) entry.clock_zero = now() - from_seconds(entry.stored.totals.render_seconds);
+  entry.finishing = 0;
+  run_locked(change);
+  const JobPlan plan = farm_.plan(id).value();
+  entry.stored.spec.target_error = plan.target_error;
+  entry.stored.spec.time = plan.time;
+  if (plan.spp != spp) entry.stored.spp = entry.stored.spec.spp = plan.spp;
+  log_job(id, std::move(told));
+  if (const auto put = store_->put_job(entry.stored); !put) return put;
   publish_job_locked(entry);
   return {};
+}
+
+Result<void> Service::set_target_locked(JobEntry& entry, double target_error) {
+  const JobId id = entry.stored.id;
+  const JobState state = shown_state(entry);
+  if (state == JobState::failed || state == JobState::cancelled)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
+                            id.value, to_string(state)));
+  if (auto woken = wake_locked(entry); !woken) return woken;
+  auto possible = farm_.may_retarget(id, target_error);
+  if (possible) {
+    const auto before = std::exchange(entry.stored.spec.target_error, target_error);
+    possible = store_->put_job(entry.stored);
+    if (!possible) entry.stored.spec.target_error = before;
+  }
+  return go_on_locked(entry, possible, JobRetargeted{id, target_error},
+                      fmt::format("target error {} from now on", target_error));
 }
 
 Result<void> Service::wake_locked(JobEntry& entry) {
@@ -146,25 +172,9 @@ Result<void> Service::extend_locked(JobEntry& entry, std::uint64_t spp) {
   if (state == JobState::failed || state == JobState::cancelled)
     return fail(Errc::failed_precondition,
                 fmt::format("job {} is {}: it cannot be extended", id.value, to_string(state)));
-  const bool at_end = entry.finishing != 0 || state == JobState::done;
-  const auto cut_by = [&](StopReason reason) { return at_end && entry.stored.stopped == reason; };
-  const bool by_error = cut_by(StopReason::error), by_time = cut_by(StopReason::time);
-  const double render_seconds = entry.stored.totals.render_seconds;
   if (auto woken = wake_locked(entry); !woken) return woken;
-  if (auto possible = farm_.may_extend(id, spp); !possible) {
-    if (state == JobState::done) forget_locked(entry);
-    return possible;
-  }
-  entry.finishing = 0;
-  if (at_end) entry.clock_zero = now() - from_seconds(render_seconds);
-  run_locked(JobExtended{id, spp});
-  if (by_error) entry.stored.spec.target_error.reset();
-  if (by_time) entry.stored.spec.time.reset();
-  entry.stored.spp = entry.stored.spec.spp = even_spp(spp);
-  log_job(id, fmt::format("extended to {} samples per pixel", spp));
-  if (const auto put = store_->put_job(entry.stored); !put) return put;
-  publish_job_locked(entry);
-  return {};
+  return go_on_locked(entry, farm_.may_extend(id, spp), JobExtended{id, spp},
+                      fmt::format("extended to {} samples per pixel", spp));
 }
 
 Result<void> Service::remove(const JobId& id) {

@@ -72,6 +72,7 @@ Result<WaitingPartial> Service::partial_for_locked(JobEntry& entry, const Fold& 
 void Service::on(const Fold& e, Todo& todo) {
   const auto entry = find_locked(e.unit.job);
   if (!entry || !entry->assembly) return;
+  const TimePoint begin = now();
   const auto waiting = partial_for_locked(*entry, e);
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
@@ -91,6 +92,7 @@ void Service::on(const Fold& e, Todo& todo) {
   else
     entry->fold_seconds = elapsed_locked(*entry);
   todo.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
+  entry->stored.totals.time.merge += seconds(now() - begin);
   if (restoring_) return;
   hub_->publish(
       "tile",
@@ -164,8 +166,8 @@ void Service::on(const JobStateChanged& e, Todo&) {
 void Service::on(const Checkpoint& e, Todo&) {
   const auto entry = find_locked(e.job);
   if (!entry || !entry->assembly) return;
-  const ImageError error = image_error(entry->assembly->errors().at(e.round));
-  entry->assembly->checkpoint_taken(e.round);
+  const ImageError error = image_error(entry->assembly->errors().at(e.rounds));
+  entry->assembly->checkpoint_taken(e.rounds);
   if (!entry->points.empty() && entry->points.back().spp >= error.spp)
     return;  // known from before the restart
   double core = entry->stored.totals.core_seconds;

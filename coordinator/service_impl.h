@@ -143,6 +143,7 @@ class Service final : public Coordinator {
   struct Checked {
     Arrived arrived;
     Verified verified;
+    double seconds = 0;  // that it took
   };
 
   Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store, File lock,
@@ -165,7 +166,7 @@ class Service final : public Coordinator {
   void publish_sequence_locked(const JobId& id, bool at_once);
   Result<void> edit_locked(const std::vector<EntryPtr>& frames, const std::function<void(StoredJob&)>& edit);
   Result<void> change_sequence_locked(const JobId& id, const Sequence& sequence, const JobChange& change);
-  Result<std::vector<EntryPtr>> may_retarget_locked(const JobId& id, const std::vector<EntryPtr>& open,
+  Result<std::vector<EntryPtr>> may_retarget_locked(const JobId& id, const std::vector<EntryPtr>& sound,
                                                     double target_error) const;
   Result<std::vector<EntryPtr>> may_extend_locked(const Sequence& sequence, std::uint64_t spp) const;
   Result<void> become_together_locked(const std::vector<EntryPtr>& frames, JobState asked);
@@ -183,6 +184,8 @@ class Service final : public Coordinator {
   Result<void> become_locked(const EntryPtr& entry, JobState asked);
   Result<void> set_priority_locked(JobEntry& entry, int priority);
   Result<void> extend_locked(JobEntry& entry, std::uint64_t spp);
+  Result<void> go_on_locked(JobEntry& entry, const Result<void>& possible, const Event& change,
+                            std::string told);
   Result<void> set_target_locked(JobEntry& entry, double target_error);
   Result<void> wake_locked(JobEntry& entry);  // tells the farm of a dormant job again
   void forget_locked(JobEntry& entry);        // makes an ended job dormant

@@ -44,9 +44,10 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
 void Service::verify_loop(const std::stop_token& token) {
   while (!token.stop_requested())
     for (Arrived& a : arrived_.pop(1, token)) {
+      const TimePoint begin = now();
       Verified verified =
           verify_result(a.result, a.expected, a.job->grid.frame, aovs_of(a.job->stored.settings));
-      checked_.push({std::move(a), std::move(verified)});
+      checked_.push({std::move(a), std::move(verified), seconds(now() - begin)});
     }
 }
 
@@ -123,11 +124,12 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
   if (wanted.verdict == Wanted::Verdict::yes && wanted.samples == a.expected.samples &&
       (!entry.log || place)) {
     entry.stored.totals.core_seconds += r.cpu_seconds;
+    entry.stored.totals.time.add(
+        {r.times.load, r.times.build, 0, r.times.transfer, item.seconds, r.times.idle});
     if (entry.assembly)
       entry.assembly->hold(
           r.unit.tile, r.unit.round,
-          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest,
-           r.health});
+          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health});
   }
   // A duplicate by the farm's book is compared there; a race that made one unstored is told as nothing: the
   // copy that was stored stands, and this one is equal or evidence the next time.

@@ -27,6 +27,15 @@ double pixels_of(const StoredJob& job) {
   return static_cast<double>(job.settings.size.width) * job.settings.size.height;
 }
 
+// Frames that are done, of so many pixels together.
+Result<void> may_wake(double pixels) {
+  if (pixels <= static_cast<double>(limits::kMaxWokenPixels)) return {};
+  return fail(Errc::failed_precondition,
+              fmt::format("the frames that are done have {:.0f} pixels; {} can be taken up again at once: "
+                          "extend the frames one by one",
+                          pixels, limits::kMaxWokenPixels));
+}
+
 }  // namespace
 
 tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& request) {
@@ -134,8 +143,12 @@ Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& se
   }
   if (change.priority)
     if (auto ok = check_priority(*change.priority); !ok) return ok;
+  if (change.spp && change.target_error)
+    return fail(Errc::invalid_argument,
+                "samples (spp) and target_error cannot be changed at once: one decides "
+                "how far the job goes; change one, then the other");
   if (change.target_error) {
-    auto chosen = may_retarget_locked(id, open, *change.target_error);
+    auto chosen = may_retarget_locked(id, sound, *change.target_error);
     if (!chosen) return tl::unexpected(chosen.error());
     retargeted = std::move(*chosen);
   }
@@ -153,13 +166,9 @@ Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& se
   for (const EntryPtr& frame : extended)
     if (auto done = extend_locked(*frame, *change.spp); !done)
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
-  if (!retargeted.empty()) {
-    if (auto done = edit_locked(retargeted, [&](StoredJob& j) { j.spec.target_error = change.target_error; });
-        !done)
-      return done;
-    for (const EntryPtr& frame : retargeted)
-      run_locked(JobRetargeted{frame->stored.id, *change.target_error});
-  }
+  for (const EntryPtr& frame : retargeted)
+    if (auto done = set_target_locked(*frame, *change.target_error); !done)
+      return tl::unexpected(in_frame(frame->stored.id, done.error()));
   if (change.priority) {
     if (auto done = edit_locked(sound, [&](StoredJob& j) { j.spec.priority = *change.priority; }); !done)
       return done;
@@ -174,22 +183,30 @@ Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& se
   return {};
 }
 
-// Those whose end is not decided yet.
+// Those whose end is not decided yet, and those that a larger target has ended.
 Result<std::vector<Service::EntryPtr>> Service::may_retarget_locked(const JobId& id,
-                                                                    const std::vector<EntryPtr>& open,
+                                                                    const std::vector<EntryPtr>& sound,
                                                                     double target_error) const {
   std::vector<EntryPtr> chosen;
   Error last{
       Errc::failed_precondition,
       fmt::format("all frames of job {} have ended: its target error can no longer be changed", id.value)};
-  for (const EntryPtr& frame : open) {
-    if (frame->dormant || frame->finishing) continue;
-    if (auto ok = farm_.may_retarget(frame->stored.id, target_error); !ok)
+  double woken = 0;
+  for (const EntryPtr& frame : sound) {
+    if (frame->dormant) {
+      const StoredJob& job = frame->stored;
+      if (job.state != JobState::done || job.stopped != StopReason::error ||
+          !(target_error < job.spec.target_error.value_or(0)))
+        continue;
+      woken += pixels_of(job);
+      chosen.push_back(frame);
+    } else if (auto ok = farm_.may_retarget(frame->stored.id, target_error); !ok)
       last = in_frame(frame->stored.id, ok.error());
     else
       chosen.push_back(frame);
   }
   if (chosen.empty()) return tl::unexpected(last);
+  if (auto few = may_wake(woken); !few) return tl::unexpected(few.error());
   return chosen;
 }
 
@@ -214,11 +231,7 @@ Result<std::vector<Service::EntryPtr>> Service::may_extend_locked(const Sequence
   }
   if (chosen.empty())
     return fail(Errc::failed_precondition, fmt::format("all frames have {} samples per pixel", spp));
-  if (woken > static_cast<double>(limits::kMaxWokenPixels))
-    return fail(Errc::failed_precondition,
-                fmt::format("the frames that are done have {:.0f} pixels; {} can be taken up again at once: "
-                            "extend the frames one by one",
-                            woken, limits::kMaxWokenPixels));
+  if (auto few = may_wake(woken); !few) return tl::unexpected(few.error());
   return chosen;
 }
 

@@ -8,6 +8,7 @@
 
 #include "coordinator/sequence.h"
 #include "coordinator/service_impl.h"
+#include "coordinator/views.h"
 
 namespace ls::coordinator {
 namespace {
@@ -56,10 +57,23 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
     if (found == sequences_.end()) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
     view = sequence_view_locked(id, found->second, true);
   }
-  static constexpr const char* kKept[] = {
-      "seed",          "scene",          "spp",    "samples", "load_seconds", "render_seconds",
-      "core_seconds",  "peak_rss_bytes", "rmse",   "relmse",  "relmse_ci95",  "nonfinite_samples", "health",
-      "pixels_sha256", "numeric_class",  "stopped"};
+  static constexpr const char* kKept[] = {"seed",
+                                          "scene",
+                                          "spp",
+                                          "samples",
+                                          "load_seconds",
+                                          "render_seconds",
+                                          "core_seconds",
+                                          "time",
+                                          "peak_rss_bytes",
+                                          "rmse",
+                                          "relmse",
+                                          "relmse_ci95",
+                                          "nonfinite_samples",
+                                          "health",
+                                          "pixels_sha256",
+                                          "numeric_class",
+                                          "stopped"};
   json frames = json::array();
   std::uint64_t samples = 0, rss = 0;
   double load = 0;
@@ -92,6 +106,7 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
          {"load_seconds", load},
          {"render_seconds", number(view.elapsed_seconds)},
          {"core_seconds", number(view.core_seconds)},
+         {"time", json::parse(time_json(view.time))},
          {"peak_rss_bytes", rss},
          {"nonfinite_samples", view.health.nonfinite},
          {"negative_samples", view.health.negative},

@@ -104,6 +104,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.priority = job.spec.priority;
   v.elapsed_seconds = elapsed_locked(entry);
   v.core_seconds = job.totals.core_seconds;
+  v.time = split_of(job.totals);
   v.submitted_unix = job.submitted_unix;
   v.health = entry.assembly ? entry.assembly->health().total() : job.totals.health;
   v.notes = health_notes(v.health, replay_of(job));

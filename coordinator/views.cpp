@@ -16,8 +16,9 @@ json text_or_null(const std::string& text) { return text.empty() ? json() : json
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 json to_value(const FramesView& v) {
-  json j{{"range", to_string(v.range)}, {"total", v.total},         {"done", v.done},      {"running", v.running},
-         {"failed", v.failed},          {"cancelled", v.cancelled}, {"current", v.current}};
+  json j{{"range", to_string(v.range)}, {"total", v.total},   {"done", v.done},
+         {"running", v.running},        {"failed", v.failed}, {"cancelled", v.cancelled},
+         {"current", v.current}};
   if (v.all.empty()) return j;
   auto& list = j["list"] = json::array();
   for (const FrameView& f : v.all)
@@ -29,6 +30,11 @@ json to_value(const FramesView& v) {
                     {"relmse", f.relmse ? number(*f.relmse) : json()},
                     {"error", text_or_null(f.error)}});
   return j;
+}
+
+json to_value(const TimeSplit& t) {
+  return {{"load", number(t.load)},         {"build", number(t.build)}, {"render", number(t.render)},
+          {"transfer", number(t.transfer)}, {"merge", number(t.merge)}, {"idle", number(t.idle)}};
 }
 
 json to_value(const JobView& v) {
@@ -52,6 +58,7 @@ json to_value(const JobView& v) {
          {"units_total", v.units_total},
          {"elapsed_seconds", number(v.elapsed_seconds)},
          {"core_seconds", number(v.core_seconds)},
+         {"time", to_value(v.time)},
          {"submitted_unix", number(v.submitted_unix)},
          {"health", json::parse(health_json(v.health, v.notes))}};
   const auto frame = frame_of(v.id);
@@ -90,6 +97,7 @@ std::string listed(const char* key, const std::vector<View>& views) {
 
 }  // namespace
 
+std::string time_json(const TimeSplit& time) { return dump(to_value(time)); }
 std::string job_json(const JobView& job) { return dump(to_value(job)); }
 std::string jobs_json(const std::vector<JobView>& jobs) { return listed("jobs", jobs); }
 std::string worker_json(const WorkerView& worker) { return dump(to_value(worker)); }

@@ -8,6 +8,7 @@
 
 namespace ls::coordinator {
 
+std::string time_json(const TimeSplit& time);
 std::string job_json(const JobView& job);
 std::string jobs_json(const std::vector<JobView>& jobs);  // {"jobs": [...]}
 std::string worker_json(const WorkerView& worker);

@@ -117,7 +117,8 @@ Result<FromWorker> progress_from(const pb::Progress& in) {
 }
 
 Result<Health> health_from(const pb::UnitResult& in) {
-  if (in.health().empty() && in.nonfinite() == 0 && in.negative() == 0 && in.majorant_violations() == 0) return Health{};
+  if (in.health().empty() && in.nonfinite() == 0 && in.negative() == 0 && in.majorant_violations() == 0)
+    return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
   // Of a program that knows no causes.
@@ -126,6 +127,14 @@ Result<Health> health_from(const pb::UnitResult& in) {
   health->add(HealthCause::negative, rest(in.negative(), health->negative));
   health->add(HealthCause::majorant_violation, rest(in.majorant_violations(), health->majorant_violations));
   return health;
+}
+
+Result<UnitTimes> times_from(const pb::UnitTimes& in) {
+  LS_TRY(load, seconds_from(in.load(), "result.times.load"));
+  LS_TRY(build, seconds_from(in.build(), "result.times.build"));
+  LS_TRY(transfer, seconds_from(in.transfer(), "result.times.transfer"));
+  LS_TRY(idle, seconds_from(in.idle(), "result.times.idle"));
+  return UnitTimes{load, build, transfer, idle};
 }
 
 Result<FromWorker> result_from(const pb::UnitResult& in) {
@@ -137,8 +146,10 @@ Result<FromWorker> result_from(const pb::UnitResult& in) {
     return wrong("result.exr",
                  fmt::format("has {} bytes; 1 to {} are allowed", in.exr().size(), limits::kPartialBytes));
   LS_TRY(health, health_from(in));
+  LS_TRY(times, times_from(in.times()));
   const auto* bytes = reinterpret_cast<const std::byte*>(in.exr().data());
-  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu, std::move(health)};
+  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu, std::move(health),
+                    times};
 }
 
 Result<FromWorker> failure_from(const pb::UnitFailure& in) {

@@ -70,6 +70,12 @@ void put(const UnitResult& result, pb::FromWorker& out) {
   r->set_negative(result.health.negative);
   r->set_majorant_violations(result.health.majorant_violations);
   if (!result.health.clean()) r->set_health(canonical_json(result.health));
+  if (result.times == UnitTimes{}) return;
+  pb::UnitTimes* times = r->mutable_times();
+  times->set_load(result.times.load);
+  times->set_build(result.times.build);
+  times->set_transfer(result.times.transfer);
+  times->set_idle(result.times.idle);
 }
 
 void put(const UnitFailure& failure, pb::FromWorker& out) {

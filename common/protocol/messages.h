@@ -66,6 +66,16 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
+// Seconds that a worker spent for a unit besides rendering it. `load` and `build` come with the first result
+// of a world: getting the files of the job, and reading them and making the world of them (wall time of the
+// thread that does it).
+struct UnitTimes {
+  double load = 0, build = 0;
+  double transfer = 0;  // to pack the result: encode and digest
+  double idle = 0;      // that its thread stood still since the last unit of the job
+  bool operator==(const UnitTimes&) const = default;
+};
+
 struct UnitResult {
   UnitKey unit;
   LeaseId lease;
@@ -73,6 +83,7 @@ struct UnitResult {
   Digest digest;               // unit_digest of it
   double cpu_seconds = 0;      // of the thread that rendered it
   Health health;
+  UnitTimes times;
   bool operator==(const UnitResult&) const = default;
 };
 

@@ -44,7 +44,7 @@ class Assembly {
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
   const HealthBook& health() const { return health_; }
-  void checkpoint_taken(RoundIndex round) { errors_.checkpoint_taken(round); }
+  void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
   // Rounds folded of each tile for a job of `spp` samples; a tail that was cut for fewer samples does not
   // count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
@@ -58,9 +58,9 @@ class Assembly {
   std::size_t waiting_bytes_ = 0;
 };
 
-// The folded state as a file: {"LSSNAP1\n", build, film, error figures, health}, closed by a SHA-256. Returned as
-// nothing if it is missing, damaged, of another grid, other AOVs or another build: then everything is folded
-// again from the partials.
+// The folded state as a file: {"LSSNAP1\n", build, film, error figures, health}, closed by a SHA-256.
+// Returned as nothing if it is missing, damaged, of another grid, other AOVs or another build: then
+// everything is folded again from the partials.
 std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, const HealthBook& health,
                                      std::string_view build);
 std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "coordinator/views.h"
+
 namespace ls::coordinator {
 namespace {
 
@@ -26,6 +28,12 @@ json point(const ConvergencePoint& p) {
 }
 
 }  // namespace
+
+TimeSplit split_of(const JobTotals& totals) {
+  TimeSplit split = totals.time;
+  split.render = totals.core_seconds;
+  return split;
+}
 
 ErrorFigures figures_of(const ImageError& e) { return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi}; }
 
@@ -53,6 +61,7 @@ std::string report_json(const ReportFacts& facts) {
          {"load_seconds", number(totals.load_seconds)},
          {"render_seconds", number(totals.render_seconds)},
          {"core_seconds", number(totals.core_seconds)},
+         {"time", json::parse(time_json(split_of(totals)))},
          {"peak_rss_bytes", totals.peak_rss_bytes},
          {"nonfinite_samples", totals.health.nonfinite},
          {"negative_samples", totals.health.negative},
@@ -86,8 +95,11 @@ std::string report_json(const ReportFacts& facts) {
   const double wall = e.relmse * totals.render_seconds, cores = e.relmse * totals.core_seconds;
   j["efficiency"] = known && wall > 0 ? number(1 / wall) : json();
   j["efficiency_per_core"] = known && cores > 0 ? number(1 / cores) : json();
+  j["adaptive"] = job.spec.target_error.has_value();
   if (job.stopped == StopReason::error)
-    j["note"] = "stopped at a target error: such an image carries a small bias; images by samples carry none";
+    j["note"] =
+        "stopped at a target error: each tile has as many samples as its own error asked for, so the image "
+        "carries a small bias, below the error told; images by samples carry none";
   if (job.stopped == StopReason::time)
     j["note"] = "stopped by time: another run may end with other samples, so its pixels may differ";
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";

@@ -23,6 +23,7 @@ struct ReportFacts {
 };
 std::string report_json(const ReportFacts& facts);
 
+TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
 std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points);
 

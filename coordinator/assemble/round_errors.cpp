@@ -15,23 +15,24 @@ void RoundErrors::folded(TileIndex tile, RoundIndex round, const TileError& erro
   t.relative[round] = error.relative.squares;
 }
 
-TileError RoundErrors::at(RoundIndex round) const {
+TileError RoundErrors::at(std::span<const RoundIndex> rounds) const {
   TileError sum;
-  for (const Tile& t : tiles_) {
-    const TileError* last = nullptr;
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    const Tile& t = tiles_[i];
+    const TileError* last = t.rounds.empty() ? nullptr : &t.rounds.front().second;
     for (const auto& [r, error] : t.rounds)
-      if (r <= round) last = &error;
+      if (r < rounds[i]) last = &error;
     if (last) sum.add(*last);
   }
   return sum;
 }
 
-void RoundErrors::checkpoint_taken(RoundIndex round) {
-  for (Tile& t : tiles_) {
+void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    auto& kept = tiles_[i].rounds;
     const auto later =
-        std::find_if(t.rounds.begin(), t.rounds.end(), [&](const auto& r) { return r.first > round; });
-    if (later - t.rounds.begin() > 1)
-      t.rounds.erase(t.rounds.begin(), later - 1);  // the last one up to `round` stays
+        std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
+    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);  // the last one that counts stays
   }
 }
 

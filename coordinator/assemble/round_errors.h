@@ -1,6 +1,6 @@
-// The error sums of every tile after every fold, as far as they are still needed: a checkpoint of round r
-// sums over all tiles what each said at r, or at its last round before r, though some are ahead already. So
-// the figures of a checkpoint do not depend on the order of arrival.
+// The error sums of every tile after every fold, as far as they are still needed: a checkpoint says how many
+// rounds of each tile count, and sums what each said after those, though some are ahead already. So the
+// figures of a checkpoint do not depend on the order of arrival.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +22,10 @@ class RoundErrors {
 
   // Rounds of a tile in order; a round given again (a cut one, now in full) replaces what was said of it.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  TileError at(RoundIndex round) const;     // summed in tile order
-  void checkpoint_taken(RoundIndex round);  // at() will not be asked for rounds before this one again
+  // Summed in tile order, `rounds` of each tile. One that has less counts with what it has; one of which only
+  // later rounds are kept, since it was ahead at a checkpoint that has been taken, with the first of those.
+  TileError at(std::span<const RoundIndex> rounds) const;
+  void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 
   // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.
   std::vector<std::vector<double>> relative() const;

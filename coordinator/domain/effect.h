@@ -39,7 +39,7 @@ struct RecordUnit {
 };
 
 // Fold this unit's accepted partial into the film, then raise UnitFolded. Rounds of a tile come in order,
-// each once; no round beyond a target's stop is ever asked for.
+// each once; no round beyond the tile's stop is ever asked for.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
@@ -73,11 +73,14 @@ struct JobStateChanged {
   JobState from = JobState::queued;
   JobState to = JobState::queued;
 };
-// Round `round` is folded over all tiles: time for a point of the convergence curve and a snapshot.
+// Every tile is folded as far as this says: time for a point of the convergence curve and a snapshot. With a
+// target error tiles have different numbers of rounds: those of one level of the stop rule
+// (coordinator/domain/adaptive_stop.h). Which checkpoints there are, and in what order, does not depend on
+// the order of arrival.
 struct Checkpoint {
   JobId job;
-  RoundIndex round = 0;
-  std::uint64_t spp = 0;
+  std::vector<RoundIndex> rounds;  // of each tile that count
+  double spp = 0;                  // mean over pixels
 };
 // With an extension the cut round `round` is rendered again: its folded tail is to be replaced, its partials
 // are void.

@@ -21,11 +21,11 @@ namespace ls::coordinator {
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
-  std::optional<std::uint64_t> spp;    // nothing: limits.h kMaxSppWithoutLimit
-  std::optional<double> target_error;  // relMSE of the image
-  std::optional<double> time;          // seconds from the first ray
-  int priority = 0;                    // higher first
-  std::vector<std::string> tags;       // a worker must carry all of them
+  std::optional<std::uint64_t> spp;                // nothing: limits.h kMaxSppWithoutLimit
+  std::optional<double> target_error;              // relMSE of the image
+  std::optional<double> time;                      // seconds from the first ray
+  int priority = 0;                                // higher first
+  std::vector<std::string> tags;                   // a worker must carry all of them
   std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
 };
 
@@ -73,15 +73,16 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
-// Another target error for a job that has one and whose last round is not decided yet (Farm::may_retarget).
-// Looked at when the next round is complete: a smaller target gives the bits of a job that had it from the
-// first, since what was not good enough for the larger one was not for it.
+// Another target error for a job that has one and was not stopped otherwise (Farm::may_retarget). A smaller
+// one also takes up again what a larger one ended, and gives the bits of a job that had it from the first,
+// since what was not good enough for the larger one was not for it. A larger one counts from where the job
+// is.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// To this new total, of a running, paused or done job. A target error or time already reached no longer
-// applies.
+// To this new total, of a running, paused or done job. Of one whose end is decided a target error or time no
+// longer applies: all its tiles get the samples asked for.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;

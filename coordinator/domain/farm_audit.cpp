@@ -11,20 +11,16 @@ std::string audit_job(Job& job, const LeaseBook& leases) {
   if (job.ended()) return job.out.empty() ? "" : name + "has ended with units leased";
   const UnitQueue& queue = job.queue;
   std::uint64_t waiting = queue.returned().size(), accepted = 0;
-  const UnitCode end = queue.end();
-  for (RoundIndex r = 0; unit_code(r, 0) < end; ++r) {
-    for (TileIndex t = 0; t < job.units.tiles(); ++t) {
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) {
+    for (RoundIndex r = 0; r < queue.end(t); ++r) {
       const UnitCode code = unit_code(r, t);
-      if (code >= end) break;
-      const bool done = job.units.accepted(code);
+      const bool done = job.units.accepted(code), ahead = r >= queue.next(t);
       const bool returned = queue.returned().contains(code), out = job.out.contains(code);
       accepted += done;
-      waiting += code >= queue.cursor() && !done;
+      waiting += ahead && !done;
       if (done + returned + out > 1) return name + fmt::format("unit {:#x} is in two places", code);
-      if (code < queue.cursor() && done + returned + out == 0)
-        return name + fmt::format("unit {:#x} is lost", code);
-      if (code >= queue.cursor() && (returned || out))
-        return name + fmt::format("unit {:#x} waits twice", code);
+      if (!ahead && done + returned + out == 0) return name + fmt::format("unit {:#x} is lost", code);
+      if (ahead && (returned || out)) return name + fmt::format("unit {:#x} waits twice", code);
     }
   }
   if (accepted != job.units.accepted_count()) return name + "acceptances beyond its end";
@@ -33,7 +29,8 @@ std::string audit_job(Job& job, const LeaseBook& leases) {
                               job.out.size(), waiting);
   }
   for (const auto& [code, holders] : job.out) {
-    if (code >= end || holders.empty()) return name + fmt::format("unit {:#x} is leased for nothing", code);
+    if (!queue.plans(code) || holders.empty())
+      return name + fmt::format("unit {:#x} is leased for nothing", code);
     for (const LeaseSeq seq : holders.lease) {
       if (seq != 0 && !leases.all().contains(seq))
         return name + fmt::format("unit {:#x} has a holder that is gone", code);

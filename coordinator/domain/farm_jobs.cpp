@@ -16,7 +16,7 @@ Job& Farm::State::add(JobPlan plan) {
   Job& added = *job;
   by_id[added.plan.brief.job] = &added;
   jobs.emplace(added.seq, std::move(job));
-  added.move_window(workers.threads());
+  added.move_windows(workers.threads());
   return added;
 }
 
@@ -41,22 +41,6 @@ void Farm::State::on(const JobSubmitted& event) {
   refresh(add(event.plan));
 }
 
-namespace {
-
-// Where a job that is done ended: rounds 0..r-1 of all tiles and round r of the first few. Nothing if
-// `folded` has another shape.
-std::optional<UnitCode> end_of(const std::vector<RoundIndex>& folded) {
-  if (folded.empty()) return std::nullopt;
-  const auto [least, most] = std::minmax_element(folded.begin(), folded.end());
-  const auto first = std::find(folded.begin(), folded.end(), *least);
-  if (*least == *most) return unit_code(*least, 0);
-  if (*most != *least + 1 || !std::all_of(first, folded.end(), [&](RoundIndex r) { return r == *least; }))
-    return std::nullopt;
-  return unit_code(*least, static_cast<TileIndex>(first - folded.begin()));
-}
-
-}  // namespace
-
 void Farm::State::on(const JobRestored& event) {
   if (find(event.plan.brief.job) != nullptr || !check_plan(event.plan)) return;
   Job& job = add(event.plan);
@@ -66,40 +50,41 @@ void Farm::State::on(const JobRestored& event) {
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return;
 
-  // A done job whose film is lost has no end to read from it: it is folded again from its results.
+  // A done job whose film is lost has no ends to read from it: it is folded again from its results.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
+    job.cut_off(event.folded, event.stopped.value_or(StopReason::spp));
     job.stopping = event.stopped;
-    if (const auto end = end_of(event.folded)) job.cut_off(*end, event.stopped.value_or(StopReason::spp));
   }
-  const UnitCode end = job.queue.end();
   for (const JobRestored::Unit& unit : event.accepted) {
     const UnitCode code = unit_code(unit.round, unit.tile);
-    if (unit.tile >= job.units.tiles() || code >= end || unit.samples != job.range(code)) continue;
+    if (unit.tile >= job.units.tiles() || !job.queue.plans(code) || unit.samples != job.range(code)) continue;
     if (!job.units.accepted(code)) job.units.accept(code, {unit.digest, workers.index_of(unit.worker)});
   }
-  for (TileIndex t = 0; with_film && t < job.units.tiles(); ++t) {
-    const RoundIndex rounds = std::min(event.folded[t], round_of(end) + (t < tile_of(end) ? 1 : 0));
-    for (RoundIndex k = 0; k < rounds; ++k) {
-      if (!job.units.accepted(unit_code(k, t)))
-        job.units.accept(unit_code(k, t), {Digest{}, workers.index_of({})});
-      if (k < event.rel_error.size() && t < event.rel_error[k].size()) {
-        job.units.restore_error(k, t, event.rel_error[k][t]);
-      }
-    }
-    job.units.restore_folded(t, rounds);
-  }
-  job.move_window(workers.threads());
+  for (TileIndex t = 0; with_film && t < job.units.tiles(); ++t) restore_tile(job, t, event);
+  job.move_windows(workers.threads());
   if (job.state == JobState::done) {
     if (job.complete()) return;
     job.stopping.reset();
     set_state(job, JobState::running);
   }
-  decide_stop_again(job);
+  if (job.adaptive) judge(job);
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
+}
+
+void Farm::State::restore_tile(Job& job, TileIndex t, const JobRestored& event) {
+  const RoundIndex rounds = std::min(event.folded[t], job.queue.end(t));
+  for (RoundIndex k = 0; k < rounds; ++k) {
+    if (!job.units.accepted(unit_code(k, t)))
+      job.units.accept(unit_code(k, t), {Digest{}, workers.index_of({})});
+    if (k < event.rel_error.size() && t < event.rel_error[k].size())
+      job.units.restore_error(k, t, event.rel_error[k][t]);
+    if (job.adaptive) job.adaptive->folded(t, k, job.units.error(k, t));
+  }
+  job.units.restore_folded(t, rounds);
 }
 
 void Farm::State::on(const JobCancelled& event) {
@@ -156,9 +141,11 @@ void Farm::State::on(const JobForgotten& event) {
 void Farm::State::freeze(Job& job, StopReason reason) {
   job.frozen = true;
   work_appeared = true;  // what came back after the time limit may be leased again
-  job.queue.skip_accepted(job.units);
-  const UnitCode begun = std::max(job.queue.cursor(), job.units.end_of_accepted());
-  job.cut_off(std::max(begun, unit_code(1, 0)), reason);
+  std::vector<RoundIndex> begun(job.units.tiles());
+  for (TileIndex t = 0; t < begun.size(); ++t)
+    begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
+  job.cut_off(begun, reason);
+  for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);  // of what a target held back
   finish_if_complete(job);
   refresh(job);
 }

@@ -37,7 +37,7 @@ Wanted Farm::wanted(const UnitKey& unit) const {
   if (job == nullptr) return no("no such job");
   if (job->state == JobState::failed || job->state == JobState::cancelled) return no("the job has ended");
   const UnitCode code = unit_code(unit.round, unit.tile);
-  if (unit.tile >= job->units.tiles() || code >= job->queue.end()) return no("not a unit of this job");
+  if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return no("not a unit of this job");
   const auto verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;
   return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class, ""};
 }
@@ -69,7 +69,7 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.priority = job->plan.priority;
   f.seconds_per_sample = job->cost.per_sample();
   // A complete round holds every pixel; the rounds under way count by their share of units.
-  const RoundIndex rounds = round_of(job->queue.end());
+  const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
   const auto samples_of_last = [&](std::uint64_t undone) {  // the last rounds are what is missing
@@ -83,7 +83,9 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
     return samples;
   };
   if (!job->ended()) {
-    f.core_seconds_left = samples_of_last(f.units_total - f.units_done) * f.seconds_per_sample;
+    const auto foreseen = job->steered() ? job->adaptive->samples_left() : std::nullopt;
+    f.core_seconds_left =
+        foreseen.value_or(samples_of_last(f.units_total - f.units_done)) * f.seconds_per_sample;
     f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
   }
   f.first_ray = job->first_ray;

@@ -1,5 +1,5 @@
 // The inside of the farm. Handlers are grouped by subject: farm_jobs, farm_workers, farm_units, farm_leases,
-// schedule.
+// schedule, farm_stop.
 #pragma once
 
 #include <map>
@@ -44,10 +44,13 @@ struct Farm::State {
   void on(const JobForgotten& event);
   static Result<void> may_retarget(const Job& job, double target_error);
   static Result<void> may_extend(const Job& job, std::uint64_t spp);
+  void reopen(Job& job, RoundIndex last);  // the cut last round, to be rendered in full
+  void take_up_again(Job& job);            // with another end
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
   void refresh(Job& job);  // is it in `ready` as it should be? After any change of its queue, state or window
+  void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
   void finish_if_complete(Job& job);
   void fail(Job& job, std::string error, std::optional<UnitFailure> failure);
@@ -73,10 +76,17 @@ struct Farm::State {
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void issue_folds(Job& job, TileIndex tile);
   void checkpoint(Job& job, RoundIndex round);
-  void decide_stop(Job& job, RoundIndex complete);  // knowing the first `complete` rounds
-  // Of a job taken up again with nothing under way: its last round may be folded already, and that it is the
-  // last one was known one round before. Asking only now would add a round.
-  void decide_stop_again(Job& job);
+
+  // ---- farm_stop.cpp ----
+  // What the fold of this round tells the stop rule, and what comes of it.
+  void steer(Job& job, TileIndex tile, RoundIndex round);
+  void judge(Job& job);  // at the levels that all tiles have come to
+  void mark_level(Job& job, bool last);
+  void take_marks(Job& job);  // those that are folded
+  void stop_at_level(Job& job);
+  // Shortly before its time is up: the rounds that each tile ends with, from what units have cost so far.
+  void plan_end(Job& job, TimePoint limit);
+  void give_back_beyond(Job& job, std::string_view why);  // units leased beyond the tiles' ends
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);  // under which it holds it
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 

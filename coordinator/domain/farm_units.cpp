@@ -18,7 +18,7 @@ void Farm::State::on(const UnitAccepted& event) {
   Job& job = *found;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return unwanted("the job has ended");
-  if (event.unit.tile >= job.units.tiles() || code >= job.queue.end())
+  if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
     return unwanted("not a unit of this job");
   if (event.samples != job.range(code)) return unwanted("another sample range is wanted");
   if (worker != nullptr && job.numeric_class && *job.numeric_class != worker->numeric_class) {
@@ -69,7 +69,7 @@ void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {
-  while (const auto round = job.units.issue_fold(tile, job.last_foldable(), job.queue.end())) {
+  while (const auto round = job.units.issue_fold(tile, job.last_foldable(tile), job.queue.end(tile))) {
     const UnitCode code = unit_code(*round, tile);
     effects.emplace_back(Fold{job.key(code), job.range(code)});
   }
@@ -83,38 +83,17 @@ void Farm::State::on(const UnitFolded& event) {
   const RoundIndex before = job->units.rounds_complete();
   if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
   for (RoundIndex r = before; r < job->units.rounds_complete(); ++r) checkpoint(*job, r);
+  if (job->adaptive) steer(*job, event.unit.tile, event.unit.round);
   finish_if_complete(*job);
   if (job->units.rounds_complete() != before) refresh(*job);
 }
 
+// Of an adaptive job only the rounds that all tiles get make checkpoints; then its levels do.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
-  effects.emplace_back(Checkpoint{job.plan.brief.job, round, cut_range(round, job.spp).s1});
-  decide_stop(job, job.units.rounds_complete());
-  job.move_window(workers.threads());
-  if (!job.plan.target_error) return;
-  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
-}
-
-void Farm::State::decide_stop(Job& job, RoundIndex complete) {
-  const UnitCode end = unit_code(complete + 1, 0);
-  if (!job.plan.target_error || complete == 0 || end >= job.queue.end()) return;
-  const double channels = 3.0 * static_cast<double>(job.plan.grid.frame.width) * job.plan.grid.frame.height;
-  const double relmse = job.units.error_sum(complete - 1) / channels;
-  if (!stop_after(complete, relmse, *job.plan.target_error, job.spp)) return;
-  // A larger target given since may be met by a round beyond which folding has begun: then the next one
-  // decides.
-  if (job.units.fold_issued_beyond(complete)) return;
-  job.cut_off(end, StopReason::error);
-  for (const LeaseSeq seq : leases_of(job)) {
-    free_units(*leases.find(seq), "beyond the last round", true, [&](UnitCode code) { return code >= end; });
-  }
-}
-
-void Farm::State::decide_stop_again(Job& job) {
-  const RoundIndex complete = job.units.rounds_complete();
-  const bool nothing_begun = job.units.folded_count() == std::uint64_t{complete} * job.units.tiles();
-  if (complete > 1 && nothing_begun) decide_stop(job, complete - 1);
-  decide_stop(job, complete);
+  if (!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop))
+    effects.emplace_back(Checkpoint{job.plan.brief.job, std::vector<RoundIndex>(job.units.tiles(), round + 1),
+                                    static_cast<double>(cut_range(round, job.spp).s1)});
+  if (!job.adaptive) job.move_windows(workers.threads());
 }
 
 LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) {
@@ -133,7 +112,7 @@ void Farm::State::on(const UnitFailed& event) {
   if (worker == nullptr || job == nullptr || job->ended()) return;
   grown(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
-  if (event.failure.unit.tile >= job->units.tiles() || code >= job->queue.end()) return;
+  if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
   // Only who holds a unit can have failed at it: no worker has a word on what was never lent to it, and what
   // was taken back from it is rendered elsewhere.
   LeaseRecord* lease = lease_of(*job, code, *worker);
@@ -162,7 +141,8 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   }
   const auto report = [&](const std::string& head) {
     const PixelRect rect = job.plan.grid.rect(tile_of(code));
-    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay), failure);
+    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
+         failure);
   };
   if (job.failures.exhausted(code, known)) return report("");
   if (known > 0 && willing == 0) {

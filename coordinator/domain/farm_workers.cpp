@@ -33,7 +33,7 @@ void Farm::State::on(const WorkerJoined& event) {
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), "joined"});
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || !job->plan.target_error) continue;
-    job->move_window(workers.threads());
+    job->move_windows(workers.threads());
     refresh(*job);
   }
   touch(worker);
@@ -106,7 +106,10 @@ void Farm::State::on(const Tick&) {
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
-    if (limit && now >= *limit) freeze(*job, StopReason::time);
+    if (limit && now >= *limit)
+      freeze(*job, StopReason::time);
+    else if (limit && seconds(*limit - now) <= kTimePlanned)
+      plan_end(*job, *limit);
   }
   work_appeared = true;
   for (const WorkerIndex index : workers.hungry()) {

@@ -9,25 +9,48 @@ Job::Job(JobSeq number, JobPlan asked)
       plan(std::move(asked)),
       spp(even_spp(plan.spp.value_or(kMaxSppWithoutLimit))),
       units(plan.grid.count()),
-      queue(plan.grid.count(), unit_code(round_count(spp), 0)),
+      queue(plan.grid.count(), round_count(spp)),
       cost(plan.grid.count()) {
   std::sort(plan.tags.begin(), plan.tags.end());
+  steer();
 }
 
-void Job::move_window(int farm_threads) {
-  const RoundIndex bound = units.rounds_complete() + kRoundsAhead;
-  if (!plan.target_error) return queue.set_window(bound);
+void Job::steer() {
+  level_seen = 0;
+  if (adaptive.has_value() == plan.target_error.has_value()) return;
+  adaptive.reset();
+  marks.clear();
+  if (plan.target_error) adaptive.emplace(plan.grid, spp);
+}
+
+void Job::move_windows(int farm_threads) {
+  if (steered() &&
+      adaptive->rounds_seen() >= foreseen_at + std::max<std::uint64_t>(1, adaptive->groups() / 2)) {
+    adaptive->foresee(*plan.target_error);
+    foreseen_at = adaptive->rounds_seen();
+  }
+  for (TileIndex t = 0; t < units.tiles(); ++t) move_window(t, farm_threads);
+}
+
+void Job::move_window(TileIndex tile, int farm_threads) {
+  if (!steered()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
   // Small images need more rounds in flight to keep a large farm busy: two units for every thread.
   const RoundIndex busy = static_cast<RoundIndex>(2 * std::max(farm_threads, 0)) / units.tiles();
-  queue.set_window(std::min(bound, last_foldable() + 1 + kRoundsAheadOfStop + busy));
+  queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->foreseen(tile) + busy));
 }
 
-void Job::cut_off(UnitCode end, StopReason reason) {
-  if (end >= queue.end()) return;
-  queue.set_end(end);
-  queue.rewind(end);
-  units.truncate(end);
-  stopping = reason;
+void Job::cut_off(const std::vector<RoundIndex>& ends, StopReason reason) {
+  for (TileIndex t = 0; t < units.tiles(); ++t) {
+    if (ends[t] >= queue.end(t)) continue;
+    queue.set_end(t, ends[t]);
+    queue.rewind(t, ends[t]);
+    units.truncate(t, ends[t]);
+    stopping = reason;
+  }
+}
+
+void Job::plan_all() {
+  for (TileIndex t = 0; t < units.tiles(); ++t) queue.set_end(t, round_count(spp));
 }
 
 std::optional<TimePoint> Job::time_limit(TimePoint now) const {

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <limits>
 #include <unordered_map>
 
+#include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/cost_model.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/failure_budget.h"
-#include "coordinator/domain/stop_rule.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
 
@@ -29,6 +30,13 @@ struct Holders {
   }
 };
 
+// A level of the adaptive stop rule whose image makes a checkpoint, until all of it is folded.
+struct LevelMark {
+  std::vector<RoundIndex> rounds;  // of each tile
+  double spp = 0;                  // mean over pixels
+  TileIndex missing = 0;           // tiles that are not folded so far
+};
+
 struct Job {
   Job(JobSeq number, JobPlan asked);
 
@@ -40,7 +48,7 @@ struct Job {
       stopping;         // decided, while what is leased or unfolded is awaited; final once done
   bool frozen = false;  // by time or user: what has been leased once is still wanted, nothing else
   std::optional<Digest> numeric_class;
-  std::optional<TimePoint> first_ray;  // moved on by the time that the job stood still since
+  std::optional<TimePoint> first_ray;    // moved on by the time that the job stood still since
   std::optional<TimePoint> still_since;  // paused or done: its time budget does not run
 
   UnitTable units;
@@ -48,6 +56,12 @@ struct Job {
   std::unordered_map<UnitCode, Holders> out;  // leased units
   CostModel cost;
   UnitFailures failures;
+
+  std::optional<AdaptiveStop> adaptive;  // with a target
+  double level_seen = 0;                 // the last level at which the image was judged; 0: none
+  std::deque<LevelMark> marks;           // ascending
+  double marked_spp = 0;                 // of the last mark made
+  std::uint64_t foreseen_at = 0;         // rounds seen when the end was last foreseen
 
   bool ended() const {
     return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
@@ -63,13 +77,20 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  RoundIndex last_foldable() const {
-    return plan.target_error ? fold_limit(units.rounds_complete()) : std::numeric_limits<RoundIndex>::max();
+  // The errors of the tiles decide where they end, and have not yet.
+  bool steered() const { return adaptive && !stopping; }
+  // A target begins, is given up or judged anew.
+  void steer();
+  RoundIndex last_foldable(TileIndex tile) const {
+    return steered() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
   // How far ahead of what is folded rounds may be leased, for a farm of so many threads.
-  void move_window(int farm_threads);
-  // Ends the job before `end`, or earlier if it ends earlier already. Acceptances beyond are forgotten.
-  void cut_off(UnitCode end, StopReason reason);
+  void move_windows(int farm_threads);
+  void move_window(TileIndex tile, int farm_threads);
+  // Ends each tile after so many rounds, or earlier if it ends earlier already. Acceptances beyond are
+  // forgotten. Nothing happens if no tile ends earlier than before.
+  void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
+  void plan_all();  // every tile ends with the samples asked for
   std::optional<TimePoint> time_limit(TimePoint now) const;
   // Before and after which the state is one in which the job stands still.
   void stand_still(TimePoint now);

@@ -35,8 +35,6 @@ inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked a
 
 // ---- rounds leased ahead of what is folded over all tiles ----
 inline constexpr RoundIndex kRoundsAhead = 64;  // bounds what waits to be folded
-inline constexpr RoundIndex kRoundsAheadOfStop =
-    2;  // with a target: beyond the last round that is surely wanted
 
 // ---- failures ----
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;   // a unit may fail on so many distinct workers...
@@ -49,5 +47,8 @@ inline constexpr std::uint32_t kMaxNamedWorkers = 8;   // in a message
 
 // ---- stopping ----
 inline constexpr std::uint64_t kMinSppBeforeStop = 64;
+inline constexpr int kMinStopPixels = 1024;        // that decide together
+inline constexpr double kTimePlanned = kLeasesPerWorker * kLeaseSeconds;  // seconds before a time limit
+inline constexpr double kCheckpointGrowth = 1.15;  // of samples from one level with a checkpoint to the next
 
 }  // namespace ls::coordinator

@@ -28,34 +28,26 @@ void UnitTable::accept(UnitCode code, const Result& result) {
   ++accepted_count_;
 }
 
-UnitCode UnitTable::end_of_accepted() const {
-  for (std::size_t k = rounds_.size(); k-- > 0;) {
-    if (rounds_[k].accepted == 0) continue;
-    TileIndex t = tiles_;
-    while (rounds_[k].results[t - 1].worker == kNoWorker) --t;
-    const RoundIndex round = static_cast<RoundIndex>(k);
-    return t == tiles_ ? unit_code(round + 1, 0) : unit_code(round, t);
-  }
+RoundIndex UnitTable::end_of_accepted(TileIndex tile) const {
+  for (std::size_t k = rounds_.size(); k-- > 0;)
+    if (accepted(unit_code(static_cast<RoundIndex>(k), tile))) return static_cast<RoundIndex>(k + 1);
   return 0;
 }
 
-void UnitTable::truncate(UnitCode end) {
-  const RoundIndex first = round_of(end);
-  for (RoundIndex k = first; k < rounds_.size(); ++k) {
+void UnitTable::truncate(TileIndex tile, RoundIndex end) {
+  for (RoundIndex k = end; k < rounds_.size(); ++k) {
     Round& r = rounds_[k];
-    if (r.results.empty()) continue;
-    for (TileIndex t = k == first ? tile_of(end) : 0; t < tiles_; ++t) {
-      if (r.results[t].worker == kNoWorker) continue;
-      CHECK(issued_[t] <= k, "tile {} round {} is cut off though its fold was asked for", t, k);
-      r.results[t] = {};
-      --r.accepted;
-      --accepted_count_;
-    }
-    if (r.accepted == 0) r.results = {};
+    if (r.results.empty() || r.results[tile].worker == kNoWorker) continue;
+    CHECK(issued_[tile] <= k, "tile {} round {} is cut off though its fold was asked for", tile, k);
+    r.results[tile] = {};
+    --accepted_count_;
+    if (--r.accepted == 0) r.results = {};
   }
 }
 
 void UnitTable::reopen(RoundIndex index) {
+  while (rounds_.size() > index + 1 && rounds_.back().accepted == 0 && rounds_.back().folded == 0)
+    rounds_.pop_back();  // what was cut off
   if (index >= rounds_.size()) return;
   CHECK(index + 1 == rounds_.size(), "round {} is reopened though {} rounds are known", index,
         rounds_.size());
@@ -73,16 +65,11 @@ void UnitTable::forget_results() {
   for (Round& r : rounds_) r.results = {}, r.errors = {};
 }
 
-std::optional<RoundIndex> UnitTable::issue_fold(TileIndex tile, RoundIndex limit, UnitCode end) {
+std::optional<RoundIndex> UnitTable::issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end) {
   const RoundIndex next = issued_[tile];
-  const UnitCode code = unit_code(next, tile);
-  if (next > limit || code >= end || !accepted(code)) return std::nullopt;
+  if (next > limit || next >= end || !accepted(unit_code(next, tile))) return std::nullopt;
   ++issued_[tile];
   return next;
-}
-
-bool UnitTable::fold_issued_beyond(RoundIndex round) const {
-  return std::any_of(issued_.begin(), issued_.end(), [&](RoundIndex next) { return next > round + 1; });
 }
 
 bool UnitTable::fold(TileIndex tile, RoundIndex index, double rel_error_sum) {
@@ -107,12 +94,10 @@ void UnitTable::restore_error(RoundIndex index, TileIndex tile, double rel_error
   r.errors[tile] = rel_error_sum;
 }
 
-double UnitTable::error_sum(RoundIndex index) const {
+double UnitTable::error(RoundIndex index, TileIndex tile) const {
   if (index >= rounds_.size() || rounds_[index].errors.empty())
     return std::numeric_limits<double>::quiet_NaN();
-  double sum = 0;
-  for (const double e : rounds_[index].errors) sum += e;
-  return sum;
+  return rounds_[index].errors[tile];
 }
 
 void UnitTable::settle_complete() {

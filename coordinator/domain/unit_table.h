@@ -38,16 +38,16 @@ class UnitTable {
   bool accepted(UnitCode code) const { return find(code) != nullptr; }
   void accept(UnitCode code, const Result& result);  // not accepted before
   std::uint64_t accepted_count() const { return accepted_count_; }
-  UnitCode end_of_accepted() const;  // the code after the last accepted one; 0 if there is none
-  void truncate(UnitCode end);       // forgets acceptances from `end` on; nothing of them may be folded
-  void reopen(RoundIndex round);     // forgets round `round`, accepted or folded; no later one may be known
-  void forget_results();             // of a job that failed: frees the memory, keeps the fold counts
+  RoundIndex end_of_accepted(TileIndex tile) const;  // one past its last accepted round
+  void truncate(TileIndex tile, RoundIndex end);     // forgets its acceptances from `end` on, none folded
+  void reopen(RoundIndex round);  // forgets round `round`, accepted or folded; no later one may be known
+  void forget_results();          // of a job that failed: frees the memory, keeps the fold counts
 
   // ---- folding ----
   // The tile's next round if it is accepted, below `end` and at most `limit`; it counts as issued from now
   // on.
-  std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, UnitCode end);
-  bool fold_issued_beyond(RoundIndex round) const;  // of any tile
+  std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
+  RoundIndex issued(TileIndex tile) const { return issued_[tile]; }  // folds asked for
   // False if this is not the issued round that is next to be folded.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
@@ -55,9 +55,7 @@ class UnitTable {
   RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
   std::uint64_t folded_count() const { return folded_count_; }
   RoundIndex rounds_complete() const { return rounds_complete_; }  // folded over all tiles
-  // Sum over all tiles in tile order: the same bits whatever the order of arrival. NaN if some tile's is
-  // unknown.
-  double error_sum(RoundIndex round) const;
+  double error(RoundIndex round, TileIndex tile) const;            // NaN: unknown
 
  private:
   struct Round {

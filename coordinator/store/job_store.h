@@ -31,6 +31,7 @@ struct JobTotals {
   std::uint64_t units = 0;          // done
   std::uint64_t units_planned = 0;  // 0: as many
   Health health;
+  TimeSplit time;                         // `render` is not kept here: it is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
   bool operator==(const JobTotals&) const = default;
 };

@@ -18,6 +18,12 @@ json to_value(const JobTotals& t) {
           {"units", t.units},
           {"units_planned", t.units_planned},
           {"health", json::parse(canonical_json(t.health))},
+          {"time",
+           {{"load", t.time.load},
+            {"build", t.time.build},
+            {"transfer", t.time.transfer},
+            {"merge", t.time.merge},
+            {"idle", t.time.idle}}},
           {"began_unix", t.began_unix},
           {"ended_unix", t.ended_unix}};
 }
@@ -46,6 +52,9 @@ JobTotals totals_of(const json& j) {
   t.units = j.at("units");
   t.units_planned = j.value("units_planned", std::uint64_t{0});
   t.health = health_of(j);
+  const json time = j.value("time", json::object());  // not in records of earlier versions
+  t.time = {time.value("load", 0.),     time.value("build", 0.), 0.,
+            time.value("transfer", 0.), time.value("merge", 0.), time.value("idle", 0.)};
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
   return t;

@@ -34,6 +34,7 @@ struct Agent::Impl {
     bool cancelled = false;
     TimePoint retry_at{};  // after a transfer that was cut, or trouble
     std::string trouble;   // of this machine; why the last attempt to load it was given up
+    UnitTimes untold;      // what loading it took, until a result tells it
   };
   struct RenderSlot {
     std::atomic<bool> stop{false};
@@ -41,6 +42,7 @@ struct Agent::Impl {
     // Of its own thread: when its last unit was rendered, and of which job.
     JobId last_job;
     TimePoint last_end{};
+    double last_transfer = 0;  // seconds to pack its result
   };
   enum class Connection { down, opening, up };
 
@@ -76,7 +78,8 @@ struct Agent::Impl {
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<LeaseBook::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                            std::shared_ptr<const LocalJob>& job);
-  void note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
+  // Seconds between the slot's last unit of this job and the first sample of this one; 0 if it is the first.
+  double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const LeaseBook::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,

@@ -81,6 +81,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   const JobId& id = brief.job;
   auto local = std::make_shared<LocalJob>();
   std::vector<std::shared_ptr<const BlobFile>> pins;
+  const TimePoint begin = clock.now();
   std::vector<BlobRef> blobs = {{brief.scene, 0, "the scene"}};
   blobs.insert(blobs.end(), brief.assets.begin(), brief.assets.end());
   for (const BlobRef& blob : blobs) {
@@ -114,6 +115,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   it->second.files = std::move(pins);
   it->second.last_use = ++uses;
   it->second.trouble.clear();
+  it->second.untold.load += seconds(start - begin);
+  it->second.untold.build += load_seconds;
   trouble_backoff.reset();
   work.notify_all();
 }

@@ -1,8 +1,10 @@
 // The render threads: one unit at a time, each from the front of the lease book.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <exception>
 #include <new>
+#include <utility>
 
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
@@ -34,7 +36,8 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
     slot.last_job = {};
     return tl::unexpected<UnitFailure>(std::move(rendered.error()));
   }
-  note_gap(slot, held.key.job, rendered->wall_seconds);
+  const double gap = note_gap(slot, held.key.job, rendered->wall_seconds);
+  const TimePoint packing = clock.now();
   auto exr = encode_partial(rendered->partial, job.brief.settings.size);
   if (!exr)
     return tl::unexpected<UnitFailure>(
@@ -45,6 +48,8 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   result.digest = unit_digest(rendered->partial);
   result.cpu_seconds = rendered->cpu_seconds;
   result.health = rendered->health;
+  result.times.idle = std::max(0., gap - std::exchange(slot.last_transfer, 0));
+  result.times.transfer = slot.last_transfer = seconds(clock.now() - packing);
   return result;
 }
 
@@ -62,14 +67,19 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, cons
   return tl::unexpected<UnitFailure>(std::move(failure));
 }
 
-void Agent::Impl::note_gap(RenderSlot& slot, const JobId& job, double wall_seconds) {
+double Agent::Impl::note_gap(RenderSlot& slot, const JobId& job, double wall_seconds) {
   const TimePoint now = clock.now();
+  double gap = 0;
   if (slot.last_job == job) {
+    gap = seconds(now - slot.last_end) - wall_seconds;
     const std::lock_guard lock(mutex);
-    gaps.add(seconds(now - slot.last_end) - wall_seconds);
+    gaps.add(gap);
+  } else {
+    slot.last_transfer = 0;
   }
   slot.last_job = job;
   slot.last_end = now;
+  return gap;
 }
 
 void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
@@ -113,6 +123,11 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
     const auto lease = slot.stop ? std::nullopt : book.finish(key);
     if (lease && outcome) {
       outcome->lease = *lease;
+      if (const auto job = jobs.find(key.job); job != jobs.end()) {
+        const UnitTimes told = std::exchange(job->second.untold, {});
+        outcome->times.load = told.load;
+        outcome->times.build = told.build;
+      }
       outbox.add(std::move(*outcome));
     } else if (lease && innocent) {
       outgoing.push_back(LeaseReturned{*lease, {key}});

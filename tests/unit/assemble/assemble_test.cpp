@@ -52,11 +52,16 @@ TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
   e.relative.squares = 100;
   errors.folded(1, 0, e);
 
-  EXPECT_EQ(errors.at(0).relative.squares, 110);
-  errors.checkpoint_taken(0);
+  const std::vector<RoundIndex> first{1, 1}, second{2, 2}, uneven{3, 1};
+  EXPECT_EQ(errors.at(first).relative.squares, 110);
+  EXPECT_EQ(errors.at(uneven).relative.squares, 112);
+  errors.checkpoint_taken(first);
   e.relative.squares = 101;
   errors.folded(1, 1, e);
-  EXPECT_EQ(errors.at(1).relative.squares, 112);
+  EXPECT_EQ(errors.at(second).relative.squares, 112);
+  errors.checkpoint_taken(uneven);
+  EXPECT_EQ(errors.at(second).relative.squares, 113)
+      << "the first tile was ahead: it counts with what it had";
   EXPECT_EQ(errors.relative(), (std::vector<std::vector<double>>{{10, 100}, {11, 101}, {12, 0}}));
   EXPECT_EQ(RoundErrors::load(errors.save(), 2, true).value(), errors);
 }

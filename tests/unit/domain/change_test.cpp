@@ -112,12 +112,12 @@ TEST(Target, ALargerOneStopsTheJobWithTheNextRound) {
   EXPECT_LE(spp, 512u);
 }
 
-TEST(Target, IsKeptByAJobThatHasNoneOrHasDecidedItsLastRound) {
+TEST(Target, IsKeptByAJobThatHasNoneOrCannotGoBack) {
   Rig rig;
   rig.rel_error = one_over_n;
   rig.join("w", 1);
   rig.submit(plan_of("plain", 1, 4));
-  EXPECT_THAT(rig.farm.may_retarget({"plain"}, .1).error().message, HasSubstr("without a target"));
+  EXPECT_THAT(rig.farm.may_retarget({"plain"}, .1).error().message, HasSubstr("no target error"));
   JobPlan plan = plan_of("j", 3, std::nullopt);
   plan.target_error = 1 / 100.0;
   rig.submit(plan);
@@ -125,9 +125,12 @@ TEST(Target, IsKeptByAJobThatHasNoneOrHasDecidedItsLastRound) {
   EXPECT_TRUE(rig.farm.may_retarget({"j"}, .1).has_value());
   rig.render_all();
 
-  EXPECT_EQ(rig.farm.may_retarget({"j"}, .001).error().code, Errc::failed_precondition);
-  rig.send(JobRetargeted{{"j"}, .001});
+  EXPECT_EQ(rig.farm.may_retarget({"j"}, .02).error().code, Errc::failed_precondition)
+      << "it is better already";
+  rig.send(JobRetargeted{{"j"}, .02});
   EXPECT_EQ(rig.farm.plan({"j"})->target_error, 1 / 100.0);
+  rig.send(JobStopped{{"j"}});
+  EXPECT_TRUE(rig.farm.may_retarget({"j"}, .001).has_value());
 }
 
 TEST(Target, ALargerOneIsSafeAcrossARestart) {

@@ -1,11 +1,9 @@
 #include "tests/unit/domain/walk.h"
 
 #include "common/base/overloaded.h"
+#include "tests/unit/domain/stop_oracle.h"
 
 namespace ls::coordinator {
-namespace {
-constexpr double kPixelsAndChannels = 64 * 3;  // of one tile of plan_of()
-}
 
 std::string Walk::run(int events) {
   for (int i = 0; i < events && wrong_.empty(); ++i) step();
@@ -27,7 +25,8 @@ void Walk::see(const Effect& effect) {
                    const bool once = accepted.try_emplace({e.unit.tile, e.unit.round}, e).second;
                    if (!once && accepted[{e.unit.tile, e.unit.round}].samples == e.samples) {
                      // Beyond a stop acceptances are forgotten and may be made again after an extension.
-                     if (!jobs_[e.unit.job].disturbed) blame("a unit was accepted twice");
+                     if (!jobs_[e.unit.job].disturbed && !jobs_[e.unit.job].reopened)
+                       blame("a unit was accepted twice");
                    }
                    accepted[{e.unit.tile, e.unit.round}] = e;
                  },
@@ -71,11 +70,16 @@ void Walk::see_fold(const Fold& fold) {
   if (it == job.accepted.end() || it->second.samples != fold.samples) blame("a fold of what is not accepted");
   if (fold.unit.round != asked) blame("a fold out of order");
   ++asked;
-  unfolded_.push_back({fold.unit, fold.samples, error_sum(job, fold.unit)});
+  unfolded_.push_back({fold.unit, fold.samples, error_sum(job, fold.unit.tile, fold.unit.round)});
 }
 
-double Walk::error_sum(const StoredJob& job, const UnitKey& unit) const {
-  return job.error / static_cast<double>(round_range(unit.round).s1) * kPixelsAndChannels;
+// The variance per sample is 2^-3 to 2^3, a tile's own, and every round scatters.
+double Walk::error_sum(const StoredJob& job, TileIndex tile, RoundIndex round) {
+  std::mt19937_64 of_tile(job.errors + tile), of_round(job.errors + 1000003 * round + tile);
+  const double variance = std::exp2(static_cast<double>(of_tile() % 7) - 3);
+  const double scatter = .75 + static_cast<double>(of_round() % 512) / 1024;
+  return scatter * variance / static_cast<double>(round_range(round).s1) * 3 *
+         static_cast<double>(job.plan.grid.rect(tile).pixels());
 }
 
 void Walk::see_end(const JobId& id, StopReason reason) {
@@ -84,15 +88,17 @@ void Walk::see_end(const JobId& id, StopReason reason) {
   if (job.disturbed || reason == StopReason::time || reason == StopReason::user) return;
   // Where it must end, from its numbers alone.
   const std::uint64_t spp = farm_.job(id)->spp;
-  RoundIndex last = round_count(spp) - 1;
-  for (RoundIndex k = 5; job.plan.target_error && k < last; ++k) {
-    if (job.error / static_cast<double>(round_range(k).s1) <= *job.plan.target_error) last = k;
+  const auto target = farm_.plan(id)->target_error;
+  std::vector<RoundIndex> ends(job.folded.size(), round_count(spp));
+  if (target) {
+    const auto error = [&](TileIndex t, RoundIndex k) { return error_sum(job, t, k); };
+    ends = stop_at_once(job.plan.grid, spp, *target, error).ends;
   }
-  for (const RoundIndex rounds : job.folded) {
-    if (rounds != last + 1)
-      blame("job " + id.value + " ended after " + std::to_string(rounds) + " rounds instead of " +
-            std::to_string(last + 1) + " (" + std::string(to_string(reason)) + ", spp " +
-            std::to_string(spp) + (job.plan.target_error ? ", target" : "") +
+  for (TileIndex t = 0; t < ends.size(); ++t) {
+    if (job.folded[t] != ends[t])
+      blame("tile " + std::to_string(t) + " of job " + id.value + " ended after " +
+            std::to_string(job.folded[t]) + " rounds instead of " + std::to_string(ends[t]) + " (" +
+            std::string(to_string(reason)) + ", spp " + std::to_string(spp) + (target ? ", target" : "") +
             (job.plan.time ? ", time" : "") + ")");
   }
 }
@@ -148,6 +154,10 @@ void Walk::user_acts() {
     std::erase_if(unfolded_, [&](const UnitFolded& f) { return f.unit.job == id; });
     return send(JobForgotten{id});
   }
+  if (const auto plan = farm_.plan(id); plan->target_error && chance(15)) {
+    jobs_[id].reopened = true;
+    return send(JobRetargeted{id, *plan->target_error * (.5 + static_cast<double>(pick(50)) / 100)});
+  }
   switch (pick(12)) {
     case 0:
       return send(JobCancelled{id});
@@ -171,9 +181,12 @@ void Walk::user_acts() {
 void Walk::submit() {
   const JobId id{"j" + std::to_string(submitted_++)};
   StoredJob job{plan_of(id.value, 1 + static_cast<int>(pick(6)), 1 + pick(chance(20) ? 300 : 40))};
-  job.error = 1 + static_cast<double>(pick(1000)) / 7;
-  if (chance(30))
-    job.plan.spp.reset(), job.plan.target_error = job.error / (70.5 + static_cast<double>(pick(500)));
+  job.errors = pick(1 << 20);
+  if (chance(30)) {
+    job.plan.target_error = 1 / (70.5 + static_cast<double>(pick(500)));
+    job.plan.spp = chance(70) ? 6000 : 1500;
+    if (chance(50)) job.plan.grid = {{static_cast<int>(job.plan.grid.count()) * 32, 32}, 32};
+  }
   if (chance(10)) job.plan.time = 1 + static_cast<double>(pick(20));
   if (chance(10)) job.plan.tags = {"even"};
   job.plan.priority = static_cast<int>(pick(3));
@@ -254,7 +267,7 @@ void Walk::restart() {
       for (RoundIndex k = 0; k < job.folded[t]; ++k) {
         if (event.rel_error.size() <= k)
           event.rel_error.resize(k + 1, std::vector<double>(job.folded.size()));
-        event.rel_error[k][t] = error_sum(job, {id, t, k});
+        event.rel_error[k][t] = error_sum(job, t, k);
       }
     }
     job.fold_asked = job.folded;

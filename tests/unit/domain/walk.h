@@ -32,8 +32,9 @@ class Walk {
   };
   struct StoredJob {  // what the service would have stored
     JobPlan plan;
-    double error = 0;        // relMSE x samples
-    bool disturbed = false;  // extended or stopped: where it ends is not foreseen here
+    std::uint64_t errors = 0;  // seed of its tiles' errors
+    bool disturbed = false;    // extended or stopped: where it ends is not foreseen here
+    bool reopened = false;     // ended, and then given a smaller target
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> fold_asked, folded;
     std::uint64_t done_seen = 0;
@@ -65,7 +66,7 @@ class Walk {
   void restart();
   void calm_down();
   bool all_ended() const;
-  double error_sum(const StoredJob& job, const UnitKey& unit) const;
+  static double error_sum(const StoredJob& job, TileIndex tile, RoundIndex round);
 
   std::mt19937_64 random_;
   Farm farm_{Farm::Options{"r0"}};

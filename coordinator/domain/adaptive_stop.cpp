@@ -1,0 +1,196 @@
+#include "coordinator/domain/adaptive_stop.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "coordinator/domain/limits.h"
+#include "coordinator/domain/stop_groups.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Before it no round is the last one.
+constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
+constexpr RoundIndex kFirstForecast = 3;  // rounds: 8 samples
+
+constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }
+
+double pixels_of(const TileGrid& grid, TileIndex tile) {
+  return static_cast<double>(grid.rect(tile).pixels());
+}
+
+}  // namespace
+
+double level_below(double gain) {
+  if (!(gain > 0)) return 0;
+  if (std::isinf(gain)) return std::numeric_limits<double>::max();
+  // 2^-1/4, 2^-1/2, 2^-3/4 as constants: the grid must not depend on a machine's exp2.
+  constexpr double kSteps[] = {0.84089641525371454303, 0.70710678118654752440, 0.59460355750136053336, .5};
+  int exponent = 0;
+  const double mantissa = std::frexp(gain, &exponent);  // in [1/2, 1)
+  for (const double step : kSteps)
+    if (step < mantissa) return std::ldexp(step, exponent);
+  return std::ldexp(kSteps[0], exponent - 1);  // gain is a power of two
+}
+
+AdaptiveStop::AdaptiveStop(const TileGrid& grid, std::uint64_t spp)
+    : grid_(grid),
+      spp_(even_spp(spp)),
+      last_(round_count(spp) - 1),
+      group_of_(grid.count()),
+      waiting_(grid.count()) {
+  for (std::vector<TileIndex>& tiles : stop_groups(grid)) {
+    Group g;
+    for (const TileIndex t : tiles) {
+      group_of_[t] = static_cast<std::uint32_t>(groups_.size());
+      g.pixels += pixels_of(grid, t);
+    }
+    g.tiles = std::move(tiles);
+    g.stop = g.foreseen = std::min(kFirstStop, last_);
+    groups_.push_back(std::move(g));
+    advance(groups_.back());
+  }
+}
+
+void AdaptiveStop::folded(TileIndex tile, RoundIndex round, double rel_error_sum) {
+  Group& g = groups_[group_of_[tile]];
+  CHECK(round == g.sums.size() + waiting_[tile].size(), "tile {}: round {} after {}", tile, round,
+        g.sums.size() + waiting_[tile].size());
+  waiting_[tile].push_back(rel_error_sum);
+  const auto has_next = [&](TileIndex t) { return !waiting_[t].empty(); };
+  while (std::all_of(g.tiles.begin(), g.tiles.end(), has_next)) {
+    double sum = 0;
+    for (const TileIndex t : g.tiles) {
+      sum += waiting_[t].front();
+      waiting_[t].erase(waiting_[t].begin());
+    }
+    g.sums.push_back(sum);
+    ++rounds_seen_;
+  }
+  advance(g);
+}
+
+double AdaptiveStop::variance(const Group& g, RoundIndex round) const {
+  return g.sums[round] * static_cast<double>(cut_range(round, spp_).s1) / (3 * g.pixels);
+}
+
+double AdaptiveStop::gain(const Group& g) const {
+  return variance(g, g.stop - 1) / (samples_after(g.stop) * samples_after(g.stop + 1));
+}
+
+void AdaptiveStop::advance(Group& g) {
+  while (!g.settled && g.stop <= g.sums.size()) {  // the rounds before `stop` are known
+    if (g.stop == last_ || gain(g) <= level_) {
+      g.settled = true;
+      ++settled_;
+    } else {
+      ++g.stop;
+    }
+  }
+  g.foreseen = std::max(g.foreseen, g.stop);
+}
+
+double AdaptiveStop::predicted() const {
+  if (last_ == 0) return std::numeric_limits<double>::quiet_NaN();
+  double sum = 0, pixels = 0;
+  for (const Group& g : groups_) {
+    sum += g.pixels * variance(g, g.stop - 1) / static_cast<double>(cut_range(g.stop, spp_).s1);
+    pixels += g.pixels;
+  }
+  return sum / pixels;
+}
+
+bool AdaptiveStop::exhausted() const {
+  return std::all_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.stop == last_; });
+}
+
+void AdaptiveStop::lower() {
+  CHECK(settled(), "a level is left before all groups have come to it");
+  double most = 0;
+  for (const Group& g : groups_)
+    if (g.stop != last_) most = std::max(most, gain(g));
+  level_ = level_below(most);
+  for (Group& g : groups_) {
+    const bool ends_here = most > 0 ? gain(g) <= level_ : g.stop == last_;
+    if (g.stop == last_ || ends_here) continue;
+    g.settled = false;
+    --settled_;
+    g.stop = most > 0 ? g.stop + 1 : last_;
+    advance(g);
+  }
+}
+
+std::vector<RoundIndex> AdaptiveStop::ends() const {
+  std::vector<RoundIndex> rounds(group_of_.size());
+  for (const Group& g : groups_)
+    for (const TileIndex t : g.tiles) rounds[t] = g.stop + 1;
+  return rounds;
+}
+
+double AdaptiveStop::mean_spp() const {
+  double samples = 0, pixels = 0;
+  for (const Group& g : groups_) {
+    samples += g.pixels * static_cast<double>(cut_range(g.stop, spp_).s1);
+    pixels += g.pixels;
+  }
+  return samples / pixels;
+}
+
+bool AdaptiveStop::bound() const {
+  return std::any_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.stop == last_; });
+}
+
+void AdaptiveStop::extend(std::uint64_t spp) {
+  CHECK(!bound() && even_spp(spp) >= spp_, "from {} samples to {}", spp_, spp);
+  spp_ = even_spp(spp);
+  last_ = round_count(spp) - 1;
+}
+
+void AdaptiveStop::foresee(double target) {
+  double pixels = 0;
+  std::vector<double> a(groups_.size());
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    const Group& g = groups_[i];
+    if (g.sums.size() < kFirstForecast) return;
+    a[i] = variance(g, static_cast<RoundIndex>(g.sums.size() - 1));
+    pixels += g.pixels;
+  }
+  const double most = static_cast<double>(spp_), least = std::min(samples_after(kFirstStop), most);
+  const auto samples = [&](double variance, double root_level) {
+    return std::clamp(std::sqrt(variance) / root_level, least, most);
+  };
+  // The error grows with the level: halve the interval of its exponent.
+  double low = -100, high = 40;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = (low + high) / 2, root = std::exp2(middle);
+    double sum = 0;
+    for (std::size_t g = 0; g < groups_.size(); ++g) sum += groups_[g].pixels * a[g] / samples(a[g], root);
+    (sum <= target * pixels ? low : high) = middle;
+  }
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    const double n = samples(a[i], std::exp2(low));
+    groups_[i].foreseen =
+        std::max(groups_[i].stop, round_count(static_cast<std::uint64_t>(std::ceil(n))) - 1);
+  }
+  foreseen_ = true;
+}
+
+RoundIndex AdaptiveStop::foreseen(TileIndex tile) const {
+  return std::min(groups_[group_of_[tile]].foreseen, last_) + 1;
+}
+
+std::optional<double> AdaptiveStop::samples_left() const {
+  if (!foreseen_) return std::nullopt;
+  double samples = 0;
+  for (const Group& g : groups_) {
+    const double there =
+        g.sums.empty() ? 0
+                       : static_cast<double>(cut_range(static_cast<RoundIndex>(g.sums.size() - 1), spp_).s1);
+    const double wanted = static_cast<double>(cut_range(std::min(g.foreseen, last_), spp_).s1);
+    samples += g.pixels * std::max(0., wanted - there);
+  }
+  return samples;
+}
+
+}  // namespace ls::coordinator

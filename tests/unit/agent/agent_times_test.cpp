@@ -1,0 +1,51 @@
+// What an agent says of its time besides rendering.
+#include <numeric>
+
+#include "tests/unit/agent/agent_rig.h"
+
+namespace ls::worker {
+namespace {
+
+// The fake, on a clock that only moves when it prepares a job (2 s) and begins a unit (1/4 s of standing still,
+// 1/2 s of rendering).
+class TimedBackend final : public RenderBackend {
+ public:
+  TimedBackend(std::unique_ptr<RenderBackend> fake, AtomicClock& clock)
+      : fake_(std::move(fake)), clock_(clock) {}
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
+    clock_.advance(std::chrono::seconds(2));
+    return fake_->prepare(job);
+  }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    auto rendered = fake_->render(job, unit, stop);
+    clock_.advance(std::chrono::milliseconds(750));
+    if (rendered) rendered->wall_seconds = .5;
+    return rendered;
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+
+ private:
+  std::unique_ptr<RenderBackend> fake_;
+  AtomicClock& clock_;
+};
+
+TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStill) {
+  start_with(std::make_unique<TimedBackend>(make_fake_backend({}), clock_));
+  coordinator_.tell(assign("l-1", "j-1", tiles_up_to(5)));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 5; });
+  ASSERT_TRUE(drain());
+
+  for (std::size_t i = 0; i < 5; ++i) {
+    const UnitTimes& times = coordinator_.results[i].times;
+    EXPECT_DOUBLE_EQ(times.build, i == 0 ? 2 : 0);
+    EXPECT_DOUBLE_EQ(times.idle, i == 0 ? 0 : .25) << "before the first unit it waits for the world";
+    EXPECT_DOUBLE_EQ(times.load, 0);
+    EXPECT_DOUBLE_EQ(times.transfer, 0) << "this clock stands still meanwhile";
+  }
+}
+
+}  // namespace
+}  // namespace ls::worker

@@ -1,0 +1,43 @@
+// Where the tiles of a job with a target error must end, from their errors alone: every tile's rounds in
+// order, one tile after the other, by the stop rule and nothing else.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "coordinator/domain/adaptive_stop.h"
+
+namespace ls::coordinator {
+
+using ErrorOf = std::function<double(TileIndex, RoundIndex)>;  // what TileError::relative.squares would be
+
+struct StopOutcome {
+  std::vector<RoundIndex> ends;
+  bool by_error = false;
+  double predicted = 0, mean_spp = 0;
+};
+
+// Folds of each tile what is wanted for certain; `seen` is how many rounds are.
+inline void feed_wanted(AdaptiveStop& rule, std::vector<RoundIndex>& seen, const ErrorOf& error) {
+  for (TileIndex t = 0; t < seen.size(); ++t)
+    for (; seen[t] <= rule.wanted(t); ++seen[t]) rule.folded(t, seen[t], error(t, seen[t]));
+}
+
+inline StopOutcome stop_at(AdaptiveStop& rule, std::vector<RoundIndex>& seen, double target,
+                           const ErrorOf& error) {
+  while (true) {
+    while (!rule.settled()) feed_wanted(rule, seen, error);
+    const bool good = rule.predicted() <= target && !rule.exhausted();
+    if (good || rule.exhausted()) return {rule.ends(), good, rule.predicted(), rule.mean_spp()};
+    rule.lower();
+  }
+}
+
+inline StopOutcome stop_at_once(const TileGrid& grid, std::uint64_t spp, double target,
+                                const ErrorOf& error) {
+  AdaptiveStop rule(grid, spp);
+  std::vector<RoundIndex> seen(grid.count());
+  return stop_at(rule, seen, target, error);
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,175 @@
+// Jobs with a target error through the whole coordinator: tiles stop after different numbers of rounds, and
+// the pixels are the same whoever rendered them, in whatever order, and however often somebody was killed.
+#include <algorithm>
+#include <random>
+
+#include "common/image/final_image.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+// 5 x 4 tiles of the fake's pixels, whose noise is the same everywhere: where they are dark, at the upper
+// left, the relative error is largest. The lowest row, cut at 13 pixels, stops with its neighbours.
+JobSpec spec_with(std::optional<double> target, std::optional<std::uint64_t> spp = {}) {
+  JobSpec spec;
+  spec.size = FrameSize{160, 109};
+  spec.target_error = target;
+  spec.spp = spp;
+  return spec;
+}
+
+constexpr double kTarget = 1e-3;
+
+struct Outcome {
+  std::string pixels, stopped;
+  double spp = 0;
+};
+Outcome outcome(const Coordinator& coordinator, const JobId& job) {
+  const auto j = report(coordinator, job);
+  return {j.value("pixels_sha256", ""), j["stopped"].is_string() ? j.value("stopped", "") : "",
+          j.value("spp", 0.)};
+}
+
+Outcome at_once(const JobSpec& spec) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator, spec);
+  FakeFarm farm(*coordinator, 1);
+  EXPECT_TRUE(farm.finish(job));
+  return outcome(*coordinator, job);
+}
+
+std::vector<std::uint64_t> spp_of_tiles(const Coordinator& coordinator, const JobId& job) {
+  std::vector<std::uint64_t> spp;
+  const auto tiles = coordinator.tiles(job);
+  for (const TileView& t : *tiles) spp.push_back(t.spp);
+  return spp;
+}
+
+TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator, spec_with(kTarget));
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+
+  const auto spp = spp_of_tiles(*coordinator, job);
+  EXPECT_GT(spp.front(), spp.back());
+  EXPECT_GE(*std::min_element(spp.begin(), spp.end()), 64u);
+  const auto exr = coordinator->image_exr(job);
+  ASSERT_TRUE(exr);
+  const auto picture = read_final_exr(*exr, "image.exr");
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->spp.front(), spp.front());
+  EXPECT_EQ(picture->spp.back(), spp.back());
+  const auto j = report(*coordinator, job);
+  EXPECT_EQ(j["stopped"], "error");
+  EXPECT_TRUE(j["adaptive"].get<bool>());
+  EXPECT_NE(j["note"].get<std::string>().find("bias"), std::string::npos);
+  EXPECT_LE(j["relmse"].get<double>(), kTarget);
+  const auto& curve = j["convergence"];
+  ASSERT_GT(curve.size(), 6u);
+  for (std::size_t i = 1; i < curve.size(); ++i) EXPECT_GT(curve[i]["spp"], curve[i - 1]["spp"]);
+  EXPECT_EQ(curve.back()["spp"], j["spp"]);
+  EXPECT_EQ(curve.back()["relmse"], j["relmse"]) << "the last checkpoint is the image";
+}
+
+TEST(Adaptive, ShuffledDuplicatedAndLostResultsGiveTheSamePixels) {
+  const Outcome expected = at_once(spec_with(kTarget));
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    auto coordinator = open_at({});
+    const JobId job = submit(*coordinator, spec_with(kTarget));
+    FakeFarm farm(*coordinator, 1 + static_cast<int>(seed));
+    std::vector<UnitResult> kept;  // handed in late
+    farm.tamper = [&](UnitResult r) {
+      std::vector<UnitResult> out{r};
+      if (random() % 4 == 0) out.push_back(r);
+      if (random() % 4 == 0) kept.push_back(r);
+      if (kept.size() > 5) out.push_back(kept.front()), kept.erase(kept.begin());
+      return out;
+    };
+    farm.reorder = [&](auto& units) { std::shuffle(units.begin(), units.end(), random); };
+    ASSERT_TRUE(farm.finish(job));
+    EXPECT_EQ(outcome(*coordinator, job).pixels, expected.pixels) << seed;
+  }
+}
+
+TEST(Adaptive, ACoordinatorKilledAnywhereGivesTheSamePixels) {
+  const Outcome expected = at_once(spec_with(kTarget));
+  for (const int k : {1, 40, 95, 101, 107, 113, 119, 125}) {
+    TempFolder dir;
+    JobId job;
+    {
+      auto coordinator = open_at(dir.path());
+      job = submit(*coordinator, spec_with(kTarget));
+      FakeFarm farm(*coordinator, 2);
+      farm.stop_after = k;
+      farm.finish(job);
+    }
+    auto coordinator = open_at(dir.path());
+    FakeFarm farm(*coordinator, 3);
+    ASSERT_TRUE(farm.finish(job)) << k;
+    const Outcome there = outcome(*coordinator, job);
+    EXPECT_EQ(there.pixels, expected.pixels) << k;
+    EXPECT_EQ(there.stopped, "error") << k;
+  }
+}
+
+TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfOneThatHadItFromTheFirst) {
+  const Outcome expected = at_once(spec_with(kTarget / 2));
+  for (const int way : {0, 1, 2}) {  // in memory, on disk, on disk with a restart between
+    TempFolder dir;
+    auto coordinator = open_at(way == 0 ? std::filesystem::path{} : dir.path());
+    const JobId job = submit(*coordinator, spec_with(kTarget));
+    {
+      FakeFarm farm(*coordinator, 2);
+      ASSERT_TRUE(farm.finish(job));
+    }
+    if (way == 2) {
+      coordinator.reset();
+      coordinator = open_at(dir.path());
+    }
+    EXPECT_NE(outcome(*coordinator, job).pixels, expected.pixels);
+    EXPECT_FALSE(coordinator->change(job, {{}, {}, {}, 2 * kTarget})) << "it is better than that";
+    ASSERT_TRUE(coordinator->change(job, {{}, {}, {}, kTarget / 2}));
+    EXPECT_EQ(coordinator->job(job)->state, JobState::running);
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job));
+    const Outcome there = outcome(*coordinator, job);
+    EXPECT_EQ(there.pixels, expected.pixels) << way;
+    EXPECT_EQ(there.spp, expected.spp);
+    EXPECT_EQ(there.stopped, "error");
+  }
+}
+
+TEST(Adaptive, ExtendedBySamplesItHasTheBitsOfAJobBySamples) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator, spec_with(kTarget));
+  {
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job));
+  }
+  const auto spp = spp_of_tiles(*coordinator, job);
+  const std::uint64_t most = *std::max_element(spp.begin(), spp.end());
+  ASSERT_TRUE(coordinator->extend(job, most + 40));
+  EXPECT_FALSE(coordinator->job(job)->target_error) << "it is reached";
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(outcome(*coordinator, job).pixels, at_once(spec_with({}, most + 40)).pixels);
+  EXPECT_EQ(outcome(*coordinator, job).stopped, "spp");
+}
+
+TEST(Adaptive, TheSampleLimitHoldsForEveryTile) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator, spec_with(kTarget, 150));
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+  const auto spp = spp_of_tiles(*coordinator, job);
+  EXPECT_EQ(*std::max_element(spp.begin(), spp.end()), 150u);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
