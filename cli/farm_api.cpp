@@ -177,6 +177,20 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
   return {};
 }
 
+FarmApi::Answer<Digest> FarmApi::upload(const std::filesystem::path& file,
+                                       const std::function<void(const std::string&)>& said) {
+  const auto digest = sha256_file(file);
+  if (!digest) return refused({Errc::invalid_argument, digest.error().message});
+  const json question{{"digests", {digest->hex()}}};
+  const auto answer = as_json(client_.request("POST", "/api/v1/blobs/missing", question.dump()));
+  if (!answer) return tl::unexpected(answer.error());
+  if (const auto missing = answer->find("missing"); missing != answer->end() && missing->empty()) return *digest;
+  said(fmt::format("sending {}", file.string()));
+  const auto put = patiently([&] { return checked(client_.upload("/api/v1/blobs/" + digest->hex(), file)); });
+  if (!put) return tl::unexpected(put.error());
+  return *digest;
+}
+
 FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& spec,
                                       const std::function<void(const std::string&)>& said) {
   const Digest text = sha256(scene.text);

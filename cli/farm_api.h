@@ -36,6 +36,8 @@ class FarmApi {
   // upload.
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& said);
+  // Uploads a file if the coordinator lacks it; the digest is how a spec names it.
+  Answer<Digest> upload(const std::filesystem::path& file, const std::function<void(const std::string&)>& said);
   // Sends an archive as it is; `query` as of spec_query().
   Answer<Json> submit_bundle(const std::filesystem::path& file, const std::string& type,
                              const std::string& query);

@@ -57,6 +57,13 @@ Result<std::unique_ptr<LocalFarm>> LocalFarm::open(Options options) {
   return farm;
 }
 
+Result<Digest> LocalFarm::adopt(const std::filesystem::path& file) {
+  auto digest = sha256_file(file);
+  if (!digest) return digest;
+  if (const auto adopted = blobs_->adopt(*digest, file); !adopted) return tl::unexpected(adopted.error());
+  return digest;
+}
+
 tl::expected<JobId, coordinator::Rejected> LocalFarm::submit(const LocalScene& scene, const JobSpec& spec) {
   for (const auto& [name, file] : scene.files)
     if (const auto adopted = blobs_->adopt(file.digest, file.path); !adopted)

@@ -29,6 +29,8 @@ class LocalFarm {
   ~LocalFarm();
 
   coordinator::Coordinator& coordinator() { return *coordinator_; }
+  // A file that a job's spec may name by its digest.
+  Result<Digest> adopt(const std::filesystem::path& file);
   tl::expected<JobId, coordinator::Rejected> submit(const LocalScene& scene, const JobSpec& spec);
 
   // Renders what was submitted until stop(). `on_result` sees every finished unit, on the agent's thread.

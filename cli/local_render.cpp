@@ -15,8 +15,6 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/say.h"
-#include "cli/true_error.h"
-#include "common/image/exr_file.h"
 #include "worker/render/thread_limit.h"
 
 namespace ls::cli {
@@ -30,34 +28,19 @@ constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 // What is kept of the units besides the image. add() runs on the agent's thread; the rest before or after it.
 struct Keepers {
   std::optional<PartialDir> partials;
-  std::optional<TrueError> truth;
   std::mutex mutex;
   std::optional<Error> trouble;  // the first; guarded by mutex
 
   Result<void> add(const UnitResult& result) {
-    if (partials)
-      if (auto kept = partials->keep(result); !kept) return kept;
-    if (!truth) return {};
-    auto file = decode_partial_file(result.exr);
-    if (!file) return tl::unexpected(file.error());
-    return truth->add(result.unit.tile, result.unit.round, std::move(file->partial));
+    return partials ? partials->keep(result) : Result<void>{};
   }
 };
 
-Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options, const JobView& job) {
+Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
   if (options.partial_dir) {
     auto folder = PartialDir::open(*options.partial_dir);
     if (!folder) return tl::unexpected(folder.error());
     keepers.partials = std::move(*folder);
-  }
-  if (options.reference) {
-    auto image = read_exr_rgb(*options.reference);
-    if (!image) return fail(Errc::invalid_argument, fmt::format("--reference: {}", image.error().message));
-    auto truth = TrueError::make({job.size, job.tile}, std::move(*image));
-    if (!truth)
-      return fail(truth.error().code,
-                  fmt::format("--reference {}: {}", options.reference->string(), truth.error().message));
-    keepers.truth = std::move(*truth);
   }
   return {};
 }
@@ -102,7 +85,13 @@ class LocalRender {
     auto farm = LocalFarm::open({options_.threads, options_.isolate});
     if (!farm) return say_error(farm.error());
     farm_ = std::move(*farm);
-    auto submitted = farm_->submit(scene_, options_.spec);
+    JobSpec spec = options_.spec;
+    if (options_.reference) {
+      const auto digest = farm_->adopt(*options_.reference);
+      if (!digest) return say_error({Errc::invalid_argument, "--reference: " + digest.error().message});
+      spec.reference = *digest;
+    }
+    auto submitted = farm_->submit(scene_, spec);
     if (!submitted) return say_rejected(submitted.error());
     job_ = std::move(*submitted);
     if (scene_.frame) job_ = coordinator::frame_job(job_, *scene_.frame);
@@ -111,7 +100,7 @@ class LocalRender {
     for (const std::string& warning : view->warnings)
       fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
     if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
-    if (const auto opened = open_keepers(keepers_, options_, *view); !opened)
+    if (const auto opened = open_keepers(keepers_, options_); !opened)
       return say_error(opened.error());
     if (const auto started = start(); !started) return say_error(started.error());
     wait_with_progress(farm_->coordinator(), job_, options_.quiet);
@@ -122,7 +111,7 @@ class LocalRender {
  private:
   Result<void> start() {
     interrupt_.on_signal([this] { (void)farm_->coordinator().cancel(job_); });
-    if (!keepers_.partials && !keepers_.truth) return farm_->start({});
+    if (!keepers_.partials) return farm_->start({});
     return farm_->start([this](const UnitResult& result) {
       const auto kept = keepers_.add(result);
       if (kept) return;
@@ -175,8 +164,7 @@ class LocalRender {
       if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
     const auto told = coordinator.report_json(job_);
     if (!told) return tl::unexpected(told.error());
-    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut, {}};
-    if (keepers_.truth) facts.true_error = keepers_.truth->points(folded);
+    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut};
     const auto report = local_report(*told, facts);
     if (!report) return tl::unexpected(report.error());
     if (options_.report)

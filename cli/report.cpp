@@ -17,17 +17,6 @@ using nlohmann::json;
 
 double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
 
-void add_true_error(json& report, const std::vector<TrueError::Point>& points) {
-  const auto put = [](json& object, const TrueError::Point& p) {
-    object["true_rmse"] = p.rmse;
-    object["true_relmse"] = p.relmse;
-  };
-  for (json& entry : report["convergence"])
-    for (const auto& p : points)
-      if (p.spp == number(entry, "spp")) put(entry, p);  // both are samples / pixels of whole numbers
-  put(report, points.back());
-}
-
 }  // namespace
 
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts) {
@@ -37,7 +26,6 @@ Result<std::string> local_report(const std::string& report, const LocalFacts& fa
   j["peak_rss_bytes"] = facts.peak_rss_bytes;
   j["threads"] = facts.threads;
   if (facts.interrupted) j["stopped"] = "user";
-  if (!facts.true_error.empty()) add_true_error(j, facts.true_error);
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
@@ -50,10 +38,10 @@ std::string report_summary(const std::string& report) {
   if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
   if (const auto ci = pair_field(j, "relmse_ci95"))
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
-  if (const std::string verdict = text_field(j, "verdict"); !verdict.empty())
-    line += ": " + verdict;
-  else if (j.contains("slope_ci95") && j["slope_ci95"].is_array())
-    line += ": " + text_field(j, "trend");
+  if (const auto truth = number_field(j, "true_relmse")) line += fmt::format(", true relMSE {:.3g}", *truth);
+  if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
+  if (text_field(j, "verdict_kind") != "early" || j.value("trusted", true) == false)
+    line += ": " + text_field(j, "verdict");
   return line;
 }
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/true_error.h"
 #include "common/base/error.h"
 
 namespace ls::cli {
@@ -16,9 +15,7 @@ struct LocalFacts {
   std::uint64_t peak_rss_bytes = 0;
   int threads = 1;
   bool interrupted = false;
-  std::vector<TrueError::Point> true_error;  // empty: there is no reference
 };
-// true_rmse and true_relmse stand in the points of `convergence` with the same samples, and beside rmse.
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
 
 // What a person wants to know at the end, one line.

@@ -17,7 +17,7 @@ namespace ls::cli {
 namespace {
 
 struct Flags {
-  std::string scene, out, report;
+  std::string scene, out, report, reference;
   JobOptions job;
   FarmOptions farm;
   bool wait = false, quiet = false;
@@ -66,12 +66,30 @@ int wait_and_fetch(const std::string& id, const Flags& flags) {
   return fetch_results(*api, id, {flags.out, flags.report, false, true});
 }
 
+// Sent before the job that names it.
+FarmApi::Answer<void> send_reference(const Flags& flags, JobSpec& spec) {
+  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
+  if (spec.frames && spec.frames->count() > 1)
+    return refuse({Errc::invalid_argument,
+                   "--reference is one image, and the job has several frames: submit them one by one"});
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return refuse(api.error());
+  const auto digest = api->upload(flags.reference, [&](const std::string& line) {
+    if (!flags.quiet) say(line);
+  });
+  if (!digest) return tl::unexpected(digest.error());
+  spec.reference = *digest;
+  return {};
+}
+
 int run(const Flags& flags) {
-  const auto spec = flags.job.parse();
+  auto spec = flags.job.parse();
   if (!spec) return say_error(spec.error());
   for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report)})
     if (!file.empty())
       if (const auto ok = check_outputs(option, file, spec->frames); !ok) return say_error(ok.error());
+  if (!flags.reference.empty())
+    if (const auto sent = send_reference(flags, *spec); !sent) return say_rejected(sent.error());
   const auto type = bundle_type(flags.scene);
   const Job job = type ? submit_bundle(flags, *spec, *type) : submit_scene(flags, *spec);
   if (!job) return say_rejected(job.error());
@@ -100,6 +118,10 @@ void add_submit(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("A,B");
+  submit
+      ->add_option("--reference", flags->reference,
+                   "the right image: every checkpoint is compared with it. Of another seed than the job's")
+      ->type_name("REF.exr");
   submit->add_flag("--wait", flags->wait, "until the job is done");
   submit->add_option("-o,--output", flags->out, "wait, then fetch the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
   submit->add_option("--report", flags->report, "wait, then fetch the report; with # in its name, every frame's")->type_name("REPORT.json");

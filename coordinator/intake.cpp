@@ -138,6 +138,8 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return refuse(settings.error());
   job.settings = std::move(*settings);
+  if (request.spec.reference)
+    if (auto right = load_reference(request.spec, job.settings.size, blobs); !right) return refuse(right.error());
   if (!wants_labels(job.settings)) {  // then what things are called is no part of the scene
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
@@ -168,6 +170,25 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   plan.brief.job.value = "new";
   if (auto ok = check_plan(plan); !ok) return refuse(ok.error());
   return intake;
+}
+
+Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs) {
+  const Digest& digest = *spec.reference;
+  if (!blobs.has(digest))
+    return fail(Errc::failed_precondition,
+                fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
+  ExrLimits limits;
+  // No more than one of the right size takes; a little, so that a wrong one is told by its size.
+  limits.max_pixels = std::max<std::uint64_t>(static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
+                                              std::uint64_t{1} << 22);
+  const auto bytes = blobs.size(digest);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (*bytes > limits.max_bytes)
+    return fail(Errc::invalid_argument,
+                fmt::format("the reference has {} bytes; at most {} are read", *bytes, limits.max_bytes));
+  const auto exr = blobs.read(digest, 0, *bytes);
+  if (!exr) return tl::unexpected(exr.error());
+  return read_reference(*exr, "the reference", size, limits);
 }
 
 std::string replay_of(const StoredJob& job) {

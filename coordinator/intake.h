@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image/reference.h"
 #include "coordinator/domain/farm.h"
 #include "coordinator/service.h"
 #include "coordinator/store/job_store.h"
@@ -29,6 +30,10 @@ tl::expected<std::vector<Intake>, Rejected> take_in_sequence(const SubmitRequest
                                                              const BlobStore& blobs);
 
 // What renders one of its samples again: common/job/replay_command.h.
+// The reference that a job of this size asks for. failed_precondition: its blob is not here; invalid_argument: it
+// is not such a picture.
+Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
+
 std::string replay_of(const StoredJob& job);
 
 // The farm's view of a stored job.

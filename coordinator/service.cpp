@@ -91,6 +91,10 @@ void Service::start_threads() {
     while (!token.stop_requested())
       for (auto& chore : chores_.pop(1, token)) chore();
   });
+  threads_.emplace_back([this](const std::stop_token& token) {
+    while (!token.stop_requested())
+      for (auto& comparison : comparisons_.pop(1, token)) comparison();
+  });
   if (!options_.tick) return;
   threads_.emplace_back([this, every = *options_.tick](const std::stop_token& token) {
     std::mutex mutex;

@@ -17,6 +17,7 @@
 #include "common/base/error.h"
 #include "common/base/frame_range.h"
 #include "common/base/id.h"
+#include "common/image/convergence.h"
 #include "common/job/health_notes.h"
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
@@ -47,11 +48,19 @@ struct TimeSplit {
   }
   bool operator==(const TimeSplit&) const = default;
 };
+struct TrueFigures {  // against a reference, its own noise subtracted (common/image/reference.h)
+  double rmse = 0, relmse = 0;
+  std::optional<double> flip;  // mean HDR-FLIP (common/image/flip.h); at doubling samples only
+  bool operator==(const TrueFigures&) const = default;
+};
 struct ConvergencePoint {
   double seconds = 0;       // since the first ray
   double core_seconds = 0;  // CPU time of workers
   double spp = 0;
   ErrorFigures error;
+  // Nothing: the job has no reference, or the figures are still being computed, or the checkpoint was in the
+  // making while the coordinator restarted.
+  std::optional<TrueFigures> truth = {};
 };
 
 // ---- sequences: a job with frames. Every frame is a job, too, with an id made of both ----
@@ -88,6 +97,9 @@ struct JobView {
   std::optional<double> target_error;  // relMSE, asked
   double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
+  std::optional<TrueFigures> truth;              // as of the last checkpoint that has it
+  std::optional<Judgement> judgement;            // nothing: no sample yet
+  std::optional<std::uint64_t> few_hits;         // pixels of the image as it is
   std::optional<double> eta_seconds;
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
@@ -242,6 +254,9 @@ class Coordinator {
   virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;          // to this new total
   virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;  // as it is now, or final
   virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const = 0;
+  // False-colour maps of the error and of the samples (common/image/maps.h).
+  virtual Result<std::vector<std::byte>> error_png(const JobId& id) const = 0;
+  virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
   virtual Result<std::string> report_json(const JobId& id) const = 0;
   virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
   virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;

@@ -152,6 +152,7 @@ Result<void> Service::wake_locked(JobEntry& entry) {
   if (!log) return tl::unexpected(log.error());
   entry.log = std::move(*log);
   load_folded(entry);
+  if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
   auto restored = restored_locked(entry, JobState::done);
   if (!restored) return tl::unexpected(restored.error());
   entry.dormant = false;

@@ -87,6 +87,7 @@ void Service::on(const Fold& e, Todo& todo) {
     todo.push_back(JobPaused{e.unit.job});
     return;
   }
+  if (entry->truths) entry->truths->folded(e.unit.tile, e.unit.round, entry->assembly->film());
   if (const auto at = entry->replay_at.find({e.unit.tile, e.unit.round}); at != entry->replay_at.end())
     entry->fold_seconds = std::max(entry->fold_seconds, at->second);
   else
@@ -168,8 +169,13 @@ void Service::on(const Checkpoint& e, Todo&) {
   if (!entry || !entry->assembly) return;
   const ImageError error = image_error(entry->assembly->errors().at(e.rounds));
   entry->assembly->checkpoint_taken(e.rounds);
-  if (!entry->points.empty() && entry->points.back().spp >= error.spp)
-    return;  // known from before the restart
+  entry->stored.totals.doubt = error.verdict;
+  entry->stored.totals.few_hits = error.few_hits;
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) {  // known from before the restart
+    const ConvergencePoint& last = entry->points.back();
+    if (last.spp == error.spp && !last.truth) compare_locked(entry, e.rounds, error.spp);
+    return;
+  }
   double core = entry->stored.totals.core_seconds;
   const auto until =
       std::upper_bound(entry->replay.begin(), entry->replay.end(),
@@ -181,6 +187,7 @@ void Service::on(const Checkpoint& e, Todo&) {
     if (const auto added = store_->add_point(id, point); !added)
       log_error(fmt::format("job={}", id.value), added.error().message);
   });
+  compare_locked(entry, e.rounds, error.spp);
 }
 
 void Service::on(const ReopenRound& e, Todo&) {
@@ -196,10 +203,11 @@ void Service::on(const JobFinished& e, Todo&) {
   entry->stored.totals.ended_unix = unix_now();
   if (entry->assembly) entry->stored.totals.health = entry->assembly->health().total();
   entry->clock_zero.reset();
+  compare_last_locked(entry);
   entry->finishing = ++last_final_;
   entry->leased.clear();
   if (entry->assembly) entry->assembly->forget_waiting();
-  chores_.push([this, entry, number = entry->finishing] { finish(entry, number); });
+  after_comparisons(entry, [this, entry, number = entry->finishing] { finish(entry, number); });
 }
 
 void Service::on(const JobFailed& e, Todo&) {

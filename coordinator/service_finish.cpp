@@ -53,6 +53,7 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
   facts.job.state = shown_state(entry);
   facts.convergence = entry.points;
   facts.replay = replay_of(entry.stored);
+  facts.reference_noise = entry.reference_noise;
   if (!entry.assembly) return facts;
   const Film& film = entry.assembly->film();
   facts.job.totals.health = entry.assembly->health().total();
@@ -187,6 +188,7 @@ void Service::forget_locked(JobEntry& entry) {
     return;
   entry.dormant = true;
   entry.assembly.reset();
+  entry.truths.reset();
   entry.log.reset();
   run_locked(JobForgotten{entry.stored.id});
 }

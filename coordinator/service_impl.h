@@ -23,6 +23,7 @@
 #include "common/image/final_image.h"
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/report.h"
+#include "coordinator/assemble/truth_book.h"
 #include "coordinator/assemble/verify.h"
 #include "coordinator/domain/farm.h"
 #include "coordinator/domain/limits.h"
@@ -45,6 +46,8 @@ struct JobEntry {
   TileGrid grid;
   std::shared_ptr<PartialLog> log;   // none in memory
   std::optional<Assembly> assembly;  // none once an ended job is on disk
+  std::optional<TruthBook> truths;   // with a reference only, while there is an assembly
+  std::optional<ReferenceNoise> reference_noise;  // as of the last comparison; nothing: not known
   std::vector<ConvergencePoint> points;
   bool dormant = false;         // has ended and is on the disk: the farm does not know it
   bool removed = false;         // by its user; nothing of it is stored any more
@@ -109,6 +112,8 @@ class Service final : public Coordinator {
   Result<void> extend(const JobId& id, std::uint64_t spp) override;
   Result<std::vector<std::byte>> image_exr(const JobId& id) const override;
   Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const override;
+  Result<std::vector<std::byte>> error_png(const JobId& id) const override;
+  Result<std::vector<std::byte>> samples_png(const JobId& id) const override;
   Result<std::string> report_json(const JobId& id) const override;
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const override;
   Result<std::vector<TileView>> tiles(const JobId& id) const override;
@@ -240,6 +245,13 @@ class Service final : public Coordinator {
   Provenance provenance_of(const StoredJob& job) const;
   MatteManifests mattes_of(const StoredJob& job) const;
 
+  // ---- references (service_truth.cpp); compare() and reference_of() on the comparing thread ----
+  void compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
+  void compare_last_locked(const EntryPtr& entry);
+  void compare(const EntryPtr& entry, double spp, const std::vector<TilePicture>& tiles, bool last);
+  std::shared_ptr<const Reference> reference_of(const StoredJob& job);
+  void after_comparisons(const EntryPtr& entry, std::function<void()> chore);
+
   // ---- results (service_results.cpp) ----
   void receive_result(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
   void verify_loop(const std::stop_token& token);
@@ -294,7 +306,9 @@ class Service final : public Coordinator {
   ByteBudget budget_{limits::kMaxResultsWaiting};
   WorkQueue<Arrived> arrived_;
   WorkQueue<Checked> checked_;
-  WorkQueue<std::function<void()>> chores_;
+  WorkQueue<std::function<void()>> chores_, comparisons_;
+  std::shared_ptr<const Reference> reference_;  // the last one compared with
+  Digest reference_digest_;
   std::unique_ptr<EventHub> hub_;
   std::vector<std::jthread> threads_;  // last: joined before all that they use goes
 };

@@ -48,6 +48,7 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
   }
   entry->assembly.emplace(entry->grid, entry->stored.spec.target_error.has_value(),
                           aovs_of(entry->stored.settings));
+  if (entry->stored.spec.reference) entry->truths.emplace(entry->assembly->film());
   if (const auto put = store_->put_job(entry->stored); !put) return tl::unexpected(rejected(put.error()));
   const JobId id = entry->stored.id;
   register_locked(entry);

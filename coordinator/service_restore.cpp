@@ -57,6 +57,7 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
     entry.log = std::move(*log);
   }
   load_folded(entry);
+  if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
   auto event = restored_locked(entry, state);
   if (!event) return tl::unexpected(event.error());
   if (auto sound = check_plan(event->plan); !sound) return sound;
@@ -112,6 +113,7 @@ void Service::set_aside_locked(JobEntry& entry, const Error& why) {
   entry.stored.error = entry.broken;
   entry.dormant = true;
   entry.assembly.reset();
+  entry.truths.reset();
   entry.log.reset();
   log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
 }

@@ -75,6 +75,7 @@ tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& requ
     entry.log = std::move(logs[i]);
     entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(),
                            aovs_of(entry.stored.settings));
+    if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
     register_locked(entries.back());
   }
   log_info(fmt::format("job={} frames={}", id.value, to_string(*request.spec.frames)), "submitted");

@@ -6,6 +6,7 @@
 
 #include "common/image/convergence.h"
 #include "common/image/final_image.h"
+#include "common/image/maps.h"
 #include "coordinator/assemble/report.h"
 #include "coordinator/intake.h"
 #include "coordinator/service_impl.h"
@@ -114,6 +115,9 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.units_total = std::max(job.totals.units, job.totals.units_planned);
   if (v.units_total > 0) v.progress = static_cast<double>(v.units_done) / static_cast<double>(v.units_total);
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
+  v.truth = last_truth(entry.points);
+  v.few_hits = job.totals.few_hits;
+  if (v.few_hits) v.judgement = judge(error_points(entry.points), job.totals.doubt);
   if (entry.assembly)
     v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
   const auto figures = entry.dormant ? std::nullopt : farm_.job(job.id);
@@ -197,6 +201,18 @@ Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposu
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
   return preview_png(shown->film, exposure);
+}
+
+Result<std::vector<std::byte>> Service::error_png(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return error_map_png(shown->film);
+}
+
+Result<std::vector<std::byte>> Service::samples_png(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return samples_map_png(shown->film);
 }
 
 Result<std::string> Service::report_json(const JobId& id) const {

@@ -69,6 +69,12 @@ json to_value(const JobView& v) {
   j["relmse"] = v.error_now ? number(v.error_now->relmse) : json();
   j["relmse_ci95"] =
       v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
+  j["reference"] = v.truth ? json{{"rmse", number(v.truth->rmse)},
+                                  {"relmse", number(v.truth->relmse)},
+                                  {"flip", v.truth->flip ? number(*v.truth->flip) : json()}}
+                           : json();
+  j["verdict"] = v.judgement ? json{{"kind", to_string(v.judgement->kind)}, {"words", v.judgement->words}} : json();
+  j["few_hits"] = v.few_hits ? json(*v.few_hits) : json();
   return j;
 }
 
@@ -115,10 +121,16 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
 }
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
-  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi\n";
+  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,ref_rmse,ref_relmse,ref_flip\n";
+  const auto or_nothing = [](const auto& truth, auto figure) {
+    return truth ? fmt::format("{}", figure(*truth)) : std::string();
+  };
   for (const auto& p : points)
-    csv += fmt::format("{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
-                       p.error.relmse, p.error.relmse_lo, p.error.relmse_hi);
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
+                       p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
+                       or_nothing(p.truth, [](const TrueFigures& t) { return t.rmse; }),
+                       or_nothing(p.truth, [](const TrueFigures& t) { return t.relmse; }),
+                       p.truth && p.truth->flip ? fmt::format("{}", *p.truth->flip) : std::string());
   return csv;
 }
 

@@ -1,5 +1,7 @@
 #include "common/image/convergence.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -131,6 +133,24 @@ std::string words(double lo, double hi) {
   return lo > kFast ? "faster than 1/N" : "converging as expected";
 }
 
+double excess(const ErrorPoint& p) { return *p.true_relmse - p.relmse; }
+
+// Where the true error of the last point stays beyond the estimated one; see the header.
+bool stands_on_a_floor(std::span<const ErrorPoint> points) {
+  constexpr double kSigmas = 4;
+  if (points.empty() || !usable(points.back()) || !points.back().true_relmse) return false;
+  const ErrorPoint& now = points.back();
+  if (!(*now.true_relmse > 0)) return false;
+  const double sigma = std::log(now.relmse_hi / now.relmse_lo) / (2 * kNormal95);
+  if (std::log(*now.true_relmse / now.relmse) < kSigmas * sigma) return false;
+  for (std::size_t i = points.size() - 1; i-- > 0;) {
+    const ErrorPoint& before = points[i];
+    if (!usable(before) || !before.true_relmse || 2 * before.spp > now.spp) continue;
+    return excess(now) > excess(before) * std::sqrt(before.spp / now.spp);
+  }
+  return false;
+}
+
 // The least time from the last point on, as a logarithm, at which `value` is down to `wanted`.
 template <class Curve>
 double when(const Curve& value, double wanted) {
@@ -162,6 +182,33 @@ std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
   if (!line.sound()) return std::nullopt;
   const double half = kNormal95 * line.slope_sigma(), lo = line.slope() - half, hi = line.slope() + half;
   return Trend{static_cast<int>(y.size()), line.slope(), lo, hi, words(lo, hi)};
+}
+
+const char* to_string(Judgement::Kind kind) {
+  using Kind = Judgement::Kind;
+  switch (kind) {
+    case Kind::early: return "early";
+    case Kind::converging: return "converging";
+    case Kind::fast: return "fast";
+    case Kind::heavy_tail: return "heavy_tail";
+    case Kind::bias_floor: return "bias_floor";
+  }
+  return "";
+}
+
+Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt) {
+  using Kind = Judgement::Kind;
+  const auto trend = trend_of(points);
+  if (!doubt.empty()) return {trend ? Kind::heavy_tail : Kind::early, doubt};
+  if (stands_on_a_floor(points))
+    return {Kind::bias_floor,
+            fmt::format("bias floor: the true relMSE stays near {:.2g} while the estimated one falls to {:.2g}: "
+                        "image and reference do not agree, or the reference is noisy and brings no error of its "
+                        "own",
+                        *points.back().true_relmse, points.back().relmse)};
+  if (!trend) return {Kind::early, "too early to tell how it converges"};
+  if (trend->slope_hi < kSlow) return {Kind::heavy_tail, "don't trust yet: " + trend->verdict};
+  return {trend->slope_lo > kFast ? Kind::fast : Kind::converging, trend->verdict};
 }
 
 std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target) {

@@ -20,6 +20,7 @@ struct ErrorPoint {
   double spp = 0;
   double core_seconds = 0;  // spent on rendering up to here
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
+  std::optional<double> true_relmse = {};  // against a reference
 };
 
 // relMSE ~ time^-slope; 1 for independent samples of finite variance.
@@ -30,6 +31,29 @@ struct Trend {
 };
 // Points in order of samples. Nothing: fewer than three of them can be used.
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points);
+
+// What is to be thought of an image's figures, in one word and in a sentence.
+struct Judgement {
+  enum class Kind {
+    early,       // too few checkpoints to say
+    converging,  // as expected: like 1/N
+    fast,        // faster than 1/N: low-discrepancy points on a smooth image
+    heavy_tail,  // don't trust yet: few pixels carry the error, or it falls slower than 1/N
+    bias_floor,  // with a reference: the true error stays while the estimated one falls
+  } kind = Kind::early;
+  std::string words;
+  bool operator==(const Judgement&) const = default;
+};
+const char* to_string(Judgement::Kind kind);
+// `doubt`: ImageError::verdict, empty when the image's own figures are trusted. In order of weight: doubt, a bias
+// floor, the slope.
+//
+// Bias floor: of the true error that part which the estimated one lacks is a squared bias, if it is there, and
+// does not fall with samples; what chance puts between the two falls as they do. It is told where the last true
+// error is above the estimated one by four standard deviations of the interval's logarithm (chance: once in
+// 30,000), and has kept more of its excess since half the samples or fewer than the root of their ratio, which is
+// half way between staying and falling like 1/N.
+Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {
   double spp = 0;                                                     // at the target

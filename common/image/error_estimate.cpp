@@ -19,12 +19,12 @@ constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal
 constexpr double kFewPixels = 100;
 constexpr double kLargeShare = 0.1;
 
-// Sums of a + b over 5 x 5 windows, clipped to the tile. Rows first, then columns, both along rows of memory.
-std::vector<double> window_sums(const double* a, const double* b, std::size_t width, std::size_t height) {
+// Sums over 5 x 5 windows, clipped to the tile. Rows first, then columns, both along rows of memory.
+std::vector<double> window_sums(const std::vector<double>& values, std::size_t width, std::size_t height) {
   constexpr std::size_t kPad = kReach;
   std::vector<double> padded(width + 2 * kPad), rows(width * (height + 2 * kPad)), sums(width * height);
   for (std::size_t y = 0; y < height; ++y) {
-    for (std::size_t x = 0; x < width; ++x) padded[kPad + x] = a[y * width + x] + b[y * width + x];
+    std::copy_n(&values[y * width], width, &padded[kPad]);
     double* out = &rows[(y + kPad) * width];
     for (std::size_t x = 0; x < width; ++x)
       out[x] = padded[x] + padded[x + 1] + padded[x + 2] + padded[x + 3] + padded[x + 4];
@@ -36,21 +36,52 @@ std::vector<double> window_sums(const double* a, const double* b, std::size_t wi
 
 int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::max(0, i - kReach) + 1; }
 
-// One channel's 1 / (window^2 + 0.01), with the window of the header's comment.
+// 1 / (m^2 + c) less what noise of m, of variance s2, adds to it in the mean.
+double weight_of(double m, double s2) {
+  const double q = m * m + kDark, f = 1 / q;
+  const double unbiased = f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
+  return std::clamp(unbiased, f / 2, 2 * f);
+}
+
+// What is known of one channel of a pixel: its own values, and sums over its window without it.
+struct Surroundings {
+  double own, own_noise;       // S, D^2
+  double others;               // how many
+  double sum, squares, noise;  // of S, S^2 and D^2
+};
+
+double weight_of(const Surroundings& s) {
+  if (s.others == 0) return weight_of(s.own, 0);
+  constexpr double kSignificant = 9;
+  const double mean = s.sum / s.others, u = s.noise / s.others, v = std::max(u, s.own_noise);
+  const double apart = (s.own - mean) * (s.own - mean);
+  double structure = std::max(0.0, s.squares / s.others - mean * mean - u * (1 - 1 / s.others));
+  if (apart > kSignificant * v) structure = std::max(structure, apart);
+  const double g = structure > 0 ? structure / (structure + v) : 0;
+  return weight_of(mean + g * (s.own - mean), u * (g * g + (1 - g) * (1 - g) / s.others));
+}
+
+// One channel's weights of relMSE; see the header.
 std::vector<double> weights(const HalfMeans& h, std::size_t plane) {
+  const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
   const double *a = &h.a[plane], *b = &h.b[plane];
-  std::vector<double> sums =
-      window_sums(a, b, static_cast<std::size_t>(h.width), static_cast<std::size_t>(h.height));
-  for (int y = 0, i = 0; y < h.height; ++y) {
+  std::vector<double> own(width * height), square(width * height), noise(width * height);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    own[i] = 0.5 * (a[i] + b[i]);
+    square[i] = own[i] * own[i];
+    noise[i] = 0.25 * (a[i] - b[i]) * (a[i] - b[i]);
+  }
+  const auto sum = window_sums(own, width, height), squares = window_sums(square, width, height),
+             noises = window_sums(noise, width, height);
+  std::vector<double> out(own.size());
+  std::size_t i = 0;
+  for (int y = 0; y < h.height; ++y)
     for (int x = 0; x < h.width; ++x, ++i) {
       const int others = span_of(x, h.width) * span_of(y, h.height) - 1;
-      const auto p = static_cast<std::size_t>(i);
-      const double own = a[p] + b[p];
-      const double mean = others > 0 ? (sums[p] - own) / (2 * others) : own / 2;
-      sums[p] = 1 / (mean * mean + kDark);
+      out[i] = weight_of({own[i], noise[i], static_cast<double>(others), sum[i] - own[i], squares[i] - square[i],
+                          std::max(0.0, noises[i] - noise[i])});
     }
-  }
-  return sums;
+  return out;
 }
 
 // d: three planes of `width` x `height` values.
@@ -106,6 +137,29 @@ void judge(ImageError& out, double pixels) {
 
 }  // namespace
 
+namespace {
+
+double light(std::span<const double> half, std::size_t pixel, std::size_t pixels) {
+  return half[pixel] + half[pixels + pixel] + half[2 * pixels + pixel];
+}
+
+}  // namespace
+
+bool has_few_hits(const HalfMeans& h, int x, int y) {
+  constexpr double kOneSided = 19;
+  const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const auto at = [&](int i, int j) { return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i); };
+  const double a = light(h.a, at(x, y), pixels), b = light(h.b, at(x, y), pixels);
+  if (a != 0 || b != 0) return std::max(a, b) > kOneSided * std::min(a, b);
+  int lit = 0, all = 0;
+  for (int j = std::max(0, y - kReach); j <= std::min(h.height - 1, y + kReach); ++j)
+    for (int i = std::max(0, x - kReach); i <= std::min(h.width - 1, x + kReach); ++i) {
+      ++all;
+      lit += light(h.a, at(i, j), pixels) != 0 || light(h.b, at(i, j), pixels) != 0;
+    }
+  return 2 * lit > all - 1;
+}
+
 void NoiseSums::add(const NoiseSums& o) {
   squares += o.squares;
   channel_fourth += o.channel_fourth;
@@ -118,6 +172,7 @@ void NoiseSums::add(const NoiseSums& o) {
 void TileError::add(const TileError& o) {
   pixels += o.pixels;
   samples += o.samples;
+  few_hits += o.few_hits;
   plain.add(o.plain);
   relative.add(o.relative);
 }
@@ -127,6 +182,8 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp) {
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
         h.b.size(), h.width, h.height);
   TileError out{.pixels = n, .samples = spp * n};
+  for (int y = 0; y < h.height; ++y)
+    for (int x = 0; x < h.width; ++x) out.few_hits += has_few_hits(h, x, y);
   std::vector<double> d(3 * n);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
   out.plain = noise_sums(d, h.width, h.height);
@@ -152,6 +209,7 @@ ImageError image_error(const TileError& sums) {
   out.relmse_lo = out.relmse * std::exp(-relative_spread_95);
   out.relmse_hi = out.relmse * std::exp(relative_spread_95);
   out.spp = static_cast<double>(sums.samples) / pixels;
+  out.few_hits = sums.few_hits;
   if (sums.relative.pixel_fourth > 0) {
     out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
     out.top_share = sums.relative.largest / sums.relative.squares;

@@ -3,14 +3,22 @@
 // A pixel's two half means A and B are independent and have the same expectation. With a, b their errors, the
 // image (A+B)/2 has the error e = (a+b)/2, and D = (A-B)/2 = (a-b)/2 has the same variance v as e: d = D^2 is
 // an unbiased estimate of E[e^2]. Sums of d over pixels and channels give the mean squared error; sums of w
-// d, with w = 1/(window^2 + 0.01), the relative one.
+// d, with w = 1/(m^2 + 0.01) and m the pixel's right value, the relative one.
 //
-// The window is the 5 x 5 average around the pixel, of both halves, the pixel itself left out and clipped to
-// the tile. The pixel is left out because a firefly in it would enlarge its own denominator and hide half of
-// its error; without it the window is independent of d, whatever the halves. (A tile of one pixel has no
-// neighbours: it uses the pixel.) The noise of the window, variance s^2, biases 1/(m^2 + c), c = 0.01, by no
-// more than s^2 (m^2 + c) / c^2 of its value (Taylor, |f''| <= 2/c^2), hence by at most s^2/c where it is
-// dark.
+// What stands for m must be free of the noise that is being measured: S = (A+B)/2 itself would let a firefly
+// enlarge its own denominator and hide most of its error, and the average W of the neighbours alone is wrong
+// wherever a picture has edges (docs/error.md has figures of both). So, per channel,
+//   m = W + g (S - W),   g = T / (T + v),
+// local Wiener filtering (Lee 1980) with
+//   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
+//   v   the noise: the window's mean of D^2, or the pixel's own, whichever is more (a firefly has D^2 = (S-W)^2);
+//   T   the picture's structure: the window's variance of S less its noise; or (S - W)^2 where that is beyond 9 v,
+//       three standard deviations, as of a small bright thing.
+// In a flat or dark place g is near 0 and m does not depend on the pixel; where the picture's structure exceeds its
+// noise g is near 1. A tile of one pixel uses S.
+// The noise that is left in m, of variance s^2 = g^2 u + (1 - g)^2 u / n (u: the window's mean of D^2, n its
+// pixels), would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2: that is subtracted, within [f/2, 2 f]. What
+// remains is of second order: in the dark 3 s^4 / c^2 of the value.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b; over channels, 4 tr(V^2) with V the covariance of the channels of D.
@@ -48,6 +56,12 @@ struct NoiseSums {
 struct TileError {
   std::uint64_t pixels = 0;
   std::uint64_t samples = 0;  // spp x pixels
+  // Pixels of which at least one half holds next to nothing of the light, though there is some: what they show
+  // came from very few samples, and neither their value nor their difference says much. A pixel counts if one
+  // half has 19 times as much as the other, or if both have nothing and more than half of the neighbours in its
+  // window have something. (k equal hits fall all into one half once in 2^(k-1): of pixels with 2 hits half are
+  // told, with 5 one in 16, with 10 one in 500.)
+  std::uint64_t few_hits = 0;
   NoiseSums plain;            // of D
   NoiseSums relative;         // of D / sqrt(window^2 + 0.01)
   void add(const TileError& other);
@@ -61,6 +75,8 @@ struct HalfMeans {
 };
 // `spp`: samples per pixel behind the means, both halves together.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp);
+// Whether pixel (x, y) is one of few_hits.
+bool has_few_hits(const HalfMeans& halves, int x, int y);
 
 // What the user is told.
 struct ImageError {
@@ -69,6 +85,7 @@ struct ImageError {
   double spp = 0;               // mean over pixels
   double effective_pixels = 0;  // (sum x)^2 / sum x^2 of the relative error: how many pixels carry it
   double top_share = 0;         // share of the relative error that stands in one pixel
+  std::uint64_t few_hits = 0;   // pixels
   bool trusted = false;         // false: few pixels carry the error, the interval means little yet
   std::string verdict;          // in words; empty when trusted
 };

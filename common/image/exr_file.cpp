@@ -53,8 +53,9 @@ FrameSize size_of(const Imath::Box2i& window) {
 }
 
 // Row bands are appended as they are read, so a small file that only claims to be large costs little memory.
-Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source, FrameSize size) {
+Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) {
   const Imath::Box2i window = file.header(source.part).dataWindow();
+  const FrameSize size = size_of(window);
   Imf::InputPart part(file, source.part);
   constexpr int kBand = 64;
   const auto width = static_cast<std::size_t>(size.width);
@@ -78,22 +79,54 @@ Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source, 
   return image;
 }
 
-}  // namespace
+// Its layers of standard errors; nothing if it has not all of them.
+std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Source& colour) {
+  const Imf::ChannelList& list = file.header(colour.part).channels();
+  const Source source{colour.part, {"stderr.R", "stderr.G", "stderr.B"}};
+  for (const char* c : source.channels) {
+    const Imf::Channel* channel = list.findChannel(c);
+    if (!channel || channel->xSampling != 1 || channel->ySampling != 1 || channel->type == Imf::UINT)
+      return std::nullopt;
+  }
+  return source;
+}
 
-Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
-                              const ExrLimits& limits) {
+Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::string& name,
+                                 const ExrLimits& limits, bool with_error) {
   if (bytes.size() > limits.max_bytes)
     return fail(Errc::resource_exhausted,
                 fmt::format("{}: {} bytes, the limit is {}", name, bytes.size(), limits.max_bytes));
   return exr::guarded(
-      Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<RgbImage> {
+      Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<RgbWithError> {
         if (const auto ok = exr::check_headers(bytes, name, limits); !ok) return tl::unexpected(ok.error());
         exr::MemoryReader in(bytes, name);
         Imf::MultiPartInputFile file(in, /*numThreads=*/0, /*reconstructChunkOffsetTable=*/false);
         const auto source = find_colour(file, name);
         if (!source) return tl::unexpected(source.error());
-        return read_part(file, *source, size_of(file.header(source->part).dataWindow()));
+        auto image = read_part(file, *source);
+        if (!image) return tl::unexpected(image.error());
+        RgbWithError out{std::move(*image), {}};
+        const auto layers = with_error ? find_error(file, *source) : std::nullopt;
+        if (!layers) return out;
+        auto error = read_part(file, *layers);
+        if (!error) return tl::unexpected(error.error());
+        out.error = std::move(error->rgb);
+        return out;
       });
+}
+
+}  // namespace
+
+Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
+                              const ExrLimits& limits) {
+  auto read = read_colour(bytes, name, limits, false);
+  if (!read) return tl::unexpected(read.error());
+  return std::move(read->image);
+}
+
+Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
+                                         const ExrLimits& limits) {
+  return read_colour(bytes, name, limits, true);
 }
 
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits) {

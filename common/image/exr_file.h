@@ -35,6 +35,15 @@ Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::strin
                               const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
+// The same with the standard error of each value, where the part has layers stderr.R, stderr.G and stderr.B at
+// full resolution; `error` is empty where it has not.
+struct RgbWithError {
+  RgbImage image;
+  std::vector<float> error;  // interleaved as image.rgb
+};
+Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
+                                         const ExrLimits& limits = {});
+
 inline constexpr float kLargestHalf = 65504;
 
 // A picture of several planes of one size.

@@ -113,13 +113,22 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pi
   return out;
 }
 
-TileError Film::estimate(const Tile& tile, const PixelRect& rect) {
-  auto means = halves(tile, static_cast<std::size_t>(rect.pixels()));
-  const std::uint64_t spp = tile.spp();
-  const double samples = static_cast<double>(spp / 2);  // of each half: counts are even
-  for (auto& half : means)
+std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels) {
+  auto out = halves(tile, pixels);
+  const double samples = static_cast<double>(tile.spp() / 2);  // of each half: counts are even
+  for (auto& half : out)
     for (double& v : half) v /= samples;
-  return estimate_error({rect.width(), rect.height(), means[0], means[1]}, spp);
+  return out;
+}
+
+TileError Film::estimate(const Tile& tile, const PixelRect& rect) {
+  const auto of = means(tile, static_cast<std::size_t>(rect.pixels()));
+  return estimate_error({rect.width(), rect.height(), of[0], of[1]}, tile.spp());
+}
+
+std::array<std::vector<double>, 2> Film::half_means(TileIndex index) const {
+  if (spp(index) == 0) return {};
+  return means(*tiles_[index], static_cast<std::size_t>(grid_.rect(index).pixels()));
 }
 
 RoundIndex Film::full_rounds(TileIndex tile) const { return tiles_[tile] ? tiles_[tile]->full_rounds : 0; }

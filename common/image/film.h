@@ -76,6 +76,8 @@ class Film {
   Digest tile_digest(TileIndex tile) const;
   TilePixels pixels(TileIndex tile) const;
   TileAovs aov_pixels(TileIndex tile) const;
+  // Of A and of B: R, G, B planes, as HalfMeans wants them; empty if there is no sample.
+  std::array<std::vector<double>, 2> half_means(TileIndex tile) const;
 
   // ---- the image ----
   std::uint64_t samples() const;       // over all pixels
@@ -111,6 +113,7 @@ class Film {
   };
   // Sums with the tail; R, G, B planes of A and of B.
   static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels);
+  static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels);
   static TileError estimate(const Tile& tile, const PixelRect& rect);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
   std::vector<std::byte> tile_bytes(TileIndex tile) const;

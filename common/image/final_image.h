@@ -61,6 +61,9 @@ float as_half(float value);  // rounded to a half, as stored in one
 // NaN.
 std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 
+// RGB, 8 bits, row by row, as a PNG.
+Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
+
 // 8-bit sRGB of the mean times 2^exposure. NaN is magenta; tiles without a sample show a quiet dark checker.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);
 

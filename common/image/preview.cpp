@@ -53,6 +53,21 @@ std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale) {
   return out;
 }
 
+Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(size.width);
+  image.height = static_cast<png_uint_32>(size.height);
+  image.format = PNG_FORMAT_RGB;
+  image.flags = PNG_IMAGE_FLAG_FAST;
+  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::vector<std::byte> png(bytes);
+  if (!png_image_write_to_memory(&image, png.data(), &bytes, 0, rgb.data(), 0, nullptr))
+    return fail(Errc::internal, fmt::format("writing a PNG: {}", image.message));
+  png.resize(bytes);
+  return png;
+}
+
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops) {
   if (!(std::abs(exposure_stops) <= kMaxStops))
     return fail(Errc::invalid_argument, fmt::format("exposure: {} stops; from -{} to {} are possible",
@@ -62,19 +77,7 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
                                static_cast<std::size_t>(frame.height) * 3);
   for (TileIndex t = 0; t < film.grid().count(); ++t)
     draw_tile(film, t, std::exp2(exposure_stops), pixels.data());
-
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(frame.width);
-  image.height = static_cast<png_uint_32>(frame.height);
-  image.format = PNG_FORMAT_RGB;
-  image.flags = PNG_IMAGE_FLAG_FAST;
-  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
-  std::vector<std::byte> png(bytes);
-  if (!png_image_write_to_memory(&image, png.data(), &bytes, 0, pixels.data(), 0, nullptr))
-    return fail(Errc::internal, fmt::format("writing a PNG: {}", image.message));
-  png.resize(bytes);
-  return png;
+  return write_png(frame, pixels);
 }
 
 }  // namespace ls

@@ -54,6 +54,15 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
+void read_reference(Fields& fields, JobSpec& spec) {
+  const Json* v = fields.find("reference");
+  if (!v) return;
+  spec.reference = v->is_string() ? Digest::parse(v->get_ref<const std::string&>()) : std::nullopt;
+  if (!spec.reference) return fields.wrong("reference", "must be the SHA-256 of a blob, 64 hexadecimal digits");
+  if (spec.frames && spec.frames->count() > 1)
+    fields.wrong("reference", "is one image, and the job has several frames: submit them one by one");
+}
+
 }  // namespace
 
 std::string canonical_json(const RenderSettings& s) {
@@ -136,6 +145,7 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.size) json["size"] = size_json(*spec.size);
   if (spec.integrator) json["integrator"] = *spec.integrator;
   if (spec.frames) json["frames"] = to_string(*spec.frames);
+  if (spec.reference) json["reference"] = spec.reference->hex();
   return dump(json);
 }
 
@@ -144,7 +154,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   if (!json) return tl::unexpected(json.error());
   Fields fields(*json, "spec",
                 {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
-                 "float", "tags", "frames"});
+                 "float", "tags", "frames", "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -158,6 +168,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   spec.float_output = fields.boolean("float").value_or(false);
   spec.tags = fields.names("tags").value_or(spec.tags);
   read_frames(fields, spec);
+  read_reference(fields, spec);
   if (fields.error()) return tl::unexpected(*fields.error());
   return spec;
 }

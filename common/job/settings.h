@@ -45,6 +45,7 @@ struct JobSpec {
   bool float_output = false;
   std::vector<std::string> tags;
   std::optional<FrameRange> frames;  // a sequence: one film per frame; absent: one image
+  std::optional<Digest> reference;   // blob of the right image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };
 

@@ -18,13 +18,48 @@ json spp_value(double spp) {
   return number(spp);
 }
 
+// true_rmse, true_relmse, true_flip.
+void put_truth(json& object, const TrueFigures& truth) {
+  object["true_rmse"] = number(truth.rmse);
+  object["true_relmse"] = number(truth.relmse);
+  object["true_flip"] = truth.flip ? number(*truth.flip) : json();
+}
+
+json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& truth) {
+  if (!facts.job.spec.reference) return {};
+  const auto& noise = facts.reference_noise;
+  return {{"digest", facts.job.spec.reference->hex()},
+          {"rmse", truth ? number(truth->rmse) : json()},
+          {"relmse", truth ? number(truth->relmse) : json()},
+          {"flip", truth && truth->flip ? number(*truth->flip) : json()},
+          {"noise_rmse", noise ? number(std::sqrt(noise->mse)) : json()},
+          {"noise_relmse", noise ? number(noise->relmse) : json()}};
+}
+
+// What each checkpoint said of the time to the target, as it was then: for who wants to know how far to trust it.
+void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
+  const std::vector<ErrorPoint> all = error_points(points);
+  double next = 0;  // at doubling samples only: there is little news in between, and all points are looked at again
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].spp < next) continue;
+    const auto forecast = forecast_of(std::span(all).first(i + 1), target);
+    if (!forecast || forecast->core_seconds == 0) continue;
+    next = 2 * all[i].spp;
+    curve[i]["forecast"] = {{"core_seconds", number(forecast->core_seconds)},
+                            {"core_seconds_ci95", {number(forecast->core_seconds_lo), number(forecast->core_seconds_hi)}},
+                            {"spp", number(forecast->spp)}};
+  }
+}
+
 json point(const ConvergencePoint& p) {
-  return {{"seconds", number(p.seconds)},
+  json j{{"seconds", number(p.seconds)},
           {"core_seconds", number(p.core_seconds)},
           {"spp", spp_value(p.spp)},
           {"rmse", number(p.error.rmse)},
           {"relmse", number(p.error.relmse)},
           {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
+  if (p.truth) put_truth(j, *p.truth);
+  return j;
 }
 
 }  // namespace
@@ -41,7 +76,14 @@ std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points
   std::vector<ErrorPoint> out;
   out.reserve(points.size());
   for (const ConvergencePoint& p : points)
-    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi});
+    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
+                   p.truth ? std::optional(p.truth->relmse) : std::nullopt});
+  return out;
+}
+
+std::optional<TrueFigures> last_truth(const std::vector<ConvergencePoint>& points) {
+  std::optional<TrueFigures> out;
+  for (auto p = points.rbegin(); p != points.rend() && !out; ++p) out = p->truth;
   return out;
 }
 
@@ -50,6 +92,7 @@ std::string report_json(const ReportFacts& facts) {
   const JobTotals& totals = job.totals;
   json curve = json::array();
   for (const auto& p : facts.convergence) curve.push_back(point(p));
+  if (job.spec.target_error) put_forecasts(curve, facts.convergence, *job.spec.target_error);
   json j{{"job", job.id.value},
          {"scene", job.scene.hex()},
          {"state", to_string(job.state)},
@@ -85,12 +128,18 @@ std::string report_json(const ReportFacts& facts) {
   j["rmse_ci95"] = known ? json{number(e.rmse_lo), number(e.rmse_hi)} : json();
   j["relmse"] = known ? number(e.relmse) : json();
   j["relmse_ci95"] = known ? json{number(e.relmse_lo), number(e.relmse_hi)} : json();
+  const auto truth = last_truth(facts.convergence);
+  if (truth) put_truth(j, *truth);
+  j["reference"] = reference_of(facts, truth);
+  j["few_hits_pixels"] = facts.error ? json(facts.error->few_hits) : json();
   const auto trend = trend_of(error_points(facts.convergence));
   j["slope"] = trend ? number(-trend->slope) : json();
   j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
   j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
   j["trusted"] = known && e.trusted;
-  j["verdict"] = e.verdict;
+  const Judgement judgement = judge(error_points(facts.convergence), e.verdict);
+  j["verdict"] = judgement.words;
+  j["verdict_kind"] = to_string(judgement.kind);
   // Error reached per second of wall clock; per core second for comparisons between farms.
   const double wall = e.relmse * totals.render_seconds, cores = e.relmse * totals.core_seconds;
   j["efficiency"] = known && wall > 0 ? number(1 / wall) : json();

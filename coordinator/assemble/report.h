@@ -8,6 +8,7 @@
 #include "common/base/digest.h"
 #include "common/image/convergence.h"
 #include "common/image/error_estimate.h"
+#include "common/image/reference.h"
 #include "coordinator/store/job_store.h"
 
 namespace ls::coordinator {
@@ -20,11 +21,14 @@ struct ReportFacts {
   std::uint64_t clamped_values = 0;  // in the final EXR
   std::vector<ConvergencePoint> convergence;
   std::string replay;  // the job's replay_command()
+  std::optional<ReferenceNoise> reference_noise;  // nothing: it is not known, or there is no reference
 };
 std::string report_json(const ReportFacts& facts);
 
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
 std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points);
+// Of the last checkpoint that has them.
+std::optional<TrueFigures> last_truth(const std::vector<ConvergencePoint>& points);
 
 }  // namespace ls::coordinator

@@ -27,6 +27,8 @@ Response patch_job(Api&, const Request&, const Params&);
 Response delete_job(Api&, const Request&, const Params&);
 Response get_image_exr(Api&, const Request&, const Params&);
 Response get_image_png(Api&, const Request&, const Params&);
+Response get_error_png(Api&, const Request&, const Params&);
+Response get_samples_png(Api&, const Request&, const Params&);
 Response get_report(Api&, const Request&, const Params&);
 Response get_convergence(Api&, const Request&, const Params&);
 Response get_tiles(Api&, const Request&, const Params&);

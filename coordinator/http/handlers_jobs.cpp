@@ -173,6 +173,20 @@ Response get_image_png(Api& api, const Request& request, const Params& params) {
   return image ? file_response("image/png", std::move(*image), id->value + ".png") : problem(image.error());
 }
 
+Response get_error_png(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto map = api.coordinator().error_png(*id);
+  return map ? file_response("image/png", std::move(*map), id->value + "-error.png") : problem(map.error());
+}
+
+Response get_samples_png(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto map = api.coordinator().samples_png(*id);
+  return map ? file_response("image/png", std::move(*map), id->value + "-samples.png") : problem(map.error());
+}
+
 Response get_report(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());

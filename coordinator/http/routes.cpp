@@ -36,6 +36,8 @@ constexpr std::array kRoutes = {
     Route{Method::del, "/api/v1/jobs/{id}", kToken, Lane::quick, kNone, 0, delete_job},
     Route{Method::get, "/api/v1/jobs/{id}/image.exr", kToken, Lane::slow, kNone, 0, get_image_exr},
     Route{Method::get, "/api/v1/jobs/{id}/image.png", kToken, Lane::slow, kNone, 0, get_image_png},
+    Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Lane::slow, kNone, 0, get_error_png},
+    Route{Method::get, "/api/v1/jobs/{id}/samples.png", kToken, Lane::slow, kNone, 0, get_samples_png},
     Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Lane::slow, kNone, 0, get_report},
     Route{Method::get, "/api/v1/jobs/{id}/convergence.csv", kToken, Lane::quick, kNone, 0, get_convergence},
     Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Lane::quick, kNone, 0, get_tiles},

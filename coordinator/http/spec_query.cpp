@@ -54,7 +54,7 @@ std::optional<Result<Json>> parse_value(std::string_view key, std::string_view t
   if (key == "target_error" || key == "time") return parse_number<double>(key, text, "a number");
   if (key == "priority") return parse_number<int>(key, text, "a whole number");
   if (key == "size") return parse_size(text);
-  if (key == "integrator" || key == "frames") return Result<Json>(Json(std::string(text)));
+  if (key == "integrator" || key == "frames" || key == "reference") return Result<Json>(Json(std::string(text)));
   if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
   if (key == "float") {
     if (text == "true" || text == "1") return Result<Json>(Json(true));
@@ -95,7 +95,7 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
           Errc::invalid_argument,
           fmt::format(
               "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
-              "aov, define, priority, float, tags, frames",
+              "aov, define, priority, float, tags, frames, reference",
               key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);

@@ -33,6 +33,9 @@ struct JobTotals {
   Health health;
   TimeSplit time;                         // `render` is not kept here: it is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
+  // As of the last checkpoint: ImageError::verdict and few_hits; nothing: there was none.
+  std::string doubt;
+  std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
 };
 
@@ -80,6 +83,8 @@ class JobStore {
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // all of them, or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
+  // Of the point with these samples, in place of what was said of it before.
+  virtual Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
 
   virtual Result<void> add_log(const JobId& job,

@@ -42,6 +42,12 @@ class MemoryJobStore final : public JobStore {
     points_[job].push_back(point);
     return {};
   }
+  Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
+    const std::lock_guard lock(mutex_);
+    for (ConvergencePoint& point : points_[job])
+      if (point.spp == spp) point.truth = truth;
+    return {};
+  }
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     const std::lock_guard lock(mutex_);
     const auto found = points_.find(job);

@@ -16,6 +16,7 @@ CREATE TABLE IF NOT EXISTS jobs(ordinal INTEGER PRIMARY KEY, id TEXT UNIQUE NOT 
 CREATE TABLE IF NOT EXISTS points(n INTEGER PRIMARY KEY, job TEXT NOT NULL, seconds REAL, core_seconds REAL, spp REAL,
   rmse REAL, relmse REAL, relmse_lo REAL, relmse_hi REAL);
 CREATE INDEX IF NOT EXISTS points_of_job ON points(job);
+CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL, PRIMARY KEY(job, spp));
 CREATE TABLE IF NOT EXISTS log(n INTEGER PRIMARY KEY, job TEXT NOT NULL, unix REAL, text TEXT);
 CREATE INDEX IF NOT EXISTS log_of_job ON log(job);
 CREATE TABLE IF NOT EXISTS counters(name TEXT PRIMARY KEY, value INTEGER NOT NULL);
@@ -55,6 +56,10 @@ class Statement {
     sqlite3_bind_double(statement_.get(), ++bound_, value);
     return *this;
   }
+  Statement& bind_null() {  // what is not bound is null
+    ++bound_;
+    return *this;
+  }
   Statement& bind(std::int64_t value) {
     sqlite3_bind_int64(statement_.get(), ++bound_, value);
     return *this;
@@ -79,6 +84,7 @@ class Statement {
                : "";
   }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+  bool null(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 
  private:
@@ -137,7 +143,7 @@ class SqliteJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     return all_or_nothing("remove a job", [&]() -> Result<void> {
       for (const JobId& job : jobs)
-        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
+        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?",
                                 "DELETE FROM log WHERE job = ?"})
           if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) return done;
       return {};
@@ -161,19 +167,32 @@ class SqliteJobStore final : public JobStore {
         .run("store a convergence point");
   }
 
+  Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
+    const std::lock_guard lock(mutex_);
+    Statement put(db_.get(), "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip) VALUES(?, ?, ?, ?, ?)");
+    put.bind(job.value).bind(spp).bind(truth.rmse).bind(truth.relmse);
+    truth.flip ? put.bind(*truth.flip) : put.bind_null();
+    return put.run("store a comparison with the reference");
+  }
+
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     const std::lock_guard lock(mutex_);
     std::vector<ConvergencePoint> all;
     Statement rows(db_.get(),
-                   "SELECT seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi FROM points "
-                   "WHERE job = ? ORDER BY n");
+                   "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
+                   "truths.rmse, truths.relmse, truths.flip "
+                   "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
     rows.bind(job.value);
     auto row = rows.step("read the convergence");
-    for (; row && *row; row = rows.step("read the convergence"))
+    for (; row && *row; row = rows.step("read the convergence")) {
       all.push_back({rows.real(0),
                      rows.real(1),
                      rows.real(2),
                      {rows.real(3), rows.real(4), rows.real(5), rows.real(6)}});
+      if (!rows.null(7))
+        all.back().truth = TrueFigures{rows.real(7), rows.real(8),
+                                       rows.null(9) ? std::nullopt : std::optional(rows.real(9))};
+    }
     if (!row) return tl::unexpected(row.error());
     return all;
   }

@@ -25,7 +25,9 @@ json to_value(const JobTotals& t) {
             {"merge", t.time.merge},
             {"idle", t.time.idle}}},
           {"began_unix", t.began_unix},
-          {"ended_unix", t.ended_unix}};
+          {"ended_unix", t.ended_unix},
+          {"doubt", t.doubt},
+          {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
 }
 
 Health health_of(const json& totals) {
@@ -57,6 +59,8 @@ JobTotals totals_of(const json& j) {
             time.value("transfer", 0.), time.value("merge", 0.), time.value("idle", 0.)};
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
+  t.doubt = j.value("doubt", std::string());
+  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null()) t.few_hits = few->get<std::uint64_t>();
   return t;
 }
 

@@ -2,7 +2,9 @@
 
 import json
 import os
+import struct
 import subprocess
+import urllib.request
 
 import pytest
 from cli_kit import FOG, digest, lightshaft, load, write_fog
@@ -38,6 +40,36 @@ def test_submit_renders_the_pixels_of_render(rendering, tmp_path):
     assert (tmp_path / "farm.exr").stat().st_size > 1000
     assert call(rendering, "fetch", job, "-o", tmp_path / "again.exr").returncode == 0
     assert (tmp_path / "again.exr").read_bytes() == (tmp_path / "farm.exr").read_bytes()
+
+
+def test_a_farm_compares_with_a_reference_as_render_does(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    lightshaft("render", scene, "-o", tmp_path / "right.exr", "--spp", 64, "--seed", 9, "--float")
+    reference = ["--spp", 8, "--reference", tmp_path / "right.exr"]
+    lightshaft("render", scene, "-o", tmp_path / "alone.exr", *reference, "--report", tmp_path / "alone.json")
+
+    sent = call(rendering, "submit", scene, *reference, "-o", tmp_path / "farm.exr", "--report", tmp_path / "farm.json")
+
+    alone, farm = load(tmp_path / "alone.json"), load(tmp_path / "farm.json")
+    truth = ["true_rmse", "true_relmse", "true_flip"]
+    assert [[p[k] for k in truth] for p in farm["convergence"]] == [[p[k] for k in truth] for p in alone["convergence"]]
+    assert farm["reference"] == alone["reference"] and farm["true_rmse"] > 0
+    job = sent.stdout.split()[0]
+    shown = json.loads(call(rendering, "show", job, "--json").stdout)
+    assert shown["reference"]["relmse"] == farm["true_relmse"] and shown["verdict"]["words"]
+    for name in ("error.png", "samples.png"):
+        request = urllib.request.Request(f"http://127.0.0.1:{rendering.http}/api/v1/jobs/{job}/{name}",
+                                         headers={"Authorization": f"Bearer {rendering.token}"})
+        with urllib.request.urlopen(request) as answer:
+            png = answer.read()
+        assert png.startswith(b"\x89PNG") and struct.unpack(">II", png[16:24]) == (72, 40)
+
+
+def test_a_reference_that_is_none_is_refused_before_anything_is_rendered(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    (tmp_path / "text.exr").write_text("no picture")
+    assert "reference" in call(rendering, "submit", scene, "--reference", tmp_path / "text.exr", code=2).stderr
+    assert "several frames" in call(rendering, "submit", scene, "--reference", tmp_path / "text.exr", "--frames", "1-3", code=2).stderr
 
 
 def test_files_are_sent_once(rendering, tmp_path):

@@ -106,12 +106,16 @@ def test_a_reference_gives_the_true_error(fog, tmp_path):
     render(fog, tmp_path, "--seed", 1, "--reference", reference, "--report", tmp_path / "other.json")
     same, other = load(tmp_path / "same.json"), load(tmp_path / "other.json")
 
-    # The reference is this very image in float32: what is left is its rounding, 2^-24 of values below 16.
-    assert same["true_rmse"] <= 16 * 2 ** -24
-    assert all(p["true_rmse"] > 1000 * same["true_rmse"] for p in same["convergence"][:-1])
-    # Two independent images of one variance: their difference has twice the squared error. A factor 2 around sqrt(2) is wide
-    # for 72 * 40 * 3 values.
-    assert other["rmse"] * 2 ** .5 / 2 < other["true_rmse"] < other["rmse"] * 2 ** .5 * 2
+    # The reference is this very image in float32, and its own noise is taken away from no difference at all.
+    assert same["true_rmse"] == 0 and same["true_flip"] < 1e-4
+    # Two independent images of one variance: their difference has twice the squared error, of which the reference's layers of
+    # errors take one half away. A factor 2 is wide for 72 * 40 * 3 values.
+    assert other["rmse"] / 2 < other["true_rmse"] < other["rmse"] * 2
+    assert .5 < other["reference"]["noise_rmse"] / other["rmse"] < 2
+    assert other["reference"]["relmse"] == other["true_relmse"] == other["convergence"][-1]["true_relmse"]
+    assert all(p["true_rmse"] > 0 for p in other["convergence"])
+    flips = [p["true_flip"] for p in other["convergence"] if p["true_flip"] is not None]
+    assert flips == sorted(flips, reverse=True) and flips[-1] == other["true_flip"] and 0 < flips[-1] < flips[0] < 1
 
 
 def test_a_reference_of_another_size_is_refused(fog, tmp_path):

@@ -140,6 +140,8 @@ class FakeCoordinator final : public Coordinator {
     if (slow_image != nullptr) slow_image(exposure);
     return std::vector<std::byte>(static_cast<std::size_t>(10 + exposure), std::byte{1});
   }
+  Result<std::vector<std::byte>> error_png(const JobId& id) const override { return image_png(id, 1); }
+  Result<std::vector<std::byte>> samples_png(const JobId& id) const override { return image_png(id, 2); }
   Result<std::string> report_json(const JobId& id) const override { return text_of(id, "{\"spp\":16}"); }
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const override {
     if (auto found = job(id); !found) return tl::unexpected(found.error());

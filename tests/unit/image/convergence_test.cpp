@@ -122,6 +122,52 @@ TEST(Trend, SaysInWordsHowItGoes) {
   EXPECT_EQ(trend_of(checkpoints(fast, 9))->verdict, "faster than 1/N");
 }
 
+// Checkpoints of an error of `variance`/N and a bias, seen against a reference.
+std::vector<ErrorPoint> against_a_reference(double bias) {
+  std::vector<ErrorPoint> points;
+  for (double spp = 8; spp <= 1024; spp *= 2) {
+    const double e = 1 / spp;
+    points.push_back({spp, spp, e, .9 * e, 1.1 * e, e + bias * bias});
+  }
+  return points;
+}
+
+TEST(Judgement, TellsABiasFloorOnlyWhereTheTrueErrorStays) {
+  using Kind = Judgement::Kind;
+  EXPECT_EQ(judge(against_a_reference(0), "").kind, Kind::converging);
+  EXPECT_EQ(judge(against_a_reference(.005), "").kind, Kind::converging);  // 2.5e-5 beside 9.8e-4: within the interval
+  const Judgement floor = judge(against_a_reference(.05), "");             // 2.5e-3
+  EXPECT_EQ(floor.kind, Kind::bias_floor);
+  EXPECT_THAT(floor.words, HasSubstr("0.0035"));
+  // Twice the estimate throughout, but falling with it: an estimate that is off, and no floor.
+  auto falling = against_a_reference(0);
+  for (ErrorPoint& p : falling) p.true_relmse = 2 * p.relmse;
+  EXPECT_EQ(judge(falling, "").kind, Kind::converging);
+}
+
+// Gaussian jobs with a reference that has no bias: the true error is another draw of the same variance.
+TEST(Judgement, SeesNoFloorWhereThereIsNone) {
+  int floors = 0;
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    Job job(400, 9000 + i), realised(400, 20000 + i);
+    auto points = checkpoints(job, 9);
+    const auto truth = checkpoints(realised, 9);
+    for (std::size_t k = 0; k < points.size(); ++k) points[k].true_relmse = truth[k].relmse;
+    floors += judge(points, "").kind == Judgement::Kind::bias_floor;
+  }
+  EXPECT_LE(floors, 1);  // four standard deviations each: one of 200 is a chance of .6 %
+}
+
+TEST(Judgement, PutsDoubtFirst) {
+  EXPECT_EQ(judge(against_a_reference(.05), "don't trust yet: ...").kind, Judgement::Kind::heavy_tail);
+  EXPECT_EQ(judge({}, "").kind, Judgement::Kind::early);
+  Job slow(4000, 1, .6), fast(4000, 3, 1.5);
+  const Judgement tail = judge(checkpoints(slow, 9), "");
+  EXPECT_EQ(tail.kind, Judgement::Kind::heavy_tail);
+  EXPECT_THAT(tail.words, HasSubstr("don't trust yet"));
+  EXPECT_EQ(judge(checkpoints(fast, 9), "").kind, Judgement::Kind::fast);
+}
+
 TEST(Forecast, OfAJobThatIsThereIsZero) {
   Job job(100, 1);
   const auto points = checkpoints(job, 6);

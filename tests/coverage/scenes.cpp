@@ -1,0 +1,85 @@
+#include "tests/coverage/scenes.h"
+
+#include <fmt/format.h>
+
+namespace ls::test {
+namespace {
+
+std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9", int depth = 8) {
+  return fmt::format(R"(<scene version="3.0.0">
+<integrator type="volpath"><integer name="max_depth" value="{}"/><integer name="rr_depth" value="5"/></integrator>
+<sensor type="perspective"><float name="fov" value="39"/>
+  <transform name="to_world"><lookat origin="{}" target="0, 0, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
+<bsdf type="twosided" id="white"><bsdf type="diffuse"><rgb name="reflectance" value="0.73, 0.73, 0.73"/></bsdf></bsdf>
+<bsdf type="twosided" id="red"><bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.07, 0.05"/></bsdf></bsdf>
+<bsdf type="twosided" id="green"><bsdf type="diffuse"><rgb name="reflectance" value="0.12, 0.45, 0.1"/></bsdf></bsdf>
+{}</scene>)",
+                     depth, eye, inside);
+}
+
+std::string cube(double sx, double sy, double sz, double x, double y, double z, const std::string& rest) {
+  return fmt::format(R"(<shape type="cube"><transform name="to_world"><scale x="{}" y="{}" z="{}"/><translate x="{}" y="{}" z="{}"/></transform>{}</shape>
+)",
+                     sx, sy, sz, x, y, z, rest);
+}
+
+std::string sphere(double x, double y, double z, double radius, const std::string& rest) {
+  return fmt::format(R"(<shape type="sphere"><point name="center" x="{}" y="{}" z="{}"/><float name="radius" value="{}"/>{}</shape>
+)",
+                     x, y, z, radius, rest);
+}
+
+std::string ref(const std::string& id) { return fmt::format(R"(<ref id="{}"/>)", id); }
+
+std::string sky(double level) {
+  return fmt::format(R"(<emitter type="constant"><rgb name="radiance" value="{0}, {0}, {0}"/></emitter>
+)",
+                     level);
+}
+
+// In front of the room and above what the camera sees.
+std::string lamp(double level, double radius = .25) {
+  return sphere(.2, 1.15, 1.7, radius,
+                fmt::format(R"(<emitter type="area"><rgb name="radiance" value="{}, {}, {}"/></emitter>)", level,
+                            .83 * level, .61 * level));
+}
+
+std::string room(const std::string& light) {
+  return cube(1.1, .05, 1.1, 0, -1.05, 0, ref("white")) + cube(1.1, .05, 1.1, 0, 1.05, 0, ref("white")) +
+         cube(1, 1, .05, 0, 0, -1.05, ref("white")) + cube(.05, 1, 1.1, -1.05, 0, 0, ref("red")) +
+         cube(.05, 1, 1.1, 1.05, 0, 0, ref("green")) + cube(.3, .6, .3, -.4, -.4, -.3, ref("white")) +
+         sphere(.45, -.65, .2, .35, ref("white")) + light;
+}
+
+std::string fog(double sigma, double albedo, double half) {
+  return fmt::format(R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{0}, {0}, {0}"/><rgb name="albedo" value="{1}, {1}, {1}"/><phase type="hg"><float name="g" value="0.2"/></phase></medium>
+)",
+                     sigma, albedo) +
+         cube(half, half, half, 0, 0, 0, R"(<bsdf type="null"/><ref name="interior" id="fog"/>)");
+}
+
+// Light through a ball of glass falls on the floor along paths that only chance finds.
+std::string caustic() {
+  return cube(1.1, .05, 1.1, 0, -1.05, 0, ref("white")) + cube(1, 1, .05, 0, 0, -1.05, ref("white")) +
+         sphere(0, -.3, 0, .4, R"(<bsdf type="dielectric"><float name="int_ior" value="1.5"/></bsdf>)") +
+         sphere(.3, 1.4, .2, .03, R"(<emitter type="area"><rgb name="radiance" value="2000, 2000, 2000"/></emitter>)");
+}
+
+}  // namespace
+
+const std::vector<CoverageScene>& coverage_scenes() {
+  static const std::vector<CoverageScene> all = {
+      {"surfaces, smooth", scene(cube(1.5, .05, 1.5, 0, -1.05, 0, ref("white")) +
+                                 sphere(-.4, -.5, 0, .5, ref("red")) + sphere(.6, -.6, .3, .4, ref("green")) + sky(.8))},
+      {"surfaces, noisy", scene(room(lamp(40, .1)))},
+      {"surfaces, dark", scene(room(lamp(1, .1))), 16},
+      {"media, smooth", scene(fog(.5, .9, .9) + sky(.7))},
+      {"media, noisy", scene(room(lamp(60)) + fog(.6, .9, .995))},
+      {"media, dark", scene(fog(2, .95, .9) + lamp(2)), 16},
+      {"fireflies", scene(caustic()), 32, true},
+  };
+  return all;
+}
+
+}  // namespace ls::test

@@ -1,0 +1,20 @@
+// Small scenes for the question whether an image's error is what its estimate says.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace ls::test {
+
+struct CoverageScene {
+  std::string name;
+  std::string xml;          // Mitsuba; its film has no say
+  std::uint64_t spp = 32;
+  bool fireflies = false;   // rare bright samples: what there is of an estimate is not to be trusted
+};
+
+// Smooth and noisy, surfaces and media, light and dark; fireflies last.
+const std::vector<CoverageScene>& coverage_scenes();
+
+}  // namespace ls::test
