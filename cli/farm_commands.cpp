@@ -20,7 +20,7 @@ using nlohmann::json;
 
 struct Flags {
   FarmOptions farm;
-  std::string id, frame, spp, target_error, out, report;
+  std::string id, frame, spp, target_error, out, report, html;
   bool quiet = false;
 };
 using Run = int (*)(FarmApi& api, const Flags& flags);
@@ -73,7 +73,9 @@ int watch(FarmApi& api, const Flags& flags) {
 }
 
 int fetch(FarmApi& api, const Flags& flags) {
-  return fetch_results(api, flags.id, {flags.out, flags.report, flags.farm.json, false});
+  if (flags.out.empty() && flags.report.empty() && flags.html.empty())
+    return usage_error("say what to fetch: -o OUT.exr, --report REPORT.json or --html REPORT.html");
+  return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
 // A frame of a sequence is a job of its own name.
@@ -130,8 +132,9 @@ void add_farm_commands(CLI::App& app, Action& action) {
   auto fetching = std::make_shared<Flags>();
   CLI::App* fetch_command =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
-  fetch_command->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")->required()->type_name("OUT.exr");
+  fetch_command->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
   fetch_command->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")->type_name("REPORT.json");
+  fetch_command->add_option("--html", fetching->html, "its report as a page; of a sequence every frame's, with # in the name")->type_name("REPORT.html");
   plain("workers", "the workers of a farm", workers, false);
 }
 

@@ -24,6 +24,9 @@ ProgressFigures figures_of(const json& job) {
   f.relmse = number_field(job, "relmse");
   f.eta_seconds = number_field(job, "eta_seconds");
   f.eta_ci95 = pair_field(job, "eta_ci95");
+  f.relmse_ci95 = pair_field(job, "relmse_ci95");
+  f.target_error = number_field(job, "target_error");
+  f.eta_with_more = number_field(job, "eta_with_8_more");
   f.trouble = text_field(job, "error");
   const double elapsed = number_field(job, "elapsed_seconds").value_or(0);
   if (const auto size = pair_field(job, "size"); elapsed > 0 && size)

@@ -35,11 +35,12 @@ Result<Plan> plan_sequence(const std::string& id, const json& frames, const Resu
   const auto list = frames.find("list");
   if (list == frames.end() || !list->is_array())
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
-  if (!wanted.image.empty() && !has_frame_number(wanted.image) && list->size() != 1)
-    return fail(Errc::invalid_argument,
-                fmt::format("-o {}: job {} has {} frames: give a name with # for their numbers, out_####.exr "
-                            "say, or choose one by --frame N",
-                            wanted.image, id, list->size()));
+  for (const auto& [option, name] : {std::pair("-o", wanted.image), std::pair("--html", wanted.html)})
+    if (!name.empty() && !has_frame_number(name) && list->size() != 1)
+      return fail(Errc::invalid_argument,
+                  fmt::format("{} {}: job {} has {} frames: give a name with # for their numbers, out_#### say, "
+                              "or choose one by --frame N",
+                              option, name, id, list->size()));
   Plan plan;
   const bool reports = has_frame_number(wanted.report);
   for (const json& frame : *list) {
@@ -55,6 +56,7 @@ Result<Plan> plan_sequence(const std::string& id, const json& frames, const Resu
     };
     if (!wanted.image.empty()) add("-o", wanted.image, "/image.exr");
     if (reports) add("--report", wanted.report, "/report");
+    if (!wanted.html.empty()) add("--html", wanted.html, "/report.html");
   }
   if (!wanted.report.empty() && !reports)
     plan.downloads.push_back({job_path(id) + "/report", "--report", wanted.report});
@@ -65,6 +67,7 @@ Plan plan_image(const std::string& id, const Results& wanted) {
   Plan plan;
   if (!wanted.image.empty()) plan.downloads.push_back({job_path(id) + "/image.exr", "-o", wanted.image});
   if (!wanted.report.empty()) plan.downloads.push_back({job_path(id) + "/report", "--report", wanted.report});
+  if (!wanted.html.empty()) plan.downloads.push_back({job_path(id) + "/report.html", "--html", wanted.html});
   return plan;
 }
 
@@ -73,7 +76,7 @@ Plan plan_image(const std::string& id, const Results& wanted) {
 Result<void> check_outputs(const std::string& option, const std::string& name,
                            const std::optional<FrameRange>& frames) {
   if (!frames) return check_output(option, name);
-  if (option == "-o")
+  if (option != "--report")
     if (auto ok = check_numbered(option, name, *frames); !ok) return ok;
   for (const std::uint32_t frame : frames->frames()) {
     if (auto ok = check_output(option, numbered(name, frame)); !ok) return ok;
@@ -83,7 +86,7 @@ Result<void> check_outputs(const std::string& option, const std::string& name,
 }
 
 int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
-  if (wanted.image.empty() && wanted.report.empty()) return kOk;
+  if (wanted.image.empty() && wanted.report.empty() && wanted.html.empty()) return kOk;
   const auto call = [&](auto request) { return wanted.patient ? patiently(request) : request(); };
   const auto job = call([&] { return api.get(job_path(id)); });
   if (!job) return say_rejected(job.error());

@@ -9,7 +9,7 @@
 namespace ls::cli {
 
 struct Results {
-  std::string image, report;  // names of files; empty: not wanted. A run of # is the number of a frame
+  std::string image, report, html;  // names of files; empty: not wanted. A run of # is the number of a frame
   bool json = false;          // each file as a line of JSON on stdout
   bool patient = false;       // a coordinator that is away for a while is waited for
 };

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "cli/html_report.h"
 #include "cli/interrupt.h"
 #include "cli/local_farm.h"
 #include "cli/local_world.h"
@@ -55,7 +56,10 @@ ProgressFigures figures_of(const JobView& job) {
           job.eta_seconds,
           {},
           {},
-          job.eta_ci95};
+          job.eta_ci95,
+          job.error_now ? std::optional(std::pair(job.error_now->relmse_lo, job.error_now->relmse_hi))
+                        : std::nullopt,
+          job.target_error};
 }
 
 void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {
@@ -169,6 +173,8 @@ class LocalRender {
     if (!report) return tl::unexpected(report.error());
     if (options_.report)
       if (auto saved = save_result(*options_.report, *report); !saved) return saved;
+    if (options_.html)
+      if (auto saved = save_html_report(*options_.html, coordinator, job_, *report); !saved) return saved;
     if (!options_.quiet && say_summary)
       say(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
     say_report_health(*report);

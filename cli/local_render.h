@@ -14,7 +14,7 @@ struct LocalRenderOptions {
   int threads = 1;
   bool isolate = false, quiet = false, strict = false;
   std::filesystem::path out;
-  std::optional<std::filesystem::path> report, partial_dir, reference;
+  std::optional<std::filesystem::path> report, html, partial_dir, reference;
 };
 // Returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);

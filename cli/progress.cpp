@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 #include "cli/say.h"
 #include "common/base/plain_text.h"
@@ -16,13 +17,33 @@ namespace ls::cli {
 namespace {
 
 constexpr int kBarCells = 16;
-constexpr int kNarrowestWithBar = 70;  // columns of the terminal
 
 std::string show_rate(double per_second) {
   constexpr std::array kUnits{"", " k", " M", " G"};
   std::size_t unit = 0;
   while (per_second >= 1000 && unit + 1 < kUnits.size()) per_second /= 1000, ++unit;
   return fmt::format("{:.3g}{} samples/s", per_second, kUnits[unit]);
+}
+
+struct Part {
+  int rank;  // what has the highest goes first where there is no room; 0: stays
+  std::string text;
+};
+
+std::string fitted(std::vector<Part> parts, int columns) {
+  const auto joined = [&] {
+    std::string line;
+    for (const Part& part : parts) line += part.text;
+    return line;
+  };
+  const auto room = static_cast<std::size_t>(std::max(columns, 1)) - 1;
+  const auto by_rank = [](const Part& a, const Part& b) { return a.rank < b.rank; };
+  while (columns > 0 && joined().size() > room) {
+    const auto least = std::max_element(parts.begin(), parts.end(), by_rank);
+    if (least->rank == 0) return joined().substr(0, room);
+    parts.erase(least);
+  }
+  return joined();
 }
 
 int terminal_columns() {
@@ -34,23 +55,26 @@ int terminal_columns() {
 
 std::string progress_line(const ProgressFigures& f, int columns) {
   const double part = std::isfinite(f.progress) ? std::clamp(f.progress, 0.0, 1.0) : 0;
-  std::string line = fmt::format("{:3.0f} %", std::floor(100 * part));
-  if (columns >= kNarrowestWithBar) {
-    const int full = static_cast<int>(std::floor(kBarCells * part));
-    line += fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' '));
-  }
-  if (f.state != "running") line += " " + plain_text(f.state);
-  if (!f.frames.empty()) line += " " + plain_text(f.frames);
-  line += fmt::format(" {:.1f} spp", f.spp_done);
-  if (f.samples_per_second > 0) line += "  " + show_rate(f.samples_per_second);
-  if (f.relmse) line += fmt::format("  relMSE {:.3g}", *f.relmse);
-  if (f.eta_seconds) line += fmt::format("  {} left", show_seconds(*f.eta_seconds));
+  const int full = static_cast<int>(std::floor(kBarCells * part));
+  std::vector<Part> parts;
+  const auto add = [&](int rank, std::string text) { parts.push_back({rank, std::move(text)}); };
+  add(0, fmt::format("{:3.0f} %", std::floor(100 * part)));
+  add(2, fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' ')));
+  if (f.state != "running") add(0, " " + plain_text(f.state));
+  if (!f.frames.empty()) add(0, " " + plain_text(f.frames));
+  add(0, fmt::format(" {:.1f} spp", f.spp_done));
+  if (f.samples_per_second > 0) add(5, "  " + show_rate(f.samples_per_second));
+  if (f.relmse) add(0, fmt::format("  relMSE {:.3g}", *f.relmse));
+  if (f.relmse && f.relmse_ci95)
+    add(3, fmt::format(" ({:.3g} to {:.3g})", f.relmse_ci95->first, f.relmse_ci95->second));
+  if (f.relmse && f.target_error) add(0, fmt::format(", target {:g}", *f.target_error));
+  if (f.eta_seconds) add(0, fmt::format("  {} left", show_seconds(*f.eta_seconds)));
   if (f.eta_seconds && f.eta_ci95)
-    line += fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second));
-  if (!f.trouble.empty()) line += "  " + plain_text(f.trouble);
-  if (columns > 0 && line.size() >= static_cast<std::size_t>(columns))
-    line.resize(static_cast<std::size_t>(columns) - 1);
-  return line;
+    add(1, fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second)));
+  if (f.eta_seconds && f.eta_with_more)
+    add(4, fmt::format(", {} with 8 more", show_seconds(*f.eta_with_more)));
+  if (!f.trouble.empty()) add(0, "  " + plain_text(f.trouble));
+  return fitted(parts, columns);
 }
 
 ProgressBar::ProgressBar(bool quiet) : shown_(!quiet && ::isatty(STDERR_FILENO) == 1) {}

@@ -17,7 +17,7 @@ namespace ls::cli {
 namespace {
 
 struct Flags {
-  std::string scene, out, threads, pixel, sample, reference, report, partial_dir;
+  std::string scene, out, threads, pixel, sample, reference, report, html, partial_dir;
   JobOptions job;
   bool isolate = false, quiet = false;
 };
@@ -44,6 +44,7 @@ Result<LocalRenderOptions> options_of(const Flags& flags) {
   const char* ending = options.spec.frames ? "_####.exr" : ".exr";
   options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ending : flags.out;
   options.report = path_of(flags.report);
+  options.html = path_of(flags.html);
   options.partial_dir = path_of(flags.partial_dir);
   options.reference = path_of(flags.reference);
   return options;
@@ -71,6 +72,8 @@ int run(const Flags& flags) {
     if (const auto ok = check_output("-o", options->out); !ok) return say_error(ok.error());
     if (options->report)
       if (const auto ok = check_output("--report", *options->report); !ok) return say_error(ok.error());
+    if (options->html)
+      if (const auto ok = check_output("--html", *options->html); !ok) return say_error(ok.error());
   }
   const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict,
                                       frames ? std::optional(frames->first) : std::nullopt);
@@ -98,6 +101,8 @@ void add_render(CLI::App& app, Action& action) {
       ->type_name("REF.exr");
   render->add_option("--report", flags->report, "write what it cost and how large the error is, as JSON")
       ->type_name("REPORT.json");
+  render->add_option("--html", flags->html, "the same as a page, with image, curves and maps in it")
+      ->type_name("REPORT.html");
   render
       ->add_option("--partial-dir", flags->partial_dir,
                    "keep every unit's partial image: `lightshaft merge` folds them")

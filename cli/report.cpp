@@ -17,6 +17,19 @@ using nlohmann::json;
 
 double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
 
+// What less error would cost.
+std::string outlook(const json& report) {
+  const auto forecast = report.find("forecast");
+  if (forecast == report.end() || !forecast->is_object()) return "";
+  const double more = number(*forecast, "core_seconds");
+  if (!(more > 0)) return "";
+  std::string line =
+      fmt::format("; {:.3g} would cost {} more on one core", number(*forecast, "target"), show_seconds(more));
+  if (const auto ci = pair_field(*forecast, "core_seconds_ci95"))
+    line += fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second));
+  return line;
+}
+
 }  // namespace
 
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts) {
@@ -42,7 +55,7 @@ std::string report_summary(const std::string& report) {
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
   if (text_field(j, "verdict_kind") != "early" || j.value("trusted", true) == false)
     line += ": " + text_field(j, "verdict");
-  return line;
+  return line + outlook(j);
 }
 
 void say_report_health(const std::string& report) {
@@ -50,9 +63,10 @@ void say_report_health(const std::string& report) {
   if (!j.is_object()) return;
   say_health(j);
   if (const auto cut = number(j, "clamped_values"); cut > 0)
-    say(fmt::format("{:.0f} values are above 65504, the largest of a half-precision image, and stand in it as that; "
-                    "--float keeps them",
-                    cut));
+    say(fmt::format(
+        "{:.0f} values are above 65504, the largest of a half-precision image, and stand in it as that; "
+        "--float keeps them",
+        cut));
 }
 
 std::string pixels_digest(const std::string& report) {

@@ -16,7 +16,7 @@ LocalRenderOptions of_frame(const LocalRenderOptions& options, std::uint32_t fra
   LocalRenderOptions o = options;
   o.spec.frames = FrameRange{frame, frame, 1};
   o.out = of_frame(options.out, frame);
-  for (auto* path : {&o.report, &o.partial_dir, &o.reference})
+  for (auto* path : {&o.report, &o.html, &o.partial_dir, &o.reference})
     if (*path) *path = of_frame(**path, frame);
   return o;
 }
@@ -33,6 +33,8 @@ Result<void> check_outputs(const FrameRange& frames, const LocalRenderOptions& o
   if (auto ok = check("-o", options.out, true); !ok) return ok;
   if (options.report)
     if (auto ok = check("--report", *options.report, true); !ok) return ok;
+  if (options.html)
+    if (auto ok = check("--html", *options.html, true); !ok) return ok;
   return options.partial_dir ? check("--partial-dir", *options.partial_dir, false) : Result<void>{};
 }
 

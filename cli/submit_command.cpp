@@ -17,7 +17,7 @@ namespace ls::cli {
 namespace {
 
 struct Flags {
-  std::string scene, out, report, reference;
+  std::string scene, out, report, html, reference;
   JobOptions job;
   FarmOptions farm;
   bool wait = false, quiet = false;
@@ -63,7 +63,7 @@ int wait_and_fetch(const std::string& id, const Flags& flags) {
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return say_rejected(end.error());
   if (const int code = say_end(*end); code != kOk) return code;
-  return fetch_results(*api, id, {flags.out, flags.report, false, true});
+  return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
 }
 
 // Sent before the job that names it.
@@ -85,7 +85,8 @@ FarmApi::Answer<void> send_reference(const Flags& flags, JobSpec& spec) {
 int run(const Flags& flags) {
   auto spec = flags.job.parse();
   if (!spec) return say_error(spec.error());
-  for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report)})
+  for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report),
+                                     std::pair("--html", flags.html)})
     if (!file.empty())
       if (const auto ok = check_outputs(option, file, spec->frames); !ok) return say_error(ok.error());
   if (!flags.reference.empty())
@@ -96,7 +97,7 @@ int run(const Flags& flags) {
   const std::string id = text_field(*job, "id");
   if (id.empty()) return say_error({Errc::internal, "the coordinator's answer names no job"});
   print(flags.farm.json ? job->dump() : plain_text(id));
-  if (!flags.wait && flags.out.empty() && flags.report.empty()) return kOk;
+  if (!flags.wait && flags.out.empty() && flags.report.empty() && flags.html.empty()) return kOk;
   return wait_and_fetch(id, flags);
 }
 
@@ -125,6 +126,7 @@ void add_submit(CLI::App& app, Action& action) {
   submit->add_flag("--wait", flags->wait, "until the job is done");
   submit->add_option("-o,--output", flags->out, "wait, then fetch the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
   submit->add_option("--report", flags->report, "wait, then fetch the report; with # in its name, every frame's")->type_name("REPORT.json");
+  submit->add_option("--html", flags->html, "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")->type_name("REPORT.html");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
   submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }

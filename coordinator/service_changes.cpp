@@ -7,6 +7,7 @@
 
 #include "common/base/log.h"
 #include "coordinator/service_impl.h"
+#include "coordinator/views.h"
 
 namespace ls::coordinator {
 namespace {
@@ -196,6 +197,7 @@ Result<void> Service::remove(const JobId& id) {
   if (auto removed = store_->remove_job(id); !removed) return removed;
   std::erase(order_, id);
   drop_locked(entry);
+  hub_->publish("job", job_removed_json(id), id.value);
   return {};
 }
 

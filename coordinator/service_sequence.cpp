@@ -276,6 +276,7 @@ Result<void> Service::remove_sequence_locked(const JobId& id, const Sequence& se
   sequences_.erase(id);
   std::erase(order_, id);
   for (const EntryPtr& frame : frames) drop_locked(frame);
+  hub_->publish("job", job_removed_json(id), id.value);
   return {};
 }
 

@@ -148,4 +148,6 @@ std::string worker_gone_json(const WorkerId& worker) {
   return dump(json{{"id", worker.value}, {"state", "gone"}});
 }
 
+std::string job_removed_json(const JobId& job) { return dump(json{{"id", job.value}, {"state", "removed"}}); }
+
 }  // namespace ls::coordinator

@@ -20,5 +20,6 @@ std::string convergence_csv(const std::vector<ConvergencePoint>& points);  // wi
 std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& rect, std::string_view state,
                             std::uint64_t spp, std::string_view worker);
 std::string worker_gone_json(const WorkerId& worker);
+std::string job_removed_json(const JobId& job);  // of a `job` event, the last of this job
 
 }  // namespace ls::coordinator

@@ -16,6 +16,7 @@ constexpr double kShort = 2.2;    // decades; on a shorter axis 2 and 5 are labe
 constexpr double kFine = 4.5;     // decades; on a shorter axis 2 to 9 have lines
 constexpr std::size_t kMostLabels = 8;
 constexpr std::size_t kFewTimes = 4;  // labels of time, before those between are added
+constexpr double kFarthest = 300;     // decades from 1: beyond it doubles end
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 
 bool inside(const LogAxis& axis, double value) { return value >= axis.lo && value <= axis.hi; }
@@ -58,7 +59,7 @@ std::vector<Tick> time_ticks(const LogAxis& axis) {
 }
 
 std::vector<Tick> plain_ticks(const LogAxis& axis) {
-  const double decades = std::log10(axis.hi / axis.lo);
+  const double decades = std::log10(axis.hi) - std::log10(axis.lo);
   const int every = static_cast<int>(decades / kMostLabels) + 1;
   std::vector<Tick> all;
   const int first = static_cast<int>(std::floor(std::log10(axis.lo)));
@@ -77,16 +78,21 @@ std::vector<Tick> plain_ticks(const LogAxis& axis) {
 }  // namespace
 
 double LogAxis::at(double value) const {
-  return from + std::log10(value / lo) / std::log10(hi / lo) * (to - from);
+  const double a = std::log10(lo), b = std::log10(hi);
+  return from + (std::log10(value) - a) / (b - a) * (to - from);
 }
 
 LogAxis log_axis(double lo, double hi, double from, double to) {
   const double a = std::log10(lo), b = std::log10(hi);
   const double margin = std::max((1 - (b - a)) / 2, kMargin * (b - a));
-  return {std::pow(10.0, a - margin), std::pow(10.0, b + margin), from, to};
+  const auto end = [](double exponent) {
+    return std::pow(10.0, std::clamp(exponent, -kFarthest, kFarthest));
+  };
+  return {end(a - margin), end(b + margin), from, to};
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
+  if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};  // none that log_axis() made
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }
 

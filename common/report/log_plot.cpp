@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
+constexpr double kHalfLabel = 25;  // of the widest label of time, which must not leave the drawing
 constexpr double kLetter = 7.4;    // mean width of one, in the legend
 constexpr double kFarthest = 100;  // times the last x: a forecast beyond it is not drawn
 constexpr std::string_view kNothing =
@@ -138,8 +139,8 @@ class Drawing {
       fmt::format_to(out(), R"(<path{} d="M{:.1f} {:.1f}V{:.1f}"/>)", t.major ? R"( class="major")" : "", x,
                      top, bottom);
       if (!t.label.empty())
-        fmt::format_to(out(), R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)", x,
-                       bottom + 19, t.label);
+        fmt::format_to(out(), R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
+                       std::min(x, kWidth - kHalfLabel), bottom + 19, t.label);
     }
     for (const Tick& t : ticks(y_, AxisUnit::plain)) {
       const double y = y_.at(t.value);

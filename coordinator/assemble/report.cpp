@@ -62,6 +62,22 @@ json point(const ConvergencePoint& p) {
   return j;
 }
 
+// What it costs to come down to the job's target or, where there is none to come down to, to half of the error.
+json forecast(const ReportFacts& facts) {
+  if (facts.convergence.empty()) return {};
+  const double now = facts.convergence.back().error.relmse;
+  const auto& asked = facts.job.spec.target_error;
+  const bool goes_on = asked && *asked < now;
+  const double target = goes_on ? *asked : now / 2;
+  const auto f = forecast_of(error_points(facts.convergence), target);
+  if (!f) return {};
+  return {{"target", number(target)},
+          {"asked", goes_on},
+          {"spp", spp_value(f->spp)},
+          {"core_seconds", number(f->core_seconds)},
+          {"core_seconds_ci95", {number(f->core_seconds_lo), number(f->core_seconds_hi)}}};
+}
+
 }  // namespace
 
 TimeSplit split_of(const JobTotals& totals) {
@@ -94,6 +110,9 @@ std::string report_json(const ReportFacts& facts) {
   for (const auto& p : facts.convergence) curve.push_back(point(p));
   if (job.spec.target_error) put_forecasts(curve, facts.convergence, *job.spec.target_error);
   json j{{"job", job.id.value},
+         {"name", job.name},
+         {"submitted_unix", number(job.submitted_unix)},
+         {"target_error", job.spec.target_error ? number(*job.spec.target_error) : json()},
          {"scene", job.scene.hex()},
          {"state", to_string(job.state)},
          {"size", {job.settings.size.width, job.settings.size.height}},
@@ -136,6 +155,7 @@ std::string report_json(const ReportFacts& facts) {
   j["slope"] = trend ? number(-trend->slope) : json();
   j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
   j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
+  j["forecast"] = forecast(facts);
   j["trusted"] = known && e.trusted;
   const Judgement judgement = judge(error_points(facts.convergence), e.verdict);
   j["verdict"] = judgement.words;

@@ -34,6 +34,9 @@ Response get_convergence(Api&, const Request&, const Params&);
 Response get_tiles(Api&, const Request&, const Params&);
 Response get_log(Api&, const Request&, const Params&);
 
+// handlers_pages.cpp
+Response get_report_page(Api&, const Request&, const Params&);
+
 // handlers_blobs.cpp; PUT is streamed
 Response post_blobs_missing(Api&, const Request&, const Params&);
 Response head_blob(Api&, const Request&, const Params&);

@@ -39,6 +39,7 @@ constexpr std::array kRoutes = {
     Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Lane::slow, kNone, 0, get_error_png},
     Route{Method::get, "/api/v1/jobs/{id}/samples.png", kToken, Lane::slow, kNone, 0, get_samples_png},
     Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Lane::slow, kNone, 0, get_report},
+    Route{Method::get, "/api/v1/jobs/{id}/report.html", kToken, Lane::slow, kNone, 0, get_report_page},
     Route{Method::get, "/api/v1/jobs/{id}/convergence.csv", kToken, Lane::quick, kNone, 0, get_convergence},
     Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Lane::quick, kNone, 0, get_tiles},
     Route{Method::get, "/api/v1/jobs/{id}/log", kToken, Lane::quick, kNone, 0, get_log},

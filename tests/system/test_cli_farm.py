@@ -40,6 +40,9 @@ def test_submit_renders_the_pixels_of_render(rendering, tmp_path):
     assert (tmp_path / "farm.exr").stat().st_size > 1000
     assert call(rendering, "fetch", job, "-o", tmp_path / "again.exr").returncode == 0
     assert (tmp_path / "again.exr").read_bytes() == (tmp_path / "farm.exr").read_bytes()
+    call(rendering, "fetch", job, "--html", tmp_path / "farm.html")
+    assert alone in (tmp_path / "farm.html").read_text()
+    assert "--html" in call(rendering, "fetch", job, code=2).stderr, "it has to be said what"
 
 
 def test_a_farm_compares_with_a_reference_as_render_does(rendering, tmp_path):

@@ -99,6 +99,22 @@ def test_the_report_has_all_of_the_contract(fog, expected, tmp_path):
     assert "true_rmse" not in figures
 
 
+def test_the_report_comes_as_a_page_of_its_own(fog, tmp_path):
+    page = tmp_path / "report.html"
+    render(fog, tmp_path, "--report", tmp_path / "report.json", "--html", page, "--quiet")
+    text, figures = page.read_text(), load(tmp_path / "report.json")
+
+    assert figures["name"] == fog.name and f"<h1>{fog.name}</h1>" in text
+    assert figures["pixels_sha256"] in text and "src=\"data:image/png;base64,iVBOR" in text
+    assert "<script" not in text and "http://" not in text.replace("http://www.w3.org/2000/svg", "") and "https://" not in text
+
+
+def test_a_page_that_cannot_be_written_is_told_before_rendering(fog, tmp_path):
+    said = lightshaft("render", fog, "-o", tmp_path / "out.exr", "--spp", SPP, "--html", tmp_path / "no" / "such.html", code=2).stderr
+
+    assert "--html" in said and not (tmp_path / "out.exr").exists()
+
+
 def test_a_reference_gives_the_true_error(fog, tmp_path):
     reference = tmp_path / "reference.exr"
     lightshaft("render", fog, "-o", reference, "--spp", SPP, "--float")

@@ -88,7 +88,7 @@ def test_ten_frames_are_one_job_on_two_workers(farm, smoke, expected, tmp_path):
         assert image == (tmp_path / f"f_{frame:04}.exr").read_bytes()
         one = farm.get(f"/api/v1/jobs/{job}?frame={frame}")
         assert (one["id"], one["sequence"], one["frame"]) == (f"{job}-frame{frame}", job, frame)
-    for what in ("image.png", "image.exr", "tiles", "convergence.csv"):
+    for what in ("image.png", "image.exr", "report.html", "tiles", "convergence.csv"):
         with pytest.raises(HttpError, match="1-10") as refused:
             farm.get(f"/api/v1/jobs/{job}/{what}")
         assert refused.value.status == 400
@@ -99,6 +99,9 @@ def test_ten_frames_are_one_job_on_two_workers(farm, smoke, expected, tmp_path):
     assert "1-10: 10 of 10 done" in shown
     lightshaft("fetch", job, "--frame", 3, "-o", tmp_path / "third.exr", env=environment(farm))
     assert (tmp_path / "third.exr").read_bytes() == (tmp_path / "f_0003.exr").read_bytes()
+    lightshaft("fetch", job, "--html", tmp_path / "f_##.html", env=environment(farm))
+    assert len(list(tmp_path.glob("f_??.html"))) == 10
+    assert "--frame N" in lightshaft("fetch", job, "--html", tmp_path / "one.html", env=environment(farm), code=2).stderr
     assert "--frame N" in lightshaft("fetch", job, "-o", tmp_path / "one.exr", env=environment(farm), code=2).stderr
 
 

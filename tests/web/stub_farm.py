@@ -50,6 +50,7 @@ class StubFarm:
         self.report = {"convergence": []}
         self.image = png(64, 48, (200, 120, 40))
         self.images = {}  # by job, before `image`
+        self.maps = {"error": png(64, 48, (150, 30, 110)), "samples": png(64, 48, (20, 10, 60))}
         self.blobs = {}
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
@@ -86,6 +87,11 @@ class StubFarm:
         with self.lock:
             self.jobs[id] = {**self.jobs[id], **more}
         self.emit("job", self.jobs[id])
+
+    def remove(self, id):
+        with self.lock:
+            del self.jobs[id]
+        self.emit("job", {"id": id, "state": "removed"})
 
     def drop_streams(self):
         with self.lock:
@@ -179,6 +185,8 @@ def _handler(farm):
                 return self._send(200, farm.report)
             if what == "image.png":
                 return self._send(200, farm.images.get(parts[0], farm.image), "image/png")
+            if what.removesuffix(".png") in farm.maps:
+                return self._send(200, farm.maps[what.removesuffix(".png")], "image/png")
             return self._problem(404, "nothing here")
 
         def _patch_jobs(self, parts, body):

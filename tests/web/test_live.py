@@ -237,11 +237,11 @@ def test_the_error_plot_grows_with_the_report(farm, dashboard):
     page = dashboard("#/jobs/j-1")
     page.wait("document.querySelector('.plot-empty')")
 
-    farm.report = {"convergence": [{"seconds": s, "core_seconds": s, "spp": s, "rmse": 0.1, "relmse": 0.1 / s, "relmse_ci95": [0.09 / s, 0.11 / s]} for s in (1, 2, 4, 8)]}
+    farm.report = {"convergence": [{"seconds": s, "core_seconds": s, "spp": s, "rmse": 0.1, "relmse": 0.1 / s, "relmse_ci95": [0.09 / s, 0.11 / s]} for s in (1, 2, 4, 8)], "slope": -1.004, "slope_ci95": [-1.2, -0.8]}
     farm.change("j-1", progress=0.5)
 
     page.wait("document.querySelectorAll('.plot-point').length === 4")
-    assert "slope −1.00" in page.text(".plot-reading")
+    assert "slope −1.00 (−1.20 to −0.80)" in page.text(".plot-verdict")
 
 
 def test_a_job_that_is_not_there_says_so(farm, dashboard):

@@ -199,5 +199,42 @@ TEST(Report, HasEveryKeyOfTheContract) {
   EXPECT_EQ(j["stopped"], "spp");
 }
 
+// Error falling as 1/N exactly.
+ReportFacts falling() {
+  ReportFacts facts;
+  facts.job.name = "bath.xml";
+  for (double n = 2; n <= 64; n *= 2)
+    facts.convergence.push_back({n, 10 * n, n, {.1, 1 / n, .9 / n, 1.1 / n}});
+  return facts;
+}
+
+TEST(Report, SaysWhatTheTargetWillCost) {
+  ReportFacts facts = falling();
+  facts.job.spec.target_error = 1.0 / 256;
+  const auto j = nlohmann::json::parse(report_json(facts));
+  const auto& f = j["forecast"];
+
+  EXPECT_EQ(j["name"], "bath.xml");
+  EXPECT_EQ(j["target_error"], 1.0 / 256);
+  EXPECT_EQ(f["asked"], true);
+  EXPECT_EQ(f["target"], 1.0 / 256);
+  EXPECT_EQ(f["spp"], 256) << "the end of a round, and 1/256 is met there exactly";
+  EXPECT_NEAR(f["core_seconds"].get<double>(), 10 * (256 - 64), 1e-6);
+  EXPECT_LE(f["core_seconds_ci95"][0], f["core_seconds"]);
+  EXPECT_GE(f["core_seconds_ci95"][1], f["core_seconds"]);
+}
+
+TEST(Report, SaysWhatHalfTheErrorWouldCostWhereNoTargetIsAhead) {
+  ReportFacts reached = falling();
+  reached.job.spec.target_error = .5;
+  for (const ReportFacts& facts : {falling(), reached}) {
+    const auto f = nlohmann::json::parse(report_json(facts))["forecast"];
+    EXPECT_EQ(f["asked"], false);
+    EXPECT_EQ(f["target"], 1.0 / 128);
+    EXPECT_NEAR(f["core_seconds"].get<double>(), 10 * 64, 1e-6);
+  }
+  EXPECT_TRUE(nlohmann::json::parse(report_json(ReportFacts{}))["forecast"].is_null());
+}
+
 }  // namespace
 }  // namespace ls::coordinator

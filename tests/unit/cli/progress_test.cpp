@@ -22,6 +22,25 @@ TEST(ProgressLine, TellsShareRateErrorAndTimeLeft) {
   EXPECT_EQ(line, " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123  42 s left");
 }
 
+const ProgressFigures kForecast{"running", .426, 27.25,        3.14e6,           .01234, 252,
+                                "",        "",   {{186, 330}}, {{.0118, .0129}}, .001,   66};
+
+TEST(ProgressLine, TellsErrorAndForecastWithTheirIntervals) {
+  EXPECT_EQ(
+      progress_line(kForecast, 200),
+      " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  "
+      "4:12 left "
+      "(3:06 to 5:30), 1:06 with 8 more");
+}
+
+TEST(ProgressLine, KeepsErrorAndForecastOnANarrowTerminal) {
+  EXPECT_EQ(progress_line(kForecast, 90),
+            " 42 % [######          ] 27.2 spp  relMSE 0.0123, target 0.001  4:12 left (3:06 to 5:30)");
+  EXPECT_EQ(progress_line(kForecast, 80),
+            " 42 % 27.2 spp  relMSE 0.0123, target 0.001  4:12 left (3:06 to 5:30)");
+  EXPECT_EQ(progress_line(kForecast, 60), " 42 % 27.2 spp  relMSE 0.0123, target 0.001  4:12 left");
+}
+
 TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
   const std::string line = progress_line({"queued", 0, 0, 0, {}, {}, "no worker is connected"}, 120);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ls::report {
 namespace {
@@ -43,6 +44,18 @@ TEST(LogAxis, OneValueHasADecadeAroundIt) {
 
   EXPECT_NEAR(std::log10(axis.hi / axis.lo), 1, 1e-12);
   EXPECT_NEAR(axis.at(3), 50, 1e-9);
+}
+
+TEST(LogAxis, TheEndsOfDoublesAreNotLeft) {
+  const LogAxis axis = log_axis(1e-308, 1e308, 0, 100);
+
+  EXPECT_TRUE(std::isfinite(axis.hi) && axis.lo > 0);
+  EXPECT_NEAR(axis.at(1), 50, 1e-9);
+  for (const AxisUnit unit : {AxisUnit::seconds, AxisUnit::plain}) {
+    EXPECT_LE(ticks(axis, unit).size(), 1000u);
+    EXPECT_TRUE(ticks({1, std::numeric_limits<double>::infinity(), 0, 1}, unit).empty());
+    EXPECT_TRUE(ticks({0, 1, 0, 1}, unit).empty());
+  }
 }
 
 TEST(Ticks, OfALongAxisAreDecades) {

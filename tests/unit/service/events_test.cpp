@@ -113,6 +113,22 @@ TEST(Events, TellAJobFromSubmissionToItsEndWithGrowingIds) {
   EXPECT_GE(open_at(dir.path())->last_event_id(), last);
 }
 
+TEST(Events, TellThatAJobWasRemoved) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  Listener listener;
+  const auto handle = coordinator->subscribe(0, listener.callback());
+  const JobId job = submit(*coordinator);
+  ASSERT_TRUE(coordinator->remove(job)) << "cancels it";
+  listener.until_state("cancelled");
+
+  ASSERT_TRUE(coordinator->remove(job));
+
+  const auto last = listener.until_state("removed").back();
+  EXPECT_EQ(last.job, job.value) << "readers of this job's events hear it, too";
+  EXPECT_EQ(nlohmann::json::parse(last.data), (nlohmann::json{{"id", job.value}, {"state", "removed"}}));
+}
+
 TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
   JobView v;
   v.id.value = "j-1";

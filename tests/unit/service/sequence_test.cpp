@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <mutex>
 #include <set>
 
 #include "coordinator/intake.h"
+#include "coordinator/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -170,7 +172,19 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
   EXPECT_EQ(coordinator->job(id)->priority, 7);
   EXPECT_EQ(coordinator->resume(id).error().code, Errc::failed_precondition);
 
+  std::mutex mutex;
+  std::condition_variable heard;
+  std::string last;
+  const auto listening = coordinator->subscribe(0, [&](const StreamEvent& e) {
+    const std::lock_guard lock(mutex);
+    last = e.data;
+    heard.notify_all();
+  });
   ASSERT_TRUE(coordinator->remove(id));
+  {
+    std::unique_lock lock(mutex);
+    EXPECT_TRUE(heard.wait_for(lock, std::chrono::seconds(20), [&] { return last == job_removed_json(id); })) << last;
+  }
 
   EXPECT_TRUE(coordinator->jobs().empty());
   EXPECT_FALSE(coordinator->job(frame_job(id, 1)));

@@ -9,8 +9,9 @@ const job = (id, name, state, more = {}) => ({
 });
 
 const half = {
-  progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252,
+  progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252, eta_ci95: [186, 330], eta_with_8_more: 66,
   units_done: 1240, elapsed_seconds: 187, core_seconds: 742,
+  time: { load: 2.1, build: 9.4, render: 742, transfer: 6.2, merge: 3.9, idle: 21.5 },
 };
 
 export const jobs = [
@@ -18,7 +19,7 @@ export const jobs = [
   job("j-a04be6d1", "shafts.xml", "running", { progress: 0.071, spp_done: 36, relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], eta_seconds: 4310, submitted_unix: kNow - 900, size: [1920, 1080] }),
   job("j-22c81f09", "cloud.xml", "paused", { progress: 0.31, spp_done: 158.7, relmse: 0.000072, relmse_ci95: [0.000069, 0.000076], submitted_unix: kNow - 1500 }),
   job("j-5be0d7aa", "tint.xml", "queued", { spp: 4096, submitted_unix: kNow - 20 }),
-  job("j-91d2c3f4", "fogbox.xml", "done", { progress: 1, spp_done: 512, spp: 512, stopped: "error", rmse: 0.0152, relmse: 0.00098, relmse_ci95: [0.00094, 0.00102], target_error: 0.001, units_done: 2880, elapsed_seconds: 423, core_seconds: 1684, submitted_unix: kNow - 5400 }),
+  job("j-91d2c3f4", "fogbox.xml", "done", { progress: 1, spp_done: 512, spp: 512, stopped: "error", rmse: 0.0152, relmse: 0.00098, relmse_ci95: [0.00094, 0.00102], target_error: 0.001, units_done: 2880, elapsed_seconds: 423, core_seconds: 1684, time: { load: 2.1, build: 9.4, render: 1684, transfer: 12.2, merge: 8.1, idle: 33 }, submitted_unix: kNow - 5400 }),
   job("j-c6e8b510", "forge-v12.xml", "failed", {
     progress: 0.02, spp_done: 10, submitted_unix: kNow - 7200, elapsed_seconds: 6, core_seconds: 9,
     error: "unit (tile 37, round 3) ended the renderer with SIGSEGV on 3 workers (lab-01, lab-02, lab-04),\nat pixel 412,96, sample 11. The job was stopped.\nReplay it: lightshaft render forge-v12.xml --pixel 412,96 --sample 11",
@@ -72,6 +73,8 @@ export const workers = [
 // Error falls as 1/time, with the scatter of a real run; [seconds, relative scatter].
 const kRun = [[0.9, 1.06], [1.8, 0.97], [3.6, 1.03], [7.1, 1.01], [14.4, 0.985], [28.6, 1.02], [57.8, 0.99], [116, 1.01], [187, 1]];
 export const report = {
+  target_error: 0.001, slope: -0.98, slope_ci95: [-1.06, -0.9], trend: "converging as expected", trusted: true, verdict: "",
+  forecast: { target: 0.001, asked: true, spp: 896, core_seconds: 1000, core_seconds_ci95: [739, 1310] },
   convergence: kRun.map(([seconds, scatter]) => {
     const relmse = (0.00418 * 187 * scatter) / seconds;
     const spread = 0.07 + 0.35 / Math.sqrt(seconds + 1);
@@ -79,6 +82,10 @@ export const report = {
   }),
 };
 export const doubtful = { ...report, trusted: false, verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
+
+// With a reference, the true error stands beside the estimate.
+export const compared = { ...report, convergence: report.convergence.map((p, i) => ({ ...p, true_relmse: p.relmse * (1.06 - 0.02 * (i % 4)), true_rmse: p.rmse, true_flip: 0.4 / Math.sqrt(p.spp) })) };
+export const comparedJob = job("j-7f3a91c2", "steam-bath.xml", "running", { ...half, submitted_unix: kNow - 240, few_hits: 12, reference: { rmse: 0.0319, relmse: 0.00443, flip: 0.0271 } });
 
 export const diagnostics = [
   { severity: "error", file: "bath.xml", line: 14, column: 16, text: "medium \"grid\" has no parameter 'sigmat'; did you mean 'sigma_t'?", source_line: "    <float name=\"sigmat\" value=\"2\"/>", length: 13 },

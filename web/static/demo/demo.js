@@ -3,7 +3,7 @@ import "../js/live_image.js";
 import { h, patch } from "../js/dom.js";
 import { withOpen, withUi } from "../js/state.js";
 import { page } from "../js/views/shell.js";
-import { paint } from "./picture.js";
+import { paint, paintMap } from "./picture.js";
 import { stories } from "./stories.js";
 
 const app = document.getElementById("app");
@@ -17,6 +17,8 @@ function show(state) {
     pick: (picked) => (picked === state.open.picked ? null : set(withOpen(state, { picked }))),
     onExposure: (event) => set(withOpen(state, { exposure: Number(event.currentTarget.value) })),
     toggleTiles: () => set(withOpen(state, { showTiles: !state.open.showTiles })),
+    setLayer: (layer) => set(withOpen(state, { layer })),
+    setClock: (clock) => set(withOpen(state, { clock, picked: null })),
     image: imageOf(state),
   };
   // Every other action needs a farm.
@@ -28,17 +30,19 @@ const images = new Map();
 function imageOf(state) {
   const job = state.jobs?.get(state.open?.shown ?? state.route.id);
   if (!job) return null;
-  if (!images.has(job.id)) {
-    images.set(job.id, async (exposure) => {
+  const key = `${job.id} ${state.open?.layer}`;
+  if (!images.has(key)) {
+    images.set(key, async (exposure) => {
       if (job.units_done === 0) throw new Error("nothing folded yet");
-      return paint(job.size[0], job.size[1], job.state === "running" ? 0.52 : 1, exposure);
+      const done = job.state === "running" ? 0.52 : 1;
+      return state.open.layer === "picture" ? paint(job.size[0], job.size[1], done, exposure) : paintMap(job.size[0], job.size[1], done, state.open.layer);
     });
   }
-  return images.get(job.id);
+  return images.get(key);
 }
 
 if (story) {
-  show(story());
+  show({ ...story(), narrow: window.matchMedia("(max-width: 40rem)").matches });
 } else {
   patch(app, h("main", null, h("h1", null, "Storybook"), h("ul", null, Object.keys(stories).map((name) => h("li", { key: name }, h("a", { href: `?view=${name}` }, name))))));
 }

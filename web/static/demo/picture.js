@@ -58,3 +58,29 @@ export function paint(width, height, done, exposure) {
   context.putImageData(image, 0, 0);
   return canvas;
 }
+
+const kStops = [[0, 0, 4], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]];
+
+function heat(part) {
+  const at = Math.min(0.9999, Math.max(0, part)) * (kStops.length - 1);
+  const [low, high] = [kStops[Math.floor(at)], kStops[Math.floor(at) + 1]];
+  return low.map((value, i) => value + (at % 1) * (high[i] - value));
+}
+
+/** A stand-in for the maps of error and of samples over the frame. */
+export function paintMap(width, height, done, kind) {
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  const context = canvas.getContext("2d");
+  const tilesAcross = Math.ceil(width / 32);
+  for (let y = 0; y < height; y += 2) {
+    for (let x = 0; x < width; x += 2) {
+      const [cx, cy] = kind === "samples" ? [(x >> 5) * 32 + 16, (y >> 5) * 32 + 16] : [x, y];
+      const many = (cy >> 5) * tilesAcross + (cx >> 5) < done * tilesAcross * Math.ceil(height / 32);
+      const light = shafts(cx / width, cy / height);
+      const part = kind === "samples" ? 0.25 + 0.3 * light + (many ? 0.25 : 0) : 0.75 - 0.5 * light - (many ? 0.2 : 0) + 0.25 * (hash(x, y, 9) - 0.5);
+      context.fillStyle = `rgb(${heat(part).map(Math.round).join(" ")})`;
+      context.fillRect(x, y, 2, 2);
+    }
+  }
+  return canvas;
+}

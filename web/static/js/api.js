@@ -48,6 +48,8 @@ export const api = {
   setState: (id, state) => call("PATCH", jobPath(id), json({ state })),
   image: async (id, exposure, signal) =>
     createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?exposure=${exposure}`, { signal })).blob()),
+  /** kind: "error" or "samples". */
+  map: async (id, kind, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/${kind}.png`, { signal })).blob()),
   missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,
   putBlob: (digest, body) =>
     call("PUT", `/blobs/${digest}`, { headers: { "Content-Type": "application/octet-stream" }, body }),
@@ -58,6 +60,7 @@ export const api = {
 export const downloads = {
   exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
   report: (id) => `${kBase}${jobPath(id)}/report`,
+  page: (id) => `${kBase}${jobPath(id)}/report.html`,
   csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,
   log: (id) => `${kBase}${jobPath(id)}/log`,
 };

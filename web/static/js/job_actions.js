@@ -14,7 +14,12 @@ export function makeJobActions({ get, set, attempt, api }) {
     setState: change,
     cancel: (id) => change(id, "cancelled"),
     confirm: (id) => set(withUi(get(), { confirming: id })),
-    image: (exposure, signal) => api.image(get().open.shown, exposure, signal),
+    image: (exposure, signal) => {
+      const { shown, layer } = get().open;
+      return layer === "picture" ? api.image(shown, exposure, signal) : api.map(shown, layer, signal);
+    },
+    setLayer: (layer) => set(withOpen(get(), { layer })),
+    setClock: (clock) => set(withOpen(get(), { clock, picked: null })),
     onExposure: (event) => set(withOpen(get(), { exposure: Number(event.currentTarget.value) })),
     resetExposure: () => set(withOpen(get(), { exposure: 0 })),
     toggleTiles: () => set(withOpen(get(), { showTiles: !get().open.showTiles })),

@@ -11,6 +11,7 @@ import { initialState, openJob, shownOf, withEvent, withJob, withJobs, withOpen,
 import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
+const kPhone = "(max-width: 40rem)";
 
 let state = initialState();
 let drawing = false;
@@ -89,7 +90,7 @@ async function enter() {
 function signedOut(message = null) {
   closeEvents?.();
   closeEvents = null;
-  set(withUi({ ...initialState(), route: state.route, session: "out" }, { signInError: message }));
+  set(withUi({ ...initialState(), narrow: state.narrow, route: state.route, session: "out" }, { signInError: message }));
 }
 
 // ---- events ----
@@ -151,7 +152,7 @@ async function refreshOpen() {
   if (!id) return;
   try {
     await snapshot("job", () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
-    if (state.open?.id !== id) return;
+    if (state.open?.id !== id || !state.jobs.has(id)) return; // removed meanwhile
     set(withOpen(state, { problem: null }));
     if (!showFrame()) await refreshShown();
   } catch (error) {
@@ -161,7 +162,7 @@ async function refreshOpen() {
 
 function openFailed(error) {
   if (error.status === 401) signedOut();
-  else set(withOpen(state, { problem: error.message }));
+  else if (error.status !== 404 || !state.open?.problem) set(withOpen(state, { problem: error.message })); // a removed job says so itself
 }
 
 /** The image, tiles and figures of the frame that the page is to show. True if that is another one than before. */
@@ -169,8 +170,8 @@ function showFrame() {
   const { open, route } = state;
   const shown = open && shownOf(state, open.id, route.frame);
   if (!open || open.shown === shown) return false;
-  const { exposure, showTiles } = open;
-  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles } });
+  const { exposure, showTiles, layer, clock } = open;
+  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles, layer, clock } });
   refreshShown().catch(openFailed);
   return true;
 }
@@ -186,6 +187,12 @@ async function refreshShown() {
   });
   await refreshReport();
 }
+
+// ---- the window ----
+
+const phone = window.matchMedia(kPhone);
+phone.addEventListener("change", () => set({ ...state, narrow: phone.matches }));
+state = { ...state, narrow: phone.matches };
 
 // ---- routes ----
 

@@ -1,54 +1,93 @@
-// Logarithmic axes for the error plot: ranges, ticks, fits. No drawing.
+// Logarithmic axes for the error plot: ranges, ticks, labels. No drawing. common/report/log_axis.cpp, which draws the
+// same plot into reports, follows the same rules.
 import { superscript } from "./format.js";
+
+const kMargin = 0.06; // of the range, on either side
+const kShort = 2.2; // decades; on a shorter axis 2 and 5 are labelled, too
+const kFine = 4.5; // decades; on a shorter axis 2 to 9 have lines
+const kMostLabels = 8;
+const kFewTimes = 4; // labels of time, before those between are added
+const kFarthest = 300; // decades from 1: beyond it numbers end
+const [kMinute, kHour, kDay] = [60, 3600, 86400];
 
 /** A log axis from values in [lo, hi] (both > 0) to pixels [from, to]; at least one decade wide. */
 export function logAxis(lo, hi, from, to) {
   let a = Math.log10(lo);
   let b = Math.log10(hi);
-  const pad = Math.max((1 - (b - a)) / 2, 0.06 * (b - a));
-  a -= pad;
-  b += pad;
+  const pad = Math.max((1 - (b - a)) / 2, kMargin * (b - a));
+  a = Math.max(a - pad, -kFarthest);
+  b = Math.min(b + pad, kFarthest);
   return { lo: 10 ** a, hi: 10 ** b, at: (x) => from + ((Math.log10(x) - a) / (b - a)) * (to - from) };
 }
 
-/** [{value, label, major}]: decades, and 2 and 5 between them where the axis is short. */
-export function ticks(axis, label) {
-  const first = Math.floor(Math.log10(axis.lo));
-  const last = Math.ceil(Math.log10(axis.hi));
-  const steps = Math.log10(axis.hi / axis.lo) < 2.2 ? [1, 2, 5] : [1];
+const inside = (axis, value) => value >= axis.lo && value <= axis.hi;
+
+/** [{value, label, major}]: decades, and what lies between where the axis is short; label "": a line alone. */
+export function errorTicks(axis) {
+  const decades = Math.log10(axis.hi) - Math.log10(axis.lo);
+  const every = Math.floor(decades / kMostLabels) + 1;
   const out = [];
-  for (let n = first; n <= last; n += 1) {
-    for (const step of steps) {
-      const value = step * 10 ** n;
-      if (value >= axis.lo && value <= axis.hi) out.push({ value, label: label(value, step, n), major: step === 1 });
+  for (let n = Math.floor(Math.log10(axis.lo)); n <= Math.ceil(Math.log10(axis.hi)); n += 1) {
+    for (let step = 1; step <= 9; step += 1) {
+      const value = Number(`${step}e${n}`);
+      if (!inside(axis, value) || (step > 1 && decades > kFine)) continue;
+      const named = step === 1 ? n % every === 0 : decades < kShort && (step === 2 || step === 5);
+      out.push({ value, label: named ? errorLabel(step, n) : "", major: step === 1 });
     }
   }
   return out;
 }
 
-export const errorLabel = (value, step, n) => (n >= -3 && n < 2 ? String(Number(value.toPrecision(2))) : `${step === 1 ? "" : `${step}·`}10${superscript(n)}`);
-
-export function timeLabel(seconds) {
-  if (seconds < 1000) return `${Number(seconds.toPrecision(2))} s`;
-  return seconds < 3600 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 360) / 10} h`;
+function errorLabel(step, n) {
+  if (n >= -3 && n <= 3) return String(Number(`${step}e${n}`));
+  return `${step === 1 ? "" : `${step}·`}10${superscript(n)}`;
 }
 
-/** Least squares of log error on log seconds over the later half of the points: {slope, at(seconds)}, or null below three. */
-export function fit(points) {
-  const late = points.slice(Math.min(Math.floor(points.length / 2), Math.max(0, points.length - 3)));
-  if (late.length < 3) return null;
-  const xs = late.map((p) => Math.log(p.seconds));
-  const ys = late.map((p) => Math.log(p.relmse));
-  const mean = (v) => v.reduce((a, b) => a + b, 0) / v.length;
-  const [mx, my] = [mean(xs), mean(ys)];
-  const spread = xs.reduce((sum, x) => sum + (x - mx) ** 2, 0);
-  if (spread === 0) return null;
-  const slope = xs.reduce((sum, x, i) => sum + (x - mx) * (ys[i] - my), 0) / spread;
-  return { slope, at: (seconds) => Math.exp(my + slope * (Math.log(seconds) - mx)) };
+/** Times that people count in. */
+export function timeTicks(axis) {
+  let times = usualTimes(axis, true);
+  if (times.length < kFewTimes) times = usualTimes(axis, false);
+  const every = Math.ceil(times.length / kMostLabels);
+  return times.map((value, i) => ({ value, label: i % every === 0 ? timeLabel(value) : "", major: true }));
 }
 
-/** Points that can stand on log axes, in order of time. */
-export const drawable = (convergence) =>
+function usualTimes(axis, coarse) {
+  const out = [];
+  const take = (unit, few, all) => out.push(...(coarse ? few : all).map((step) => step * unit).filter((value) => inside(axis, value)));
+  for (let n = Math.floor(Math.log10(axis.lo)); n < 0; n += 1) take(10 ** n, [1], [1, 2, 5]);
+  for (const unit of [1, kMinute]) take(unit, [1, 10], [1, 2, 5, 10, 20]);
+  take(kHour, [1, 10], [1, 2, 5, 10]);
+  for (let unit = kDay; unit <= axis.hi; unit *= 10) take(unit, [1], [1, 2, 5]);
+  return out;
+}
+
+function timeLabel(seconds) {
+  const [unit, name] = seconds < kMinute ? [1, "s"] : seconds < kHour ? [kMinute, "min"] : seconds < kDay ? [kHour, "h"] : [kDay, "d"];
+  return `${Number((seconds / unit).toPrecision(6))} ${name}`;
+}
+
+/** Points that can stand on log axes over the clock `key` ("seconds" or "core_seconds"), in order of time. */
+export const drawable = (convergence, key) =>
   (Array.isArray(convergence) ? convergence : [])
-    .filter((p) => p && p.seconds > 0 && p.relmse > 0 && Number.isFinite(p.relmse))
-    .sort((a, b) => a.seconds - b.seconds);
+    .filter((p) => p && Number.isFinite(p[key]) && p[key] > 0 && Number.isFinite(p.relmse) && p.relmse > 0)
+    .sort((a, b) => a[key] - b[key]);
+
+/**
+ * When the error will be down to the job's target, over the same clock: {x, lo, hi, more}, lo, hi and more (with eight
+ * more workers) null if they are not known; null if nothing is forecast, or it is reached.
+ */
+export function aheadOf(job, report, key) {
+  const last = drawable(report?.convergence, key).at(-1);
+  const forecast = report?.forecast;
+  const target = job.target_error;
+  if (!last || !(target > 0) || last.relmse <= target) return null;
+  if (key === "seconds" && job.eta_seconds > 0 && Array.isArray(job.eta_ci95)) {
+    const [lo, hi] = job.eta_ci95.map((eta) => job.elapsed_seconds + eta);
+    return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_8_more > 0 ? job.elapsed_seconds + job.eta_with_8_more : null };
+  }
+  if (!(forecast?.asked && forecast.core_seconds > 0)) return null;
+  const pace = key === "seconds" ? last.seconds / last.core_seconds : 1; // as it went so far
+  const at = (core) => last[key] + pace * core;
+  const [lo, hi] = Array.isArray(forecast.core_seconds_ci95) ? forecast.core_seconds_ci95.map(at) : [null, null];
+  return Number.isFinite(pace) ? { x: at(forecast.core_seconds), lo, hi, more: null } : null;
+}

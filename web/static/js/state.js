@@ -13,6 +13,7 @@ export function initialState() {
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // what belongs to the one job that is shown, see openJob()
     submit: emptySubmission(),
+    narrow: false, // the page is as wide as a phone
     ui: { confirming: null, busy: null, notice: null, signInError: null, signingIn: false },
   };
 }
@@ -37,6 +38,8 @@ export const openJob = (id, shown = id) => ({
   folds: 0, // grows with every fold: the image has changed
   exposure: 0,
   showTiles: true,
+  layer: "picture", // over the image: "error", "samples"
+  clock: "seconds", // of the plot: "core_seconds"
   picked: null, // point of the plot under the pointer
   problem: null, // why it can't be shown
 });
@@ -84,6 +87,7 @@ export function withEvent(state, type, data) {
 }
 
 export function withJob(state, job) {
+  if (job.state === "removed") return withoutJob(state, job.id);
   const jobs = new Map(state.jobs ?? []);
   const sequence = job.sequence ? jobs.get(job.sequence) : null;
   if (sequence?.frames?.list) {
@@ -94,6 +98,13 @@ export function withJob(state, job) {
   const next = { ...state, jobs };
   const over = state.open?.shown === job.id && isOver(job);
   return over ? withOpen(next, { tiles: new Map(), folds: state.open.folds + 1 }) : next;
+}
+
+/** A job that somebody removed takes its frames along; a page that shows it says so. */
+function withoutJob(state, id) {
+  const jobs = new Map([...(state.jobs ?? [])].filter(([key, job]) => key !== id && job.sequence !== id));
+  const next = { ...state, jobs };
+  return state.open?.id === id ? withOpen(next, { problem: "Somebody has removed this job, with its image and report.", tiles: new Map() }) : next;
 }
 
 const sharedFigures = ({ state, progress, spp_done, relmse, error }) => ({ state, progress, spp_done, relmse, error });

@@ -1,10 +1,11 @@
 // One job: its image as it fills in, how wrong that image still is, and who is at work on it.
 import { h } from "../dom.js";
-import { healthComplaints, isOver } from "../state.js";
-import { duration, jobName, moment, percent } from "../format.js";
+import { healthComplaints } from "../state.js";
+import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
+import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
@@ -28,12 +29,8 @@ function shownJob(state, job, actions) {
   return [
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, h("pre", null, job.error))) : null,
     h("div", { key: "columns", class: "columns" },
-      h("div", { class: "picture" }, imagePanel(state, job, actions), downloadLinks(job)),
-      h("div", { class: "facts" },
-        figures(job, state.open.report),
-        h("section", { class: "panel" }, h("h2", null, "Error against time"),
-          errorPlot({ convergence: state.open.report?.convergence, target: job.target_error ?? state.open.report?.target_error ?? null, picked: state.open.picked, onPick: actions.pick })),
-        inFlight(state, job))),
+      h("div", { class: "picture" }, imagePanel(state, job, actions), errorPlot(job, state.open, actions, state.narrow), downloadLinks(job)),
+      h("div", { class: "facts" }, figures(job), timeSplit(job), inFlight(state, job))),
   ];
 }
 
@@ -58,6 +55,7 @@ function alerts(job) {
   const warnings = job.warnings ?? [];
   return [
     job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? "The job failed" : "Something is wrong", h("pre", null, job.error))) : null,
+    job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} got too few hits for the error to be known there; the error map flags them.`) : null,
     complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,
     warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
   ];
@@ -68,11 +66,11 @@ const complaint = ({ key, text, place, replay }) => h("li", { key },
   replay ? h("p", { key: "replay", class: "replay" }, "See it again: ", h("code", null, replay)) : null);
 
 function downloadLinks(job) {
-  const link = (href, label, hint, name) => h("a", { key: label, class: "button", href, download: name }, label, h("small", null, hint));
+  const link = (href, label, hint, name) => h("a", { key: hint, class: "button", href, download: name }, label, h("small", null, hint));
   const stem = jobName(job).replace(/\.xml$/i, "") + (job.sequence ? `.${job.frame}` : "");
-  const now = isOver(job) ? "" : " so far";
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
-    link(downloads.exr(job.id), "EXR", `image${now}`, `${stem}.exr`),
+    link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`),
+    h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
     link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
     link(downloads.csv(job.id), "Convergence", "CSV", `${stem}.convergence.csv`),
     link(downloads.log(job.id), "Log", "text", `${stem}.log`));

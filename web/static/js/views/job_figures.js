@@ -1,34 +1,39 @@
 // The figures of one job, and its tiles in flight.
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
-import { count, duration, figure, interval, plural, spp } from "../format.js";
+import { count, duration, figure, given, interval, plural, spp } from "../format.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
 
-/** report: its verdict says in words when the error estimate is not to be trusted yet. */
-export function figures(job, report) {
+/** What follows each figure has its lines kept free, so that nothing moves when it becomes known. */
+export function figures(job) {
   const ci = interval(job.relmse_ci95);
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
-    fact("relMSE", figure(job.relmse), ci ? [ci, h("i", { key: "ci" }, "95 % interval")] : "not known yet", "key"),
-    report?.trusted === false ? h("p", { key: "verdict", class: "verdict" }, report.verdict || "This error estimate can't be trusted yet.") : null,
-    fact("Samples per pixel", spp(job.spp_done), `of ${count(job.spp)}`, "key"),
-    isOver(job) ? fact("Took", duration(job.elapsed_seconds), "wall clock", "key") : fact("Time left", duration(job.eta_seconds), timeNote(job), "key"),
+    fact("relMSE", figure(job.relmse), [ci ? `95 %: ${ci}` : "not known yet", job.target_error > 0 ? `target ${given(job.target_error)}` : null], "key"),
+    isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact("Time left", duration(job.eta_seconds), timeNotes(job), "key"),
+    fact("Samples per pixel", spp(job.spp_done), [`of ${count(job.spp)}`]),
     fact("RMSE", figure(job.rmse)),
     fact("Core time", duration(job.core_seconds)),
-    fact("Units", count(job.units_done), `of ${count(job.units_total)}`),
-    fact("Numeric health", clean ? "clean" : "see above", null, clean ? "good" : "bad"));
+    job.reference ? trueFigures(job.reference) : null,
+    fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
+    fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
 }
 
 /** What the forecast leaves open, and what more workers would do. */
-function timeNote(job) {
-  const range = job.eta_ci95 ? `${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : null;
-  const more = typeof job.eta_with_8_more === "number" ? `${duration(job.eta_with_8_more)} with 8 more workers` : null;
-  return [range, more, `${duration(job.elapsed_seconds)} so far`].filter(Boolean).join(", ");
+function timeNotes(job) {
+  return [
+    job.eta_ci95 ? `95 %: ${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : `${duration(job.elapsed_seconds)} so far`,
+    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}` : null];
 }
 
-const fact = (name, value, note, className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name), h("dd", null, h("b", null, value), note ? h("small", null, note) : null));
+const trueFigures = ({ relmse, rmse, flip }) => [
+  fact("True relMSE", figure(relmse), ["against the reference"], "true"), fact("True RMSE", figure(rmse), [], "true"),
+  flip === null || flip === undefined ? null : fact("FLIP", figure(flip), [], "true")];
+
+const fact = (name, value, notes = [], className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name),
+  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i }, note))));
 
 export function inFlight(state, job) {
   if (isOver(job)) return null;

@@ -1,9 +1,12 @@
-// The live image, the tiles in flight over it, and the exposure slider.
+// The live image or a map over it, the tiles in flight, and the exposure slider or the map's legend.
 import { h } from "../dom.js";
 import { colourOf } from "../state.js";
 import { exposure as exposureText, jobName } from "../format.js";
-import { safeClass } from "./pieces.js";
+import { choice, safeClass } from "./pieces.js";
 
+const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Samples"]];
+const kNames = { picture: "as it is now", error: "error of each pixel", samples: "samples of each pixel" };
+const kLegends = { error: ["exact", "noisy"], samples: ["few", "many"] };
 const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
 
 export function imagePanel(state, job, actions) {
@@ -12,20 +15,26 @@ export function imagePanel(state, job, actions) {
   return h("figure", { class: "panel image" },
     h("div", { class: "stage", style: { "--ratio": `${width} / ${height}` } },
       h("live-image", {
-        key: job.id, "aria-label": `${jobName(job)} as it is now`, role: "img",
-        ".size": width * 65536 + height, ".source": actions.image, ".exposure": open.exposure, ".version": open.folds,
+        key: job.id, "aria-label": `${jobName(job)}, ${kNames[open.layer]}`, role: "img",
+        ".size": width * 65536 + height, ".source": actions.image, ".exposure": open.layer === "picture" ? open.exposure : 0, ".version": `${open.layer} ${open.folds}`,
       }),
       open.showTiles ? overlay(state, width, height) : null,
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
-      h("label", { for: "exposure" }, "Exposure"),
-      h("input", {
-        id: "exposure", type: "range", min: -6, max: 6, step: 0.25, ".value": String(open.exposure), "aria-valuetext": exposureText(open.exposure),
-        oninput: actions.onExposure, ondblclick: actions.resetExposure,
-      }),
-      h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)),
+      choice("layer", "What is shown", kLayers, open.layer, actions.setLayer),
+      open.layer === "picture" ? exposureTool(open, actions) : legend(open.layer),
       h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
 }
+
+const exposureTool = (open, actions) => h("span", { key: "exposure", class: "image-tool" },
+  h("label", { for: "exposure" }, "Exposure"),
+  h("input", {
+    id: "exposure", type: "range", min: -6, max: 6, step: 0.25, ".value": String(open.exposure), "aria-valuetext": exposureText(open.exposure),
+    oninput: actions.onExposure, ondblclick: actions.resetExposure,
+  }),
+  h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)));
+
+const legend = (layer) => h("span", { key: "legend", class: "image-tool legend" }, kLegends[layer][0], h("i", { "aria-hidden": "true" }), kLegends[layer][1]);
 
 function stageText(job) {
   if (job.state === "failed" || job.state === "cancelled") return "No sample was taken.";

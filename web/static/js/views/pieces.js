@@ -24,6 +24,11 @@ export const workerMark = (colour, name) => h("span", { class: "worker-name" }, 
 export const notice = (kind, title, ...body) =>
   h("section", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : null }, h("h2", null, title), ...body);
 
+/** One of a few: [[value, label], ...], as radio buttons, which the arrow keys walk along. */
+export const choice = (name, label, options, chosen, onChoose) =>
+  h("fieldset", { class: "choice" }, h("legend", { class: "unseen" }, label), options.map(([value, text]) => h("label", { key: value },
+    h("input", { type: "radio", name, value, ".checked": value === chosen, onchange: () => onChoose(value) }), h("span", null, text))));
+
 /** Pause or resume, and cancel, which asks once more. */
 export function jobActions(state, job, actions, large = false) {
   if (isOver(job)) return null;

@@ -1,120 +1,103 @@
-// Error against time, both logarithmic: measured points, their 95 % band, the target, and where the fitted line meets it.
+// Error against time: the choice of clock, the drawing, what it says at the point that was chosen, and all of it as a table.
 import { h } from "../dom.js";
-import { drawable, errorLabel, fit, logAxis, ticks, timeLabel } from "../plot_scale.js";
+import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
+import { choice } from "./pieces.js";
+import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
-const kWidth = 440;
-const kHeight = 270;
-const kBox = { left: 52, right: kWidth - 14, top: 14, bottom: kHeight - 34 };
+const kClocks = [["seconds", "Wall time"], ["core_seconds", "Core time"]];
+const kSince = { seconds: "after the first ray", core_seconds: "of core time" };
 
-/** convergence: of the report. target: relMSE or null. picked: index of the point to name, or null. */
-export function errorPlot({ convergence, target, picked, onPick }) {
-  const points = drawable(convergence);
-  if (points.length === 0) {
-    return h("p", { class: "plot-empty" }, "The first point appears when every tile has finished two rounds of samples.");
-  }
-  const frame = axes(points, target);
-  const chosen = points[picked] ? picked : points.length - 1;
-  return h("figure", { class: "plot" },
+/** open: {clock, picked, report}; actions: pick(index or null), setClock(key). narrow: the page is as wide as a phone. */
+export function errorPlot(job, { clock, picked, report }, actions, narrow) {
+  const points = drawable(report?.convergence, clock);
+  const plot = { points, key: clock, target: job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
+  plot.chosen = points[picked] ? picked : points.length - 1;
+  return h("section", { key: "plot", class: "panel plot", "aria-labelledby": "plot-title" },
+    h("div", { class: "panel-head" }, h("h2", { id: "plot-title" }, "Error against time"), choice("clock", "Time axis", kClocks, clock, actions.setClock)),
+    points.length === 0 ? empty(narrow) : figureOf(plot, actions),
+    h("p", { class: "plot-verdict" }, verdict(report)),
+    table(points));
+}
+
+function empty(narrow) {
+  const box = boxOf(narrow);
+  const row = (text, line) => h("text", { key: line, x: box.width / 2, y: box.height / 2 + 18 * line, "text-anchor": "middle" }, text);
+  return h("figure", { key: "empty" },
+    h("svg", { class: "plot-empty", viewBox: `0 0 ${box.width} ${box.height}`, role: "img", "aria-label": "No point yet" },
+      row("The first point appears when every tile", 0), row("has finished two rounds of samples.", 1)),
+    h("figcaption", { class: "plot-reading" }));
+}
+
+function figureOf(plot, actions) {
+  const { points, key, chosen } = plot;
+  const frame = frameOf(plot);
+  return h("figure", { key: "figure" },
     h("svg", {
-      viewBox: `0 0 ${kWidth} ${kHeight}`, "aria-label": summary(points, target), tabindex: 0,
-      role: "slider", "aria-valuemin": 1, "aria-valuemax": points.length, "aria-valuenow": chosen + 1, "aria-valuetext": spoken(points[chosen]),
-      onpointermove: (event) => onPick(nearest(event, points, frame)), onpointerleave: () => onPick(null),
-      onkeydown: (event) => onPick(stepped(event, chosen, points.length)), onblur: () => onPick(null),
-    },
-      grid(frame), band(points, frame), targetLine(target, frame), prediction(points, target, frame),
-      series(points, frame, "relmse", "plot-line"), series(points, frame, "true_relmse", "plot-true"),
-      points.map((p, i) => h("circle", { key: `p${i}`, class: i === chosen ? "plot-point chosen" : "plot-point", cx: frame.x.at(p.seconds), cy: frame.y.at(p.relmse), r: i === chosen ? 4.5 : 2.6 }))),
-    h("figcaption", { class: "plot-reading" }, reading(points[chosen]), slopeText(points)));
+      viewBox: `0 0 ${frame.box.width} ${frame.box.height}`, "aria-label": summary(plot), tabindex: 0,
+      role: "slider", "aria-valuemin": 1, "aria-valuemax": points.length, "aria-valuenow": chosen + 1, "aria-valuetext": spoken(points[chosen], key),
+      onpointermove: (event) => actions.pick(nearest(event, points, key, frame)), onpointerleave: () => actions.pick(null),
+      onkeydown: (event) => actions.pick(stepped(event, chosen, points.length)), onblur: () => actions.pick(null),
+    }, drawing(plot, frame)),
+    h("figcaption", { class: "plot-reading" }, reading(points[chosen], key), forecastText(plot)));
 }
 
-function axes(points, target) {
-  const errors = points.flatMap((p) => [p.relmse, ...(p.relmse_ci95 ?? []), p.true_relmse]).filter((e) => e > 0);
-  if (target > 0) errors.push(target);
-  const meets = meeting(points, target);
-  const last = points.at(-1).seconds;
-  return {
-    x: logAxis(points[0].seconds, meets && meets < 30 * last ? Math.max(meets, last) : last, kBox.left, kBox.right),
-    y: logAxis(Math.min(...errors), Math.max(...errors), kBox.bottom, kBox.top),
-  };
-}
-
-/** When the fitted line reaches the target; null if it does not, or if it is reached already. */
-function meeting(points, target) {
-  const line = fit(points);
-  const last = points.at(-1);
-  if (!line || !(target > 0) || last.relmse <= target || line.slope > -0.2) return null;
-  return last.seconds * (last.relmse / target) ** (-1 / line.slope);
-}
-
-function grid({ x, y }) {
-  return h("g", { class: "plot-grid" },
-    ticks(x, timeLabel).map((t) => [
-      h("line", { key: `x${t.value}`, class: t.major ? "major" : null, x1: x.at(t.value), x2: x.at(t.value), y1: kBox.top, y2: kBox.bottom }),
-      h("text", { key: `xt${t.value}`, x: x.at(t.value), y: kBox.bottom + 20, "text-anchor": "middle" }, t.label)]),
-    ticks(y, errorLabel).map((t) => [
-      h("line", { key: `y${t.value}`, class: t.major ? "major" : null, x1: kBox.left, x2: kBox.right, y1: y.at(t.value), y2: y.at(t.value) }),
-      h("text", { key: `yt${t.value}`, x: kBox.left - 9, y: y.at(t.value) + 4, "text-anchor": "end" }, t.label)]));
-}
-
-function band(points, { x, y }) {
-  const with95 = points.filter((p) => p.relmse_ci95?.[0] > 0 && p.relmse_ci95[1] > 0);
-  if (with95.length < 2) return null;
-  const up = with95.map((p) => `${x.at(p.seconds)},${y.at(p.relmse_ci95[1])}`);
-  const down = with95.map((p) => `${x.at(p.seconds)},${y.at(p.relmse_ci95[0])}`).reverse();
-  return h("polygon", { class: "plot-band", points: [...up, ...down].join(" ") });
-}
-
-function series(points, { x, y }, name, className) {
-  const known = points.filter((p) => p[name] > 0);
-  return known.length < 2 ? null : h("polyline", { class: className, points: known.map((p) => `${x.at(p.seconds)},${y.at(p[name])}`).join(" ") });
-}
-
-function targetLine(target, { y }) {
-  if (!(target > 0)) return null;
-  return h("g", { class: "plot-target" },
-    h("line", { x1: kBox.left, x2: kBox.right, y1: y.at(target), y2: y.at(target) }),
-    h("text", { x: kBox.left + 6, y: y.at(target) - 6 }, `target ${given(target)}`));
-}
-
-function prediction(points, target, { x, y }) {
-  const meets = meeting(points, target);
-  if (!meets || meets > x.hi) return null;
-  const last = points.at(-1);
-  return h("line", { class: "plot-ahead", x1: x.at(last.seconds), y1: y.at(last.relmse), x2: x.at(meets), y2: y.at(target) });
-}
-
-function nearest(event, points, { x }) {
-  const box = event.currentTarget.getBoundingClientRect();
-  const at = ((event.clientX - box.left) / box.width) * kWidth;
-  const distance = (p) => Math.abs(x.at(p.seconds) - at);
+function nearest(event, points, key, { x, box }) {
+  const place = event.currentTarget.getBoundingClientRect();
+  const at = ((event.clientX - place.left) / place.width) * box.width;
+  const distance = (p) => Math.abs(x.at(p[key]) - at);
   return points.reduce((best, p, i) => (distance(p) < distance(points[best]) ? i : best), 0);
 }
 
-/** The arrow keys walk along the points. */
+/** The arrow keys walk along the points; Home and End go to the first and the last. */
 function stepped(event, chosen, count) {
-  const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key] ?? 0;
-  if (step) event.preventDefault();
-  return Math.min(count - 1, Math.max(0, chosen + step));
+  const to = { ArrowLeft: chosen - 1, ArrowDown: chosen - 1, ArrowRight: chosen + 1, ArrowUp: chosen + 1, Home: 0, End: count - 1 }[event.key];
+  if (to === undefined) return chosen;
+  event.preventDefault();
+  return Math.min(count - 1, Math.max(0, to));
 }
 
-const spoken = (point) => `relMSE ${figure(point.relmse)} after ${duration(point.seconds)}`;
+const spoken = (point, key) => `relMSE ${figure(point.relmse)} after ${duration(point[key])}`;
 
-function reading(point) {
+function reading(point, key) {
   const ci = interval(point.relmse_ci95);
   return [
-    h("span", { key: "t" }, h("b", null, duration(point.seconds)), " after the first ray"),
+    h("span", { key: "t" }, h("b", null, duration(point[key])), ` ${kSince[key]}`),
     h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), ci ? ` (95 %: ${ci})` : null),
-    point.true_relmse > 0 ? h("span", { key: "r", class: "true" }, "against the reference ", h("b", null, figure(point.true_relmse))) : null,
+    point.true_relmse > 0 ? h("span", { key: "r", class: "true" }, "against the reference ", h("b", null, figure(point.true_relmse)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 
-function slopeText(points) {
-  const line = fit(points);
-  return line ? h("span", { key: "slope", title: "Slope of the later half of the points; independent samples give −1" }, "slope ", h("b", null, line.slope.toFixed(2).replace("-", "−"))) : null;
+function forecastText({ ahead, key, target }) {
+  if (!ahead) return null;
+  const ci = ahead.lo !== null ? ` (${duration(ahead.lo)} to ${duration(ahead.hi)})` : null;
+  return h("span", { key: "f", class: "forecast" }, `target ${given(target)} at `, h("b", null, duration(ahead.x)), ci, ahead.more ? `, with 8 more workers at ${duration(ahead.more)}` : null);
 }
 
-function summary(points, target) {
+/** The slope with its interval, and what it means, in words. */
+function verdict(report) {
+  if (!report) return null;
+  const signed = (x) => x.toFixed(2).replace("-", "−");
+  const ci = Array.isArray(report.slope_ci95) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
+  return [
+    typeof report.slope === "number" ? h("span", { key: "slope", title: "Of log error over log time; independent samples give −1" }, "slope ", h("b", null, signed(report.slope)), ci) : null,
+    report.trusted === false
+      ? h("span", { key: "words", class: "doubt" }, report.verdict || "This error estimate can't be trusted yet.")
+      : h("span", { key: "words" }, report.trend ?? report.verdict)];
+}
+
+const kColumns = ["Time", "Core time", "Samples", "relMSE", "95 % interval"];
+
+function table(points) {
+  const truth = points.some((p) => p.true_relmse > 0);
+  const cells = (p) => [duration(p.seconds), duration(p.core_seconds), spp(p.spp), figure(p.relmse), interval(p.relmse_ci95), ...(truth ? [figure(p.true_relmse)] : [])];
+  return h("details", { key: "table", class: "plot-table" }, h("summary", null, "As a table"),
+    h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Error at each checkpoint" }, h("table", null,
+      h("thead", null, h("tr", null, [...kColumns, ...(truth ? ["True relMSE"] : [])].map((name) => h("th", { key: name, scope: "col" }, name)))),
+      h("tbody", null, points.map((p, i) => h("tr", { key: i }, cells(p).map((text, k) => h("td", { key: k }, text))))))));
+}
+
+function summary({ points, key, target }) {
   const last = points.at(-1);
-  return `Error against time: relMSE ${figure(last.relmse)} after ${duration(last.seconds)}` + (target > 0 ? `, target ${given(target)}` : "");
+  return `Error against time: relMSE ${figure(last.relmse)} after ${duration(last[key])}` + (target > 0 ? `, target ${given(target)}` : "");
 }

@@ -1,0 +1,135 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/report/html.h"
+#include "common/report/job_sections.h"
+#include "common/report/log_plot.h"
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+constexpr std::size_t kMostRows = 256;  // of the table; of more, the last ones
+
+struct Clock {
+  const char* key;
+  const char* id;
+  const char* name;
+  const char* axis;
+};
+constexpr Clock kWall{"seconds", "wall", "wall clock", "time since the first ray"};
+constexpr Clock kCores{"core_seconds", "cores", "core time", "core time spent on rendering"};
+
+std::string range(const std::optional<std::pair<double, double>>& ci, std::string (*words)(double)) {
+  return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
+}
+
+// Where the error will be down to the target that was asked for; of wall seconds by the pace there was.
+std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
+  const Json& forecast = member(report, "forecast");
+  const double more = number(forecast, "core_seconds"), now = number(last, clock.key);
+  if (!flag(forecast, "asked", false) || !(more > 0) || !(now > 0)) return std::nullopt;
+  const double pace = clock.id == std::string_view(kCores.id) ? 1 : now / number(last, "core_seconds");
+  if (!std::isfinite(pace)) return std::nullopt;
+  Ahead ahead{now + pace * more, 0, 0, 0};
+  if (const auto ci = interval(forecast, "core_seconds_ci95")) {
+    ahead.x_lo = now + pace * ci->first;
+    ahead.x_hi = now + pace * ci->second;
+  }
+  return ahead;
+}
+
+LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock& clock) {
+  LogPlot plot;
+  plot.id = clock.id;
+  plot.title = fmt::format("relMSE against {}", clock.name);
+  plot.x_title = clock.axis;
+  plot.y_title = "relMSE";
+  Curve estimate{"estimate, with its 95 % interval", {}}, truth{"against the reference", {}, true};
+  for (const Json& p : points) {
+    const double x = number(p, clock.key);
+    const auto ci = interval(p, "relmse_ci95").value_or(std::pair(0.0, 0.0));
+    estimate.points.push_back({x, number(p, "relmse"), ci.first, ci.second});
+    if (const double error = number(p, "true_relmse"); error > 0) truth.points.push_back({x, error});
+  }
+  const bool has_truth = !truth.points.empty();
+  plot.curves.push_back(std::move(estimate));
+  if (has_truth) plot.curves.push_back(std::move(truth));
+  const Json& last = points.back();
+  if (const double target = number(report, "target_error"); target > 0) plot.target = target;
+  plot.ahead = ahead_of(report, last, clock);
+  plot.summary = fmt::format("{} points; the last: relMSE {} after {}", points.size(),
+                             figure(number(last, "relmse")), duration(number(last, clock.key)));
+  return plot;
+}
+
+std::string cell(const std::string& words) { return "<td>" + words + "</td>"; }
+
+std::string table(const std::vector<Json>& points) {
+  const bool truth =
+      std::any_of(points.begin(), points.end(), [](const Json& p) { return number(p, "true_relmse") > 0; });
+  const bool flip =
+      std::any_of(points.begin(), points.end(), [](const Json& p) { return number(p, "true_flip") >= 0; });
+  std::string rows;
+  for (std::size_t i = points.size() - std::min(points.size(), kMostRows); i < points.size(); ++i) {
+    const Json& p = points[i];
+    rows += "<tr>" + cell(duration(number(p, "seconds"))) + cell(duration(number(p, "core_seconds"))) +
+            cell(given(number(p, "spp"))) + cell(figure(number(p, "rmse"))) +
+            cell(figure(number(p, "relmse"))) + cell(range(interval(p, "relmse_ci95"), figure));
+    if (truth) rows += cell(figure(number(p, "true_relmse")));
+    if (flip) rows += cell(figure(number(p, "true_flip")));
+    rows += "</tr>\n";
+  }
+  std::string head;
+  for (const char* name : {"Time", "Core time", "Samples", "RMSE", "relMSE", "95 % interval"})
+    head += fmt::format("<th scope=\"col\">{}</th>", name);
+  if (truth) head += "<th scope=\"col\">True relMSE</th>";
+  if (flip) head += "<th scope=\"col\">FLIP</th>";
+  return fmt::format(
+      "<details><summary>The points as a table</summary><div class=\"wide\"><table><caption "
+      "class=\"unseen\">Error at each "
+      "checkpoint</caption><thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div></details>",
+      head, rows);
+}
+
+std::string slope(const Json& report) {
+  const double value = number(report, "slope");
+  if (!std::isfinite(value)) return "";
+  const auto with_sign = [](double x) { return fmt::format("{}{:.2f}", x < 0 ? "−" : "", std::abs(x)); };
+  std::string out = fmt::format("Slope <b>{}</b>", with_sign(value));
+  if (const auto ci = interval(report, "slope_ci95"))
+    out +=
+        fmt::format(" ({} to {}; independent samples give −1)", with_sign(ci->first), with_sign(ci->second));
+  if (const std::string trend = text(report, "trend"); !trend.empty()) out += ": " + escape_html(trend);
+  return out + ". ";
+}
+
+}  // namespace
+
+std::string outlook(const Json& report) {
+  const Json& forecast = member(report, "forecast");
+  const double target = number(forecast, "target"), more = number(forecast, "core_seconds");
+  if (!(target > 0) || !(more > 0)) return "";
+  std::string out = fmt::format("relMSE {} {} {} more of core time", given(target),
+                                flag(forecast, "asked", false) ? "needs" : "would need", duration(more));
+  if (const std::string ci = range(interval(forecast, "core_seconds_ci95"), duration); !ci.empty())
+    out += fmt::format(" ({})", ci);
+  if (const double spp = number(forecast, "spp"); spp > 0)
+    out += fmt::format(", to {} samples per pixel", count(spp));
+  return out + ".";
+}
+
+std::string curves(const Json& report) {
+  const std::vector<Json> points = objects(report, "convergence");
+  if (points.empty()) return "";
+  std::string body = "<div class=\"pair\">";
+  for (const Clock& clock : {kWall, kCores})
+    body += fmt::format("<figure><figcaption>Against {}</figcaption>{}</figure>", clock.name,
+                        svg_of(plot_of(report, points, clock)));
+  body += "</div><p class=\"note\">" + slope(report) + outlook(report) + "</p>" + table(points);
+  return section("Error against time", body);
+}
+
+}  // namespace ls::report

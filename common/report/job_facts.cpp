@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/report/html.h"
+#include "common/report/job_sections.h"
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+std::string place_of(const Json& cause) {
+  const std::vector<Json> first = objects(cause, "first");
+  if (first.empty()) return "";
+  const auto pixel = interval(first[0], "pixel");
+  if (!pixel) return "";
+  const double frame = number(cause, "frame");
+  return fmt::format("; first {}at pixel {:.0f},{:.0f}, sample {}",
+                     std::isfinite(frame) ? fmt::format("in frame {:.0f} ", frame) : "", pixel->first,
+                     pixel->second, count(number(first[0], "sample")));
+}
+
+std::string cause_item(const Json& cause) {
+  std::string out = "<li>" + escape_html(text(cause, "text")) + place_of(cause) + ".";
+  if (const std::string replay = text(cause, "replay"); !replay.empty())
+    out += "<p>See it again: <code>" + escape_html(replay) + "</code></p>";
+  return out + "</li>\n";
+}
+
+std::string feature_list(const Json& report, bool used) {
+  std::string items;
+  const auto add = [&](const std::string& part, const std::string& why) {
+    items += fmt::format("<li>{}{}</li>\n", escape_html(part),
+                         why.empty() ? "" : fmt::format(" <span class=\"why\">{}</span>", escape_html(why)));
+  };
+  const std::vector<Json> parts = objects(member(report, "analysis"), "parts");
+  for (const Json& part : parts)
+    if (flag(part, "used", false) == used) add(text(part, "part"), text(part, "why"));
+  if (parts.empty())
+    for (const std::string& name : texts(report, used ? "features_used" : "features_left_out")) add(name, "");
+  if (items.empty()) return "";
+  return fmt::format("<div><h3>{}</h3><ul class=\"parts{}\">\n{}</ul></div>", used ? "At work" : "Left out",
+                     used ? "" : " out", items);
+}
+
+// What no pixel depends on and was neither stored nor sent.
+std::string pruned(const Json& report) {
+  std::string items;
+  for (const Json& one : objects(member(report, "analysis"), "left_out")) {
+    const double n = number(one, "count"), bytes = number(one, "bytes");
+    items += fmt::format("<li>{}{}{} <span class=\"why\">{}</span></li>\n", escape_html(text(one, "what")),
+                         n > 1 ? " × " + count(n) : "", bytes > 0 ? ", " + byte_size(bytes) : "",
+                         escape_html(text(one, "why")));
+  }
+  if (items.empty()) return "";
+  return "<h3>Neither stored nor sent</h3><ul class=\"parts spaced\">\n" + items + "</ul>";
+}
+
+std::string row(const char* name, const std::string& value, bool code = false) {
+  if (value.empty() || value == kAbsent) return "";
+  const char* tag = code ? "code" : "span";
+  return fmt::format("<div><dt>{}</dt><dd><{}>{}</{}></dd></div>\n", name, tag, escape_html(value), tag);
+}
+
+std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
+
+}  // namespace
+
+std::string section(std::string_view title, std::string_view body, std::string_view css_class) {
+  return fmt::format("<section{}><h2>{}</h2>\n{}\n</section>\n",
+                     css_class.empty() ? "" : fmt::format(" class=\"{}\"", css_class), title, body);
+}
+
+std::string health(const Json& report) {
+  const Json& state = member(report, "health");
+  if (!state.is_object()) return "";
+  std::string items;
+  for (const Json& cause : objects(state, "causes")) items += cause_item(cause);
+  if (const double cut = number(report, "clamped_values"); cut > 0)
+    items += fmt::format(
+        "<li>{} values are above 65504, the largest of a half-precision image, and stand in it as "
+        "that.</li>\n",
+        count(cut));
+  if (const double few = number(report, "few_hits_pixels"); few > 0)
+    items += fmt::format(
+        "<li>{} pixels got too few hits for their error to be known; the error map flags them.</li>\n",
+        count(few));
+  if (items.empty())
+    return section(
+        "Numeric health",
+        "<p class=\"good\">Clean: no sample was rejected, no bound was broken, no input was mended.</p>");
+  return section("Numeric health", "<ul class=\"complaints\">\n" + items + "</ul>", "bad");
+}
+
+std::string features(const Json& report) {
+  const std::string used = feature_list(report, true), out = feature_list(report, false);
+  if (used.empty() && out.empty() && pruned(report).empty()) return "";
+  return section("What the scene needs, and what was left out",
+                 pruned(report) + "<div class=\"features\">" + used + out + "</div>");
+}
+
+std::string provenance(const Json& report) {
+  std::string rows =
+      row("Job", text(report, "job"), true) + row("Handed in", date_time(number(report, "submitted_unix"))) +
+      row("Scene", text(report, "scene"), true) +
+      row("Pixels (SHA-256)", text(report, "pixels_sha256"), true) +
+      row("Numeric class", text(report, "numeric_class"), true) + row("Build", text(report, "build")) +
+      row("Integrator", text(report, "integrator")) + row("Seed", whole(number(report, "seed"))) +
+      row("Threads", whole(number(report, "threads"))) +
+      row("Reference", text(member(report, "reference"), "digest"), true);
+  std::string warnings;
+  for (const std::string& warning : texts(report, "warnings")) warnings += escape_html(warning) + "\n";
+  if (!warnings.empty())
+    warnings =
+        "<details open><summary>Warnings about the scene</summary><pre>" + warnings + "</pre></details>";
+  if (rows.empty() && warnings.empty()) return "";
+  return section("Provenance", (rows.empty() ? "" : "<dl class=\"rows\">\n" + rows + "</dl>") + warnings);
+}
+
+}  // namespace ls::report

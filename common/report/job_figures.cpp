@@ -1,0 +1,121 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include "common/report/html.h"
+#include "common/report/job_sections.h"
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+struct Part {
+  const char* key;
+  const char* name;
+  const char* meaning;
+};
+constexpr std::array kParts{
+    Part{"load", "load", "reading what the scene names"},
+    Part{"build", "build", "making it ready to trace"},
+    Part{"render", "render", "tracing"},
+    Part{"transfer", "transfer", "on the network"},
+    Part{"merge", "merge", "folding and measuring, in the coordinator"},
+    Part{"idle", "idle", "lent threads without work"},
+};
+
+std::string fact(const char* name, const std::string& value, const std::string& note,
+                 const char* css_class = "") {
+  if (value == kAbsent) return "";
+  return fmt::format("<div{}><dt>{}</dt><dd><b>{}</b>{}</dd></div>", css_class, name, value,
+                     note.empty() ? "" : "<small>" + note + "</small>");
+}
+
+std::string within(const Json& report, const char* key) {
+  const auto ci = interval(report, key);
+  return ci ? fmt::format("95 %: {} to {}", figure(ci->first), figure(ci->second)) : std::string();
+}
+
+std::string key_figures(const Json& report) {
+  constexpr const char* kKey = " class=\"key\"";
+  std::string out = fact("relMSE", figure(number(report, "relmse")), within(report, "relmse_ci95"), kKey);
+  if (const double target = number(report, "target_error"); target > 0 && !out.empty())
+    out.insert(out.rfind("</dd>"), fmt::format("<small>target {}</small>", given(target)));
+  out += fact("Samples per pixel", given(number(report, "spp")), "", kKey);
+  out += fact("Render time", duration(number(report, "render_seconds")), "first ray to last fold", kKey);
+  return out + fact("Core time", duration(number(report, "core_seconds")), "spent on rendering", kKey);
+}
+
+std::string true_figures(const Json& report) {
+  const Json& reference = member(report, "reference");
+  const bool nested = reference.is_object();
+  const double relmse = nested ? number(reference, "relmse") : number(report, "true_relmse");
+  const double rmse = nested ? number(reference, "rmse") : number(report, "true_rmse");
+  const double noise = number(reference, "noise_relmse");
+  return fact("True relMSE", figure(relmse),
+              noise > 0 ? fmt::format("the reference's own, {}, taken off", figure(noise))
+                        : "against the reference") +
+         fact("True RMSE", figure(rmse), "") +
+         fact("FLIP", figure(number(reference, "flip")), "0: looks the same");
+}
+
+std::string lesser_figures(const Json& report) {
+  std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
+  out += true_figures(report);
+  out += fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)");
+  out += fact("per core", figure(number(report, "efficiency_per_core")), "1 / (relMSE × core seconds)");
+  out += fact("Samples", count(number(report, "samples")), "");
+  out += fact("Loading", duration(number(report, "load_seconds")), "");
+  return out + fact("Memory", byte_size(number(report, "peak_rss_bytes")), "at its peak");
+}
+
+// Of stacked bars; widths as attributes: the page's policy forbids style attributes.
+std::string bar(const Json& time, double total) {
+  std::string out =
+      R"(<svg class="bar" viewBox="0 0 1000 26" preserveAspectRatio="none" aria-hidden="true">)";
+  double x = 0;
+  for (std::size_t i = 0; i < kParts.size(); ++i) {
+    const double seconds = number(time, kParts[i].key);
+    if (!(seconds > 0)) continue;
+    const double width = 1000 * seconds / total;
+    fmt::format_to(std::back_inserter(out),
+                   R"(<rect class="t{}" x="{:.2f}" y="0" width="{:.2f}" height="26"/>)", i, x, width);
+    x += width;
+  }
+  return out + "</svg>";
+}
+
+}  // namespace
+
+std::string figures(const Json& report) {
+  const std::string keys = key_figures(report), others = lesser_figures(report);
+  std::string out = keys.empty() ? "" : "<dl class=\"figures\">" + keys + "</dl>";
+  return out + (others.empty() ? "" : "<dl class=\"figures lesser\">" + others + "</dl>");
+}
+
+std::string time_split(const Json& report) {
+  const Json& time = member(report, "time");
+  double total = 0;
+  for (const Part& part : kParts)
+    if (const double seconds = number(time, part.key); std::isfinite(seconds) && seconds > 0)
+      total += seconds;
+  if (!(total > 0) || !std::isfinite(total)) return "";
+  std::string rows;
+  for (std::size_t i = 0; i < kParts.size(); ++i) {
+    const double seconds = number(time, kParts[i].key);
+    if (!(seconds >= 0)) continue;
+    rows += fmt::format(
+        "<tr><th scope=\"row\"><svg class=\"swatch\" viewBox=\"0 0 10 10\" aria-hidden=\"true\"><rect "
+        "class=\"t{}\" width=\"10\" "
+        "height=\"10\" rx=\"2\"/></svg>{}</th><td>{}</td><td>{}</td><td class=\"why\">{}</td></tr>\n",
+        i, kParts[i].name, duration(seconds), percent(seconds / total), kParts[i].meaning);
+  }
+  return section("Where the time went",
+                 bar(time, total) +
+                     "<table class=\"split\"><caption class=\"unseen\">Core time by what it was spent on"
+                     "</caption><tbody>\n" +
+                     rows + "</tbody></table>");
+}
+
+}  // namespace ls::report

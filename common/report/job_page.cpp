@@ -1,0 +1,95 @@
+#include "common/report/job_page.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/report/html.h"
+#include "common/report/job_sections.h"
+#include "common/report/log_plot.h"
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+std::string css() { return std::string(page_css()) + std::string(plot_css()); }
+
+std::string size_of(const Json& report) {
+  const auto size = interval(report, "size");
+  return size ? fmt::format("{:.0f} × {:.0f}", size->first, size->second) : std::string();
+}
+
+std::string name_of(const Json& report) {
+  for (const char* key : {"name", "job"})
+    if (std::string name = text(report, key); !name.empty()) return name;
+  return "render";
+}
+
+std::string how_it_ended(const Json& report) {
+  const std::string state = text(report, "state"), stopped = text(report, "stopped");
+  const std::string why = stopped == "spp"     ? "all its samples are in"
+                          : stopped == "error" ? "the target error is reached"
+                          : stopped == "time"  ? "its time was up"
+                          : stopped == "user"  ? "someone stopped it"
+                                               : "";
+  if (state == "done" || state.empty()) return why.empty() ? state : "done: " + why;
+  return state + (state == "running" ? ": figures so far" : "");
+}
+
+std::string verdict(const Json& report) {
+  const std::string note = text(report, "note"), words = text(report, "verdict");
+  std::string out;
+  if (!flag(report, "trusted", true) && !words.empty())
+    out += "<p class=\"verdict\" role=\"note\">" + escape_html(words) + "</p>";
+  if (!note.empty()) out += "<p class=\"note\">" + escape_html(note) + "</p>";
+  return out;
+}
+
+std::string header(const Json& report) {
+  std::string sub;
+  for (const std::string& part :
+       {how_it_ended(report), size_of(report), date_time(number(report, "submitted_unix"))})
+    if (!part.empty() && part != kAbsent) sub += (sub.empty() ? "" : " · ") + escape_html(part);
+  return fmt::format(
+      "<header><p class=\"brand\"><svg viewBox=\"0 0 32 32\" aria-hidden=\"true\"><path class=\"beam\" "
+      "d=\"M8 5 L15 3 L30 29 L13 "
+      "29 Z\"/><path class=\"window\" d=\"M8 5 L15 3 L16.4 5.5 L8.6 7.8 Z\"/></svg>Lightshaft "
+      "report</p><h1>{}</h1><p "
+      "class=\"sub\">{}</p></header>\n",
+      escape_html(name_of(report)), sub);
+}
+
+std::string picture(const std::vector<std::byte>& png, const std::string& alt) {
+  return fmt::format("<img alt=\"{}\" src=\"{}\">", alt, data_url("image/png", png));
+}
+
+std::string pictures(const JobPage& page, const Json& report) {
+  std::string out, maps;
+  if (!page.image.empty())
+    out += "<figure class=\"image\">" + picture(page.image, escape_html(name_of(report)) + ", the image") +
+           "</figure>\n";
+  const auto add = [&](const std::vector<std::byte>& png, const char* name, const char* meaning) {
+    if (png.empty()) return;
+    maps += fmt::format("<figure class=\"map\">{}<figcaption><b>{}</b> {}</figcaption></figure>\n",
+                        picture(png, fmt::format("Map of the {} over the image", name)), name, meaning);
+  };
+  add(page.error_map, "error", "of each pixel, relative to its brightness: dark is exact, bright is noisy");
+  add(page.samples_map, "samples", "of each pixel: dark is few, bright is many");
+  return out + (maps.empty() ? "" : "<div class=\"pair\">" + maps + "</div>");
+}
+
+}  // namespace
+
+Result<std::string> job_page(const JobPage& page) {
+  const Json report = Json::parse(page.report, nullptr, false);
+  if (!report.is_object())
+    return fail(Errc::invalid_argument, "the report is no JSON object, so no page can be made of it");
+  const std::string body = "<main>\n" + header(report) + pictures(page, report) + figures(report) +
+                           verdict(report) + curves(report) + time_split(report) + health(report) +
+                           features(report) + provenance(report) + "</main>";
+  return document(name_of(report) + " · Lightshaft report", css(), body);
+}
+
+std::string job_page_policy() { return document_policy(css()); }
+
+}  // namespace ls::report

@@ -1,0 +1,202 @@
+#include "common/report/job_page.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace ls::report {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kMarkup = "<img src=x onerror=\"alert('x')\">&amp;<script>alert(1)</script>";
+
+json some_report() {
+  json j = json::parse(
+      R"({"job": "j-1", "name": "bath.xml", "state": "done", "stopped": "spp", "size": [320, 240], "spp": 512,
+    "samples": 39321600, "render_seconds": 95.1, "core_seconds": 88.3, "load_seconds": 0.7, "peak_rss_bytes": 36347904,
+    "rmse": 0.046, "relmse": 0.022, "relmse_ci95": [0.0125, 0.0389], "target_error": 0.005, "slope": -0.91,
+    "slope_ci95": [-0.99, -0.83], "trend": "converging as expected", "trusted": true, "verdict": "converging as expected",
+    "forecast": {"target": 0.005, "asked": true, "spp": 2048, "core_seconds": 300, "core_seconds_ci95": [222, 420]},
+    "time": {"load": 1, "build": 2, "render": 80, "transfer": 4, "merge": 1, "idle": 12},
+    "health": {"clean": true, "causes": []}, "clamped_values": 0, "seed": 7, "integrator": "volpath", "scene": "abcd",
+    "analysis": {"parts": [{"part": "meshes", "used": false, "why": "no mesh files"}, {"part": "surfaces", "used": true, "why": "1 cube"}],
+                 "left_out": [{"what": "texture", "why": "no shape wears it", "count": 3, "bytes": 2048}]},
+    "warnings": [], "convergence": []})");
+  for (double s = 1; s < 100; s *= 2)
+    j["convergence"].push_back({{"seconds", s},
+                                {"core_seconds", 2 * s},
+                                {"spp", 8 * s},
+                                {"rmse", 0.3},
+                                {"relmse", 1 / s},
+                                {"relmse_ci95", {0.8 / s, 1.2 / s}}});
+  return j;
+}
+
+std::string page_of(const json& report) {
+  auto page = job_page({report.dump(), {std::byte{1}, std::byte{2}}, {}, {}});
+  EXPECT_TRUE(page) << page.error().message;
+  return page ? *page : "";
+}
+
+void expect(const std::string& page, std::string_view words) {
+  EXPECT_NE(page.find(words), std::string::npos) << '"' << words << "\" is not in\n" << page;
+}
+
+std::size_t times(const std::string& text, std::string_view what) {
+  std::size_t n = 0;
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += what.size()) ++n;
+  return n;
+}
+
+TEST(JobPage, TellsWhatTheReportTells) {
+  const std::string page = page_of(some_report());
+
+  for (const char* words :
+       {"<h1>bath.xml</h1>",
+        "done: all its samples are in",
+        "320 × 240",
+        "0.0220",
+        "0.0125 to 0.0389",
+        "target 0.005",
+        "512",
+        "95 s",
+        "34.7 MiB",
+        "Slope <b>−0.91</b> (−0.99 to −0.83",
+        "relMSE 0.005 needs 5 min more of core time (3.7 min to 7 min), to 2,048 samples per pixel.",
+        "relMSE against wall clock",
+        "relMSE against core time",
+        "<th scope=\"row\">",
+        "80 %",
+        "Clean: no sample was rejected",
+        "no mesh files",
+        "1 cube",
+        "texture × 3, 2.0 KiB",
+        "volpath",
+        "data:image/png;base64,AQI="})
+    expect(page, words);
+}
+
+// A target that nobody asked for is none.
+TEST(JobPage, WithoutATargetSaysWhatHalfOfTheErrorWouldCost) {
+  json report = some_report();
+  report["target_error"] = nullptr;
+  report["forecast"]["asked"] = false;
+  report["forecast"]["target"] = 0.011;
+  const std::string page = page_of(report);
+
+  expect(page, "relMSE 0.011 would need 5 min more");
+  EXPECT_EQ(times(page, "class=\"target\""), 0u);
+  EXPECT_EQ(times(page_of(some_report()), "class=\"target\""), 2u) << "one in each plot";
+}
+
+TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
+  json report = some_report();
+  for (json& p : report["convergence"]) p["true_relmse"] = 1.1 * p["relmse"].get<double>();
+  report["reference"] = {
+      {"relmse", 0.0242}, {"rmse", 0.05}, {"flip", 0.043}, {"digest", "beef"}, {"noise_relmse", 0.0002}};
+  const std::string page = page_of(report);
+
+  for (const char* words :
+       {"True relMSE", "0.0242", "FLIP", "0.0430", "against the reference", "beef", "2.00 × 10⁻⁴, taken off"})
+    expect(page, words);
+  EXPECT_EQ(times(page, "polyline class=\"line c1 dashed\""), 2u);
+  EXPECT_EQ(times(page_of(some_report()), "polyline class=\"line c1"), 0u);
+}
+
+TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
+  json report = some_report();
+  report["trusted"] = false;
+  report["verdict"] = "don't trust yet";
+  report["few_hits_pixels"] = 12;
+  report["health"] =
+      json::parse(R"({"clean": false, "causes": [{"text": "3 samples were not a number", "frame": null,
+    "first": [{"pixel": [412, 96], "sample": 1100}], "replay": "lightshaft render x.xml --pixel 412,96 --sample 1100"}]})");
+  const std::string page = page_of(report);
+
+  expect(page, "class=\"verdict\" role=\"note\">don&#39;t trust yet");
+  expect(page, "3 samples were not a number; first at pixel 412,96, sample 1,100.");
+  expect(page, "lightshaft render x.xml --pixel 412,96 --sample 1100");
+  expect(page, "12 pixels got too few hits");
+}
+
+// Every text of the report, wherever it stands, is a stranger's.
+void poison(json& j) {
+  if (j.is_string()) j = kMarkup;
+  if (j.is_structured())
+    for (json& child : j) poison(child);
+}
+
+TEST(JobPage, NoTextOfTheReportBecomesMarkup) {
+  json report = some_report();
+  report["warnings"] = {"w"};
+  report["note"] = "n";
+  report["trusted"] = false;
+  report["build"] = report["pixels_sha256"] = report["numeric_class"] = "x";
+  report["features_used"] = report["features_left_out"] = {"f"};
+  report["health"]["causes"] =
+      json::parse(R"([{"text": "t", "replay": "r", "first": [{"pixel": [1, 2], "sample": 3}], "frame": 4}])");
+  poison(report);
+  const std::string page = page_of(report);
+
+  EXPECT_GT(times(page, "&lt;img src=x onerror=&quot;alert(&#39;x&#39;)&quot;&gt;"), 15u);
+  EXPECT_EQ(times(page, "<script"), 0u);
+  EXPECT_EQ(times(page, "<img"), 1u) << "the picture itself";
+  EXPECT_EQ(times(page, "onerror=\""), 0u);
+}
+
+// A mutant of the report per field: absent, and of another type. It must never throw or show a NaN.
+void expect_sound(const json& report) {
+  const std::string page = page_of(report);
+  EXPECT_EQ(times(page, "nan"), times(page, "Provenance")) << report.dump(1);
+  EXPECT_EQ(times(page, "inf"), 0u) << report.dump(1);
+}
+
+TEST(JobPage, LacksWhatTheReportLacksAndTakesNothingForWhatItIsNot) {
+  const json whole = some_report();
+  const std::vector<json> others{nullptr,
+                                 true,
+                                 "text",
+                                 -1,
+                                 0,
+                                 1e308,
+                                 json::array(),
+                                 json::object(),
+                                 json::array({"a", nullptr}),
+                                 json::array({json::object()})};
+  for (const auto& [key, value] : whole.items()) {
+    json without = whole;
+    without.erase(key);
+    expect_sound(without);
+    for (const json& other : others) {
+      json mutant = whole;
+      mutant[key] = other;
+      expect_sound(mutant);
+      for (const char* nested : {"time", "forecast", "health", "analysis"})
+        if (whole[nested].is_object()) {
+          mutant = whole;
+          for (json& inner : mutant[nested]) inner = other;
+          expect_sound(mutant);
+        }
+    }
+  }
+  expect_sound(json::object());
+}
+
+TEST(JobPage, ConvergencePointsMayBeAnything) {
+  json report = some_report();
+  report["convergence"] =
+      json::parse(R"([null, 1, {}, {"seconds": -1, "relmse": 0}, {"seconds": "x", "relmse": []},
+    {"seconds": 1e300, "core_seconds": 1e-300, "relmse": 1e300, "relmse_ci95": [1, 2, 3]}, {"seconds": 1, "relmse": 1e-300, "relmse_ci95": ["a", 0]}])");
+  expect_sound(report);
+}
+
+TEST(JobPage, WhatIsNoReportIsRefused) {
+  for (const char* text : {"", "[]", "{", "7"})
+    EXPECT_EQ(job_page({text, {}, {}, {}}).error().code, Errc::invalid_argument) << text;
+}
+
+TEST(JobPage, IsTheSameForTheSame) { EXPECT_EQ(page_of(some_report()), page_of(some_report())); }
+
+}  // namespace
+}  // namespace ls::report

@@ -1,0 +1,244 @@
+"""How wrong an image is and where its time went, on the page of a job: clocks, maps, tables, colours, and that nothing jumps."""
+import pytest
+
+from stub_farm import job
+
+WITH_TARGET = {"target_error": 0.001, "eta_seconds": 60, "eta_ci95": [45, 80], "eta_with_8_more": 12}
+TIME = {"load": 1, "build": 2, "render": 90, "transfer": 3, "merge": 1, "idle": 3}
+
+
+def point(seconds, **more):
+    error = 0.1 / seconds
+    return {"seconds": seconds, "core_seconds": 3 * seconds, "spp": 8 * seconds, "rmse": 0.1, "relmse": error, "relmse_ci95": [0.8 * error, 1.2 * error], **more}
+
+
+def report(*seconds, **more):
+    return {"convergence": [point(s) for s in seconds], "slope": -1.01, "slope_ci95": [-1.1, -0.9], "trend": "converging as expected", "trusted": True,
+            "verdict": "", "forecast": {"target": 0.001, "asked": True, "spp": 800, "core_seconds": 270, "core_seconds_ci95": [240, 330]}, **more}
+
+
+def places(page):
+    page.wait("document.querySelector('.plot-point')")
+    return page.evaluate("[...document.querySelectorAll('.plot-point')].map(p => [+p.getAttribute('cx'), +p.getAttribute('cy')])")
+
+
+# ---- the plot ----
+
+def test_the_clock_is_chosen_by_keyboard(open_page, farm):
+    page = open_page(f"{farm.url}/demo.html?view=job")
+    assert "3.1 min after the first ray" in page.text(".plot-reading")
+
+    page.evaluate("document.querySelector('[name=clock]:checked').focus()")
+    page.key("ArrowRight", virtual=39)
+
+    page.wait("document.querySelector('.plot-reading').innerText.includes('12 min of core time')")
+    assert page.evaluate("document.activeElement.value") == "core_seconds"
+    assert "29 min (25 min to 34 min)" in page.text(".plot-reading"), "the forecast is on the same clock"
+    assert page.evaluate("document.querySelector('.choice legend').textContent")
+
+
+def test_the_forecast_meets_the_target_within_its_interval(open_page, farm):
+    page = open_page(f"{farm.url}/demo.html?view=job")
+    target = page.wait("+document.querySelector('.plot-target line').getAttribute('y1')")
+
+    middle, more = page.evaluate("['.plot-meets', '.plot-more'].map(c => document.querySelector(c).getAttribute('d').match(/[\\d.]+/g).map(Number))")
+    span = page.evaluate("document.querySelector('.plot-span').getAttribute('d').match(/[\\d.]+/g).map(Number)")
+    last = places(page)[-1]
+
+    assert middle[1] + 5 == pytest.approx(target) and more[1] + 5 == pytest.approx(target)
+    assert last[0] < more[0] < span[0] < middle[0] < span[5], "eight more workers are sooner; the interval holds the forecast"
+
+
+def test_a_forecast_that_is_far_away_does_not_squeeze_the_curve(open_page, farm, dashboard):
+    farm.jobs["j-1"] = job(**{**WITH_TARGET, "eta_seconds": 1e9, "eta_ci95": [1e8, 1e10]})
+    farm.report = report(1, 2, 4, 8)
+    page = dashboard("#/jobs/j-1")
+
+    points = places(page)
+
+    assert page.count(".plot-ahead") == 0
+    assert points[-1][0] - points[0][0] > 300, "the points use the width"
+
+
+def test_the_table_says_what_the_plot_shows(open_page, farm):
+    page = open_page(f"{farm.url}/demo.html?view=job-reference")
+    page.wait("document.querySelector('.plot-table summary')")
+
+    page.click(".plot-table summary")
+
+    rows = page.evaluate("[...document.querySelectorAll('.plot-table tbody tr')].map(r => [...r.cells].map(c => c.innerText))")
+    assert len(rows) == page.count(".plot-point")
+    assert rows[-1] == ["3.1 min", "12 min", "214", "0.00418", "0.00382 – 0.00458", "0.00443"]
+    assert page.evaluate("[...document.querySelectorAll('.plot-table th')].every(th => th.scope === 'col')")
+
+
+def test_the_true_error_has_a_curve_of_its_own(open_page, farm):
+    page = open_page(f"{farm.url}/demo.html?view=job-reference")
+
+    dashes = page.wait("getComputedStyle(document.querySelector('.plot-true')).strokeDasharray")
+
+    assert dashes != "none", "told apart without colours"
+    assert open_page(f"{farm.url}/demo.html?view=job").count(".plot-true") == 0
+
+
+@pytest.mark.parametrize("lo, hi, shown", [
+    (1e-5, 2, ["10⁻⁵", "10⁻⁴", "0.001", "0.01", "0.1", "1"]), (0.009, 0.3, ["0.01", "0.02", "0.05", "0.1", "0.2"]), (9e-6, 6e-5, ["10⁻⁵", "2·10⁻⁵", "5·10⁻⁵"])])
+def test_ticks_of_error_are_those_of_the_reports(open_page, farm, lo, hi, shown):
+    """The same cases as tests/unit/report/log_axis_test.cpp."""
+    page = open_page(f"{farm.url}/demo.html")
+    assert page.evaluate(f"import('/js/plot_scale.js').then(({{ errorTicks }}) => errorTicks({{ lo: {lo}, hi: {hi} }}).map(t => t.label).filter(Boolean))") == shown
+
+
+@pytest.mark.parametrize("lo, hi, shown", [
+    (0.7, 300, ["1 s", "2 s", "5 s", "10 s", "20 s", "1 min", "2 min", "5 min"]), (0.5, 90000, ["1 s", "10 s", "1 min", "10 min", "1 h", "10 h", "1 d"])])
+def test_ticks_of_time_are_those_of_the_reports(open_page, farm, lo, hi, shown):
+    page = open_page(f"{farm.url}/demo.html")
+    assert page.evaluate(f"import('/js/plot_scale.js').then(({{ timeTicks }}) => timeTicks({{ lo: {lo}, hi: {hi} }}).map(t => t.label).filter(Boolean))") == shown
+
+
+@pytest.mark.parametrize("points", [
+    "null", "'x'", "[null, 1, {}]", "[{seconds: -1, core_seconds: 1, relmse: 1}]", "[{seconds: 1, core_seconds: 1, relmse: NaN}]"])
+def test_what_has_no_logarithm_is_left_out(open_page, farm, points):
+    page = open_page(f"{farm.url}/demo.html")
+    assert page.evaluate(f"import('/js/plot_scale.js').then(({{ drawable }}) => drawable({points}, 'seconds').length)") == 0
+
+
+# ---- maps ----
+
+def middle_pixel(page):
+    return page.evaluate("(() => { const c = document.querySelector('live-image canvas'); return [...c.getContext('2d').getImageData(c.width / 2, c.height / 2, 1, 1).data.slice(0, 3)]; })()")
+
+
+def test_the_maps_are_shown_over_the_image_and_follow_what_is_folded(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('live-image')?.dataset.painted")
+    assert middle_pixel(page) == [200, 120, 40]
+
+    page.click(".image-tools [value=error]")
+    page.wait("document.querySelector('live-image').dataset.painted === '2'")
+
+    assert middle_pixel(page) == [150, 30, 110]
+    assert "exact" in page.text(".legend") and page.evaluate("document.querySelector('live-image').getAttribute('aria-label')") == "steam.xml, error of each pixel"
+    farm.emit("tile", {"job": "j-1", "tile": 0, "rect": [0, 0, 32, 32], "state": "folded", "spp": 8, "worker": "w-1"})
+    page.wait("Number(document.querySelector('live-image').dataset.painted) >= 3")
+    assert farm.asked("GET", "/api/v1/jobs/j-1/error.png") >= 2
+
+    page.click(".image-tools [value=samples]")
+    page.wait("document.querySelector('.legend').innerText.includes('many')")
+    page.click(".image-tools [value=picture]")
+    page.wait("document.querySelector('#exposure')")
+
+
+# ---- where the time went ----
+
+def test_the_parts_of_the_time_fill_the_bar(farm, dashboard):
+    farm.jobs["j-1"] = job(time=TIME)
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.time-parts')")
+    parts = page.evaluate("[...document.querySelectorAll('.time-parts li')].map(li => li.innerText.replace(/\\s+/g, ' ').trim())")
+    widths = page.evaluate("(() => { const bar = document.querySelector('.time-bar'); return [...bar.children].map(i => +getComputedStyle(i).getPropertyValue('--part')); })()")
+
+    assert parts == ["load 1 s 1 %", "build 2 s 2 %", "render 90 s 90 %", "transfer 3 s 3 %", "merge 1 s 1 %", "idle 3 s 3 %"]
+    assert sum(widths) == pytest.approx(1) and widths[2] == pytest.approx(0.9)
+
+
+# ---- what changes must not make the page jump ----
+
+def test_nothing_jumps_from_the_first_sample_to_the_last(farm, dashboard):
+    nothing = {"merge": 0, "load": 0, "build": 0, "render": 0, "transfer": 0, "idle": 0}
+    farm.jobs["j-1"] = job(progress=0, units_done=0, spp_done=0, relmse=None, rmse=None, relmse_ci95=None, eta_seconds=None, target_error=0.001, time=nothing)
+    page = dashboard("#/jobs/j-1", width=1280, height=2000)
+    page.wait("document.querySelector('.plot-empty')")
+    page.evaluate("""void (() => {
+      window.jumps = [];
+      const named = ({ node, previousRect, currentRect }) => `${node?.parentElement?.className ?? ""} ${node?.nodeName} ${node?.textContent?.slice(0, 40)}: ${previousRect.y} to ${currentRect.y}`;
+      const moved = ({ previousRect, currentRect }) => Math.abs(currentRect.y - previousRect.y) > 0.5; // a figure that has become longer may reach further to the left
+      new PerformanceObserver((list) => list.getEntries().forEach((entry) => window.jumps.push(...entry.sources.filter(moved).map(named))))
+        .observe({ type: "layout-shift", buffered: false });
+    })()""")
+
+    farm.report = report(1)
+    farm.change("j-1", progress=0.1, units_done=2, spp_done=4, relmse=0.1, rmse=0.1, relmse_ci95=[0.08, 0.12], eta_seconds=20000, time=TIME)
+    page.wait("document.querySelector('.plot-point')")
+    farm.report = report(1, 2, 4, 8, trusted=False, verdict="don't trust yet: few pixels carry the error (like 16 of 76800; the worst one 25 %); bright outliers may still be missing")
+    farm.change("j-1", progress=0.4, **WITH_TARGET)
+    page.wait("document.querySelectorAll('.plot-point').length === 4 && document.querySelector('.plot-meets')")
+    farm.report = report(1, 2, 4, 8, 100)
+    farm.change("j-1", state="done", stopped="error", progress=1, relmse=0.00099, eta_seconds=None, eta_ci95=None, eta_with_8_more=None)
+    page.wait("document.querySelectorAll('.plot-point').length === 5 && document.querySelector('.state-done')")
+    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+
+    assert page.evaluate("window.jumps") == []
+
+
+# ---- removed jobs ----
+
+def test_a_removed_job_leaves_the_list(farm, dashboard):
+    farm.jobs.update({"j-1": job(), "j-2": job("j-2", "cloud.xml")})
+    page = dashboard()
+    page.wait("document.querySelectorAll('[data-job]').length === 2")
+
+    farm.remove("j-1")
+
+    page.wait("document.querySelectorAll('[data-job]').length === 1")
+    assert page.evaluate("document.querySelector('[data-job]').dataset.job") == "j-2"
+
+
+def test_the_page_of_a_removed_job_says_so(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.job')")
+
+    farm.remove("j-1")
+
+    page.wait("document.querySelector('[role=alert]')?.innerText.includes('Somebody has removed this job')")
+    assert page.count("live-image") == 0
+
+
+# ---- colours ----
+
+CONTRAST = """(() => {
+  const rgba = (text) => { const n = text.match(/[\\d.]+/g).map(Number); return text.startsWith("color(srgb") ? [...n.slice(0, 3).map((v) => 255 * v), n[3] ?? 1] : [...n.slice(0, 3), n[3] ?? 1]; };
+  const over = ([r, g, b, a], under) => [r, g, b].map((v, i) => v * a + under[i] * (1 - a));
+  const light = (colour) => { const [r, g, b] = colour.map((v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const ground = (element) => element ? over(rgba(getComputedStyle(element).backgroundColor), ground(element.parentElement)) : [255, 255, 255];
+  const faint = [];
+  let seen = 0;
+  for (const element of document.querySelectorAll("#app *")) {
+    if (![...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim()) || element.closest(".unseen, .skip, .stage") || !element.getClientRects().length) continue;
+    const inSvg = element instanceof SVGElement;
+    const under = ground(inSvg ? element.closest("svg").parentElement : element);
+    const style = getComputedStyle(element);
+    const [bright, dark] = [light(over(rgba(inSvg ? style.fill : style.color), under)), light(under)].sort((a, b) => b - a);
+    seen += 1;
+    if ((bright + 0.05) / (dark + 0.05) < 4.5) faint.push([element.textContent.slice(0, 30), ((bright + 0.05) / (dark + 0.05)).toFixed(2)]);
+  }
+  return [seen, faint];
+})()"""
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("view", ["job-reference", "job-unhealthy", "job-failed", "jobs", "workers", "submit-refused", "signin-refused"])
+def test_every_text_has_the_contrast_that_wcag_asks_for(open_page, farm, view, theme):
+    """Level AA: at least 4.5 to 1, by day and by night."""
+    page = open_page("about:blank")
+    page.call("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+    page.go(f"{farm.url}/demo.html?view={view}")
+
+    page.wait("document.querySelector('#app *')")
+    seen, faint = page.evaluate(CONTRAST)
+
+    assert seen > 3 and faint == []
+
+
+def test_by_day_the_page_is_light(open_page, farm):
+    grounds = {}
+    for theme in ("dark", "light"):
+        page = open_page("about:blank")
+        page.call("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+        page.go(f"{farm.url}/demo.html?view=jobs")
+        grounds[theme] = page.wait("getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
+
+    assert min(grounds["light"]) > 230 and max(grounds["dark"]) < 30

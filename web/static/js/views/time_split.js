@@ -1,0 +1,20 @@
+// Where the workers' core time went, and the coordinator's on merging.
+import { h } from "../dom.js";
+import { duration, percent } from "../format.js";
+
+const kParts = ["load", "build", "render", "transfer", "merge", "idle"];
+const kMeanings = {
+  load: "reading what the scene names", build: "making it ready to trace", render: "tracing", transfer: "on the network",
+  merge: "folding and measuring, in the coordinator", idle: "lent threads without work",
+};
+
+export function timeSplit(job) {
+  const parts = kParts.map((name) => ({ name, seconds: job.time?.[name] })).filter(({ seconds }) => Number.isFinite(seconds) && seconds >= 0);
+  const total = parts.reduce((sum, { seconds }) => sum + seconds, 0);
+  if (!job.time) return null;
+  return h("section", { key: "time", class: "panel time", "aria-labelledby": "time-title" },
+    h("h2", { id: "time-title" }, "Where the core time went"),
+    h("div", { class: "time-bar", "aria-hidden": "true" }, parts.map(({ name, seconds }) => h("i", { key: name, class: `time-${name}`, style: { "--part": total > 0 ? seconds / total : 0 } }))),
+    h("ul", { class: "time-parts" }, parts.map(({ name, seconds }) => h("li", { key: name, title: kMeanings[name] },
+      h("i", { class: `swatch time-${name}`, "aria-hidden": "true" }), h("span", null, name), h("b", null, duration(seconds)), h("small", null, percent(total > 0 ? seconds / total : 0))))));
+}
