@@ -1,8 +1,10 @@
+#include <cstdlib>
 #include <utility>
 
 #include "cli/cases/case.h"
 
 namespace ls::cases {
+void add_scratch(Table& t);
 
 void Table::mean(std::string id, std::string rows, std::string about, Maker scene, const Channels& expected,
                  MeanOptions options) {
@@ -43,6 +45,11 @@ Table all_cases() {
   add_surfaces(t);
   add_rooms(t);
   add_interfaces(t);
+  add_microfacets(t);
+  add_places(t);
+  add_bodies(t);
+  add_bugs(t);
+  if (getenv("SCRATCH")) add_scratch(t);
   return t;
 }
 

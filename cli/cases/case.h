@@ -119,6 +119,10 @@ void add_seed(Table& t);
 void add_surfaces(Table& t);
 void add_rooms(Table& t);
 void add_interfaces(Table& t);
+void add_microfacets(Table& t);
+void add_places(Table& t);
+void add_bodies(Table& t);
+void add_bugs(Table& t);
 
 // All of them, in the order of the report.
 Table all_cases();

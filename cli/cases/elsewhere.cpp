@@ -16,7 +16,8 @@ const std::vector<Elsewhere>& answered_elsewhere() {
       {"N20", "tests/unit/render/numerics_test.cpp", "Frame, IsOrthonormalWhereverTheNormalPoints"},
       {"N20", "tests/unit/render/numerics_test.cpp",
        "Directions, KeepTheirLengthOverAHundredThousandScatterings"},
-      {"N21", "common/scene/known.cpp", "tabphase"},  // refused by name: there are no tabulated ones
+      // There are no tabulated phase functions.
+      {"N21", "tests/system/test_validation_table.py", "test_tabulated_phase_functions_are_refused_by_name"},
       {"N30", "tests/unit/render/envmap_test.cpp",
        "EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight"},
       {"N31", "tests/unit/render/lights_tree_test.cpp",
@@ -43,9 +44,12 @@ const std::vector<Elsewhere>& answered_elsewhere() {
       {"N48", "tests/unit/render/camera_test.cpp", "Camera, ExtremeFieldsOfViewGiveUnitDirections"},
       {"N49", "tests/unit/image/sums_test.cpp", "Sums, OfMoreOnesThanFloat32CountsAreExact"},
       {"N49", "tests/unit/image/sums_test.cpp", "Sums, OfTenthsDriftByNoMoreThanTheirRounding"},
+      {"N50", "tests/unit/image/error_estimate_test.cpp", "ErrorEstimate, SumsOfTilesAreThoseOfTheImage"},
       {"N50", "tests/unit/image/error_estimate_test.cpp",
        "ErrorEstimate, EqualHalvesHaveNoErrorAndAreBelievedOnlyAfterSomeSamples"},
       {"N51", "tests/unit/image/film_test.cpp", "Film, IsTheSameWhateverOrderTheTilesComeIn"},
+      {"N51", "tests/unit/image/merge_test.cpp",
+       "Merge, GivesTheFilmOfTheCoordinatorWhateverTheOrderOfFiles"},
       {"N51", "tests/unit/image/merge_test.cpp", "Merge, DropsEqualDuplicatesAndCountsThem"},
       {"N52", "tests/unit/image/final_image_test.cpp", "FinalExr, ClampsToTheLargestHalfAndCounts"},
       {"N53", "tests/unit/image/error_estimate_test.cpp", "ErrorEstimate, CountsFirefliesInFull"},
@@ -54,6 +58,8 @@ const std::vector<Elsewhere>& answered_elsewhere() {
       {"N54", "tests/unit/render/health_test.cpp",
        "Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing"},
       {"N55", "tests/unit/render/sampler_test.cpp", "SampleStream, SamplesBeyondTheSequenceAreDrawnByHash"},
+      {"N56", "tests/unit/render/sampler_test.cpp",
+       "SampleStream, PixelsHalvesSeedsVerticesAndPurposesAreUncorrelated"},
       {"N56", "tests/unit/render/sampler_test.cpp", "SampleStream, NoKeyRepeatsOverAJobOfAMillionNumbers"},
       {"N57", "tests/unit/assemble/assemble_test.cpp", "Report, HasEveryKeyOfTheContract"},
       {"N59", "tests/unit/render/boundary_test.cpp", "Boundaries, RejectSamplesWhoseShadowRaysAreCutOff"},
@@ -62,7 +68,8 @@ const std::vector<Elsewhere>& answered_elsewhere() {
       {"N63", "tests/unit/image/final_image_test.cpp", "Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds"},
       {"N66", "tests/unit/render/glow_test.cpp",
        "BlackBody, IsDarkWhereItIsColdAndNeverMoreThanRayleighAndJeans"},
-      {"N68", "common/scene/known.cpp", "motion is not rendered"},  // shutters mean nothing, with a warning
+      // Nothing moves.
+      {"N68", "tests/system/test_validation_table.py", "test_shutters_that_mean_nothing_are_warned_of"},
       {"N69", "tests/statistical/overlaps.cpp", "Two identical media of half the density"},
   };
   return rows;

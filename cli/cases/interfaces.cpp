@@ -6,6 +6,7 @@
 
 #include "cli/cases/case.h"
 #include "cli/cases/checks.h"
+#include "cli/cases/stages.h"
 #include "common/image/exr_file.h"
 
 namespace ls::cases {
@@ -50,18 +51,11 @@ void stacks(Table& t) {
 }
 
 // ---- shapes that are none, and instances
-AssetIndex file(SceneKit& kit, const std::string& name, const std::string& bytes) {
-  static const ScratchFolder folder;
-  const Asset asset{name, sha256(bytes), bytes.size()};
-  const auto path = folder.path() / asset.digest.hex();
-  std::ofstream(path, std::ios::binary) << bytes;
-  kit.files[asset.digest] = path;
-  return SceneKit::push<AssetTag>(kit.scene.assets, asset);
-}
 SceneKit mesh(const std::string& more) {
   SceneKit kit;
   MeshShape m;
-  m.file = file(kit, "mesh.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\n" + more + "f 1 3 4\n");
+  m.file =
+      text_file(kit, "mesh.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\n" + more + "f 1 3 4\n");
   kit.shape(m, scale(2), kit.diffuse(.5));
   kit.environment();
   kit.look({0, -4, 3}, {0, 0, 0}, 40);
@@ -118,7 +112,7 @@ SceneKit painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   const auto bytes = write_exr(picture);
   BitmapTexture image;
   if (bytes)
-    image.file = file(kit, "paint.exr", {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+    image.file = text_file(kit, "paint.exr", {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
   image.to_uv = to_uv;
   kit.shape(RectangleShape{}, scale(50),
             kit.bsdf(DiffuseBsdf{SceneKit::push<TextureTag>(kit.scene.textures, image)}));

@@ -118,6 +118,35 @@ void from_afar(Table& t) {
   }
 }
 
+// Lights of radius (or half side) 1e5 at 1e7, of fluence 1, over a cube of size 2: float32 coordinates of a
+// world of that size tell its faces apart only about the cube.
+void enormous(Table& t) {
+  constexpr double kSize = 1e5, kFar = 1e7;
+  const double cone = 2 * kPi * (1 - std::sqrt(1 - kSize * kSize / kFar / kFar)),
+               disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
+               square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
+  struct Light {
+    const char* name;
+    Geometry shape;
+    double solid_angle;
+  };
+  for (const Light& light : {Light{"sphere", SphereShape{}, cone}, Light{"disk", DiskShape{}, disk},
+                             Light{"square", RectangleShape{}, square}}) {
+    for (const Way& way : all_ways())
+      t.mean(fmt::format("N24-{}-of-1e5-at-1e7{}", light.name, way.name()), "N24 N26",
+             "A light of size 1e5 at 1e7, of fluence 1: a sun of half a degree over a cube of size 2.",
+             [=] {
+               SceneKit kit = lit_cube(way, rgb(1), rgb(1));
+               kit.scene.emitters.clear();
+               kit.shape(light.shape, translate({0, kFar, 0}) * rotate_x(90) * scale(kSize), kit.diffuse(0))
+                   .emitter = AreaEmitter{kit.texture(rgb(1 / light.solid_angle))};
+               return kit;
+             },
+             // Its rim is .01 rad off, .014 in the corners: ways down are longer by at most 1e-4.
+             grey(lit_cube_answer(1, 1)), {.slack = 1e-4});
+  }
+}
+
 // A cube [-1, 1]^3 seen along z through its middle, and a lamp on the y axis, inside it or out: extinction
 // counts inside only.
 double cube_answer(double y, double sigma) {
@@ -156,6 +185,7 @@ void add_lamps(Table& t) {
   passing_by(t);
   through_a_lamp(t);
   from_afar(t);
+  enormous(t);
   across_boundaries(t);
 }
 

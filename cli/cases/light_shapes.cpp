@@ -103,17 +103,12 @@ void huge(Table& t) {
 
 // Triangles as OBJ, given by the corners of each.
 AssetIndex obj(SceneKit& kit, const std::vector<std::array<Vec3, 3>>& triangles) {
-  static const ScratchFolder folder;
   std::string text;
   for (const auto& triangle : triangles)
     for (const Vec3& p : triangle) text += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
   for (std::size_t i = 0; i < triangles.size(); ++i)
     text += fmt::format("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
-  const Asset asset{"lamp.obj", sha256(text), text.size()};
-  const auto path = folder.path() / asset.digest.hex();
-  std::ofstream(path, std::ios::binary) << text;
-  kit.files[asset.digest] = path;
-  return SceneKit::push<AssetTag>(kit.scene.assets, asset);
+  return text_file(kit, "lamp.obj", text);
 }
 
 void of_nothing(Table& t) {

@@ -13,6 +13,20 @@ SceneKit unit_cube(const Way& way, const Rgb& sigma_t, const Rgb& albedo, double
   return kit;
 }
 
+SceneKit head_on(const Way& way, double g, double sigma, bool backlit) {
+  SceneKit kit = unit_cube(way, rgb(sigma), rgb(1), g);
+  kit.scene.sensor.projection = Projection::orthographic;
+  kit.scene.sensor.to_world = look_at({-3, .5, .5}, {.5, .5, .5}, {0, 0, 1}) * scale(.01, .01, 1);
+  kit.scene.emitters.push_back(DirectionalEmitter{{backlit ? -1. : 1., 0, 0}, rgb(1)});
+  kit.scene.integrator.max_depth = kOnce;
+  return kit;
+}
+
+double head_on_answer(double g, double sigma) {
+  const double near = 1 - std::abs(g), peak = (1 + std::abs(g)) / (near * near) / (4 * kPi);
+  return peak * (g > 0 ? sigma * std::exp(-sigma) : -std::expm1(-2 * sigma) / 2);
+}
+
 SceneKit lit_cube(const Way& way, const Rgb& sigma_t, const Rgb& albedo, double y, const Vec3& at,
                   double size) {
   SceneKit kit;
@@ -87,6 +101,15 @@ SceneKit column(const Way& way, const Slab& slab, bool transmitted) {
   kit.environment();
   kit.look({.1, .15, slab.tau + 1}, {.1, .15, 0}, 1e-3, {0, 1, 0});
   return kit;
+}
+
+AssetIndex text_file(SceneKit& kit, const std::string& name, const std::string& bytes) {
+  static const ScratchFolder folder;
+  const Asset asset{name, sha256(bytes), bytes.size()};
+  const auto path = folder.path() / asset.digest.hex();
+  std::ofstream(path, std::ios::binary) << bytes;
+  kit.files[asset.digest] = path;
+  return SceneKit::push<AssetTag>(kit.scene.assets, asset);
 }
 
 SceneKit half_space(const Way& way, double albedo, double depth, double cosine) {

@@ -12,6 +12,12 @@ inline constexpr int kOnce = 2;
 // The unit cube of a medium in the dark, seen along x through its middle: a unit of it.
 SceneKit unit_cube(const Way& way, const Rgb& sigma_t, const Rgb& albedo = rgb(0), double g = 0);
 
+// That cube, of albedo 1, and light along the view itself or against it, by parallel rays: scattered by 0
+// degrees, p(0) sigma d e^(-sigma d) arrives of light from behind; by 180, p(180) (1 - e^(-2 sigma d)) / 2.
+SceneKit head_on(const Way& way, double g, double sigma, bool backlit);
+// Of a light from behind where g > 0, from the eye where g < 0: 4 pi p = (1 + |g|) / (1 - |g|)^2.
+double head_on_answer(double g, double sigma);
+
 // The cube [-1, 1]^3 of a medium lit once, straight down its y axis with irradiance 1, seen along z at height
 // y: L = a / (4 pi) e^(-sigma (1 - y)) (1 - e^(-2 sigma)) (STABILITY 7.6f).
 SceneKit lit_cube(const Way& way, const Rgb& sigma_t, const Rgb& albedo, double y = 0,
@@ -40,6 +46,9 @@ SceneKit column(const Way& way, const Slab& slab, bool transmitted);
 // A cube of `depth` mean free paths to a side before a black plate, in a sky, seen at an angle of this cosine
 // from the normal of its upper face: all but endless.
 SceneKit half_space(const Way& way, double albedo, double depth, double cosine);
+
+// A file of these bytes that the scene names so.
+AssetIndex text_file(SceneKit& kit, const std::string& name, const std::string& bytes);
 
 // Composite Simpson; n even.
 template <class F>

@@ -33,6 +33,34 @@ def test_every_row_of_the_list_is_a_case_or_a_test_that_is_named(table):
     assert missing == []
 
 
+SCENE = """<scene version="3.0.0">
+  <sensor type="perspective">{sensor}<film type="hdrfilm"/></sensor>
+  <medium type="homogeneous" id="fog"><phase type="{phase}">{values}</phase></medium>
+  <shape type="cube"><bsdf type="null"/><ref id="fog" name="interior"/></shape>
+  <emitter type="constant"/>
+</scene>
+"""
+
+
+def inspected(tmp_path, code, sensor="", phase="isotropic", values=""):
+    scene = tmp_path / "scene.xml"
+    scene.write_text(SCENE.format(sensor=sensor, phase=phase, values=values))
+    return lightshaft("inspect", scene, code=code)
+
+
+def test_tabulated_phase_functions_are_refused_by_name(tmp_path):
+    values = '<string name="values" value="1, 2, 1e6"/>'
+    said = inspected(tmp_path, 2, phase="tabphase", values=values).stderr
+    assert "scene.xml:3:" in said and 'the phase "tabphase" is not supported; supported: hg, isotropic' in said
+
+
+def test_shutters_that_mean_nothing_are_warned_of(tmp_path):
+    for close in ("0", "1"):
+        said = inspected(tmp_path, 0, sensor=f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>').stderr
+        assert "'shutter_close'" in said and "motion is not rendered" in said
+    assert "motion" not in inspected(tmp_path, 0).stderr
+
+
 def test_cases_are_chosen_by_prefix_or_glob(tmp_path):
     out = tmp_path / "one.json"
     lightshaft("validate", "--case", "N01-*/grid/volpath", "--json", out)

@@ -156,6 +156,7 @@ class SegmentLight {
       spot = s.after(x);
       p = path.start_ + path.d_ * spot.t;
     }
+    const V3 start = p;
     p = path.clear_of_ends(p, segment, spot.t);
     const C3 scattering = spot.rate > 0 ? s.scattering(spot, p) : C3(0);
     if (is_black(scattering)) return;
@@ -176,7 +177,7 @@ class SegmentLight {
     }
     RandomStream stream =
         path.stream_.stream(path.segment_, by_angle ? Purpose::track_segment : Purpose::track_distance);
-    const C3 arriving = path.unoccluded(p, p, *light, path.medium_, RandomStream(stream.next()));
+    const C3 arriving = path.unoccluded(start, p, *light, path.medium_, RandomStream(stream.next()));
     if (is_black(arriving)) return;
     const C3 through = transmittance<F>(medium, path.start_, path.d_, 0, spot.t, RandomStream(stream.next()));
     path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)), true);

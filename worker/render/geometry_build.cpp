@@ -57,6 +57,34 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
+// Float32 leaves a mesh that lies far from the origin few bits for its own form.
+double bits_left(const Bounds& b, const V3d& origin) {
+  const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
+  const double size = std::max(half.x, std::max(half.y, half.z)),
+               far = std::max(std::abs(away.x), std::max(std::abs(away.y), std::abs(away.z)));
+  return size / std::max(size, far);
+}
+
+// All shapes about the middle of their box; but where that leaves some mesh less than 8 bits of 24 (a small
+// scene lit by a sphere of 1e5 at 1e7), about the mesh that has the fewest, if that is better for all of
+// them.
+Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
+  Space s = unit_space(all);
+  constexpr double kFewBits = 0x1p-16;
+  const auto worst = [&](const V3d& origin) {
+    return std::min_element(meshes.begin(), meshes.end(), [&](const Bounds& a, const Bounds& b) {
+      return bits_left(a, origin) < bits_left(b, origin);
+    });
+  };
+  const auto m = worst(s.center);
+  if (m == meshes.end() || !(bits_left(*m, s.center) < kFewBits)) return s;
+  const V3d there = (m->lo + m->hi) * .5;
+  if (!(bits_left(*worst(there), there) > bits_left(*m, s.center))) return s;
+  Bounds wide = all;  // made even about its new middle
+  for (const V3d& corner : {all.lo, all.hi}) wide.add(there * 2 - corner);
+  return unit_space(wide);
+}
+
 // A closed mesh has no area to any side, all in all: its normals, weighted by area, add up to nothing.
 bool is_sheet(const LocalMesh& mesh) {
   V3d sum(0);
@@ -195,6 +223,7 @@ struct Parts {
   std::vector<Placed> shapes;
   Bounds world;
   std::vector<Bounds> groups;
+  std::vector<Bounds> meshes;  // of the world's own shapes, those that are made of triangles
 };
 
 // Vertices are counted in 32 bits, by the BVH too.
@@ -214,6 +243,9 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
                   fmt::format("the scene's meshes have more than {} vertices together", kMaxVertices));
     const auto& group = scene.shapes[i].group;
     add_bounds(*p, group ? parts.groups[group->value] : parts.world);
+    Bounds own;
+    add_bounds(*p, own);
+    if (!group && !p->mesh.positions.empty() && (own.hi - own.lo).length() > 0) parts.meshes.push_back(own);
     parts.shapes.push_back(std::move(*p));
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -298,11 +330,14 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
     g.surfaces.back().wants_attributes = !parts->shapes[i].mesh.attributes.empty();
   }
   g.attributes = attributes_of(scene);
-  const Space world = unit_space(parts->world);
+  const Space world = world_space(parts->meshes, parts->world);
   g.center = world.center;
   g.scale = world.scale;
-  if (!parts->world.empty())
-    g.radius = static_cast<float>(((parts->world.hi - parts->world.lo) * .5).length() * g.scale);
+  if (!parts->world.empty()) {
+    const V3d half = (parts->world.hi - parts->world.lo) * .5,
+              aside = (parts->world.hi + parts->world.lo) * .5 - g.center;
+    g.radius = static_cast<float>((half.length() + aside.length()) * g.scale);
+  }
   g.own = append_all(g, scene, *parts, std::nullopt, world);
   std::vector<Space> spaces;
   for (std::uint32_t i = 0; i < scene.groups.size(); ++i)

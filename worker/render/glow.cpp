@@ -126,6 +126,16 @@ class GlowWalk {
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
   double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
 
+  // Of what is taken there, the share that is not scattered.
+  C3 absorbing_at(double t) const {
+    if (!m_.albedo[0]) return m_.absorbing;
+    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
+    C3 a(0);
+    for (int k = 0; k < 3; ++k)
+      if (m_.sigma_t[k] > 0) a[k] = std::max(0.f, m_.sigma_t[k] - scattering[k]) / m_.sigma_t[k];
+    return a;
+  }
+
   // A share of the light e of channel c, or of all of them where they have one extinction.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
@@ -175,9 +185,8 @@ class GlowWalk {
     if (!(absorbed > 0)) return;
     const double t = absorption_point(a, b, s, absorbed, u);
     V3d e = source(t);
-    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
-    for (int k = 0; k < 3; ++k)
-      e[k] = m_.sigma_t[k] > 0 ? e[k] * std::max(0.f, m_.sigma_t[k] - scattering[k]) / m_.sigma_t[k] : 0;
+    const C3 absorbing = absorbing_at(t);
+    for (int k = 0; k < 3; ++k) e[k] = m_.sigma_t[k] > 0 ? e[k] * absorbing[k] : 0;
     add(c, e, absorbed);
   }
 

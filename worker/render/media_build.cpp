@@ -126,6 +126,7 @@ Result<void> HeteroBuilder::albedo() {
   const Volume& volume = scene.volumes.at(m.albedo.value);
   if (const auto* a = std::get_if<ConstVolume>(&volume)) {
     out.sigma_s = color(times(sigma, a->value));
+    out.absorbing = color({1 - a->value[0], 1 - a->value[1], 1 - a->value[2]});
     return {};
   }
   auto loaded = load(volume, per_unit);

@@ -38,6 +38,9 @@ struct Medium {
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
+  // Of a grid with a constant albedo, 1 less that: what is left of an albedo of 1 - 1e-7 in float32 is a
+  // fifth off.
+  C3 absorbing{1, 1, 1};
   HenyeyGreenstein phase;
   // Light given off (glow.h). Homogeneous: `emission` [radiance per world unit]. Grid: `emission` times the
   // emitter's value, or times a black body's radiance at offset + scale times that value, and (but for

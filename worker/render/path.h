@@ -15,6 +15,7 @@
 //                                                   pivot. 1 for a default-constructed one, as on surfaces.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <type_traits>
@@ -128,20 +129,45 @@ class PathTracer {
     const float share = distance * std::abs(dot(offset, d_)) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
-  // A point at t of a segment keeps as far from the surfaces at both ends as rays that leave them: rounding
-  // must not put it on the other side, where the medium has no end.
+  // Where a ray is sent from that is scattered at t of a segment: as far from the surfaces at both ends as
+  // rays that leave them. Rounding must not put it on the other side, where the medium has no end.
   V3 clear_of_ends(V3 p, const Segment& s, float t) const {
     if (s.lead > 0) p += clear_of(o_ - start_, t);
-    if (s.end) p += clear_of(offset_point(*s.end, -d_) - s.end->p, s.length - t);
+    const V3 from_end = s.end ? clear_of(offset_point(*s.end, -d_) - s.end->p, s.length - t) : V3(0);
+    p += from_end;
+    if (s.lead < 0 && !(dot(from_end, from_end) > 0)) [[unlikely]]
+      p += back_off(t);
     return p;
+  }
+  // At a vertex of a medium.
+  void stand_at(const Segment& s, float t) {
+    const V3 p = start_ + d_ * t;
+    last_.p = clear_of_ends(p, s, t);
+    start_ = p;
+    o_ = last_.p;
+  }
+  // Of a ray towards the surface that its start was moved away from, but that ends elsewhere: what the point
+  // at t lacks of that distance.
+  V3 back_off(float t) const {
+    const V3 offset = o_ - start_;
+    return offset * (1 - t * dot(offset, d_) / dot(offset, offset));
+  }
+  // From `start` along d to the surface that the ray from o met. Where o is farther from it than `start` - a
+  // vertex in a medium that was moved away from this very surface - the way is measured to the surface's
+  // plane: it may be a mean free path and more shorter (of a medium of optical depth 1e6).
+  static float way_to(const SurfaceHit& hit, const V3& start, const V3& o, const V3& d) {
+    const float lead = dot(o - start, d);
+    if (lead < 0) [[unlikely]]
+      return std::min(hit.t, std::max(0.f, dot(hit.p - start, hit.ng) / dot(d, hit.ng)));
+    return hit.t + lead;
   }
 
   const World& world_;
   const SampleStream& stream_;
   LightSplit* split_;
   // Where the path stands, and where its next ray is sent from: moved off a surface, so that it does not meet
-  // it again. A medium fills the way between them too (over a mean free path of a medium of optical depth
-  // 1e6).
+  // it again, or does from inside of what it bounds. A medium fills the way between them too (over a mean
+  // free path of a medium of optical depth 1e6).
   V3 start_{0, 0, 0}, o_{0, 0, 0}, d_{0, 0, 1};
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
   float eta_scale_ = 1;  // undoes the radiance scaling of refraction in roulette decisions
@@ -209,8 +235,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 // segment, if there is one, or has ended on the way, with beta black.
 template <Features F, template <Features> class Light>
 std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
-  const float lead = dot(o_ - start_, d_), t_max = end ? end->t + lead : kInfinity;
-  const Segment segment{t_max, lead, end};
+  const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
+  const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow(medium, t_max);
   const bool may_scatter = world_.depth_allows(depth_ + 1);
   const auto plan = Light<F>::ahead(*this, medium, segment, may_scatter);
@@ -226,9 +252,9 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
     return std::nullopt;
   }
   last_ = Vertex{};
-  last_.p = clear_of_ends(start_ + d_ * flight.t, segment, flight.t);
   last_.delta = false;
   last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
+  stand_at(segment, flight.t);
   apply(flight);
   if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
   ++depth_;
@@ -236,7 +262,6 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
   const Group direction = stream_.group(depth_, Purpose::direction);
   const PhaseSample s = medium.phase.sample(d_, {direction.u(0), direction.u(1)});
   last_.pdf = s.pdf;
-  start_ = o_ = last_.p;
   d_ = s.w;
   return direction.u(3);
 }

@@ -12,8 +12,8 @@ namespace ls::render {
 
 template <Features F, template <Features> class Light>
 std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) {
-  const float lead = dot(o_ - start_, d_), t_max = end ? end->t + lead : kInfinity;
-  const Segment segment{t_max, lead, end};
+  const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
+  const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow_among(t_max);
   const bool may_scatter = world_.depth_allows(depth_ + 1);
   RandomStream streams = stream_.stream(segment_, Purpose::overlap);
@@ -40,8 +40,8 @@ std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) 
     return std::nullopt;
   }
   last_ = Vertex{};
-  last_.p = clear_of_ends(start_ + d_ * flight.t, segment, flight.t);
   last_.delta = false;
+  stand_at(segment, flight.t);
   apply(flight);
   if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
   ++depth_;
@@ -49,7 +49,6 @@ std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) 
   const Group direction = stream_.group(depth_, Purpose::direction);
   const PhaseSample s = met->phase.sample(d_, {direction.u(0), direction.u(1)});
   last_.pdf = s.pdf;
-  start_ = o_ = last_.p;
   d_ = s.w;
   return direction.u(3);
 }
@@ -65,7 +64,7 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
   if (!light) return;
   const float phase = medium.phase.value(d, light->direction);
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + phase);
-  const C3 arriving = unoccluded(p, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
+  const C3 arriving = unoccluded(start_, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
 }
 

@@ -1,6 +1,8 @@
 // Part of path.h, which includes it: what a shadow ray brings.
 #pragma once
 
+#include <algorithm>
+
 #include "worker/render/built.h"
 #include "worker/render/counters.h"
 #include "worker/render/world.h"
@@ -41,7 +43,8 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
     if constexpr (F.media) {
       if (medium.any()) {
-        const float t = (met ? std::min(hit.t, left) : left) + dot(o - from, d);
+        const float t =
+            met && hit.t <= left ? way_to(hit, from, o, d) : std::max(0.f, left + dot(o - from, d));
         value *= through_media(medium, from, d, t, stream);
         if (is_black(value)) return value;
       }

@@ -101,7 +101,7 @@ class VertexLight {
                              ? 1 / with_focus
                              : light->pdf / (light->pdf * with_focus + phase);
     const C3 arriving =
-        path.unoccluded(p, p, *light, path.medium_, path.stream_.stream(path.depth_, Purpose::track_shadow));
+        path.unoccluded(path.start_, p, *light, path.medium_, path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
   }
 
@@ -131,7 +131,7 @@ class VertexLight {
     const float share = delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
     const float weight =
         delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f) : (std::isfinite(ratio) ? share : 1.f);
-    const C3 arriving = path.unoccluded(p, p, *light, path.medium_,
+    const C3 arriving = path.unoccluded(s.p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;
     const C3 through = transmittance<F>(medium, path.start_, path.d_, 0, spot.t,

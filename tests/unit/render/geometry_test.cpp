@@ -36,6 +36,32 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
   EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {0, 0, -5}, {0, 0, 1}, 0, 4), kEndless) << "beyond t_max";
 }
 
+// A box of size 2 with a lamp of 1e5 at 1e7: about the middle of all, 2 is two last places of float32.
+TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
+  SceneKit kit;
+  kit.shape(CubeShape{}, {}, kit.diffuse(.5));
+  kit.shape(SphereShape{}, translate({0, 1e7, 0}) * test::scale(1e5), kit.diffuse(0));
+  const auto g = Geometry::build(kit.scene, AssetLoader{kit.scene, kit.files});
+  ASSERT_TRUE(g.has_value());
+  EXPECT_EQ(g->center.x, 0);
+  EXPECT_EQ(g->center.y, 0);
+  for (const V3& p : g->positions)
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(std::abs(p[k]) / g->scale, 1);
+  const double far = g->spheres.at(0).center.length() + g->spheres.at(0).radius;
+  EXPECT_LE(far, 1) << "the world is no longer of unit size";
+  EXPECT_GE(far, .5);
+  EXPECT_GE(g->radius, far);
+}
+
+TEST(World, IsAboutItsMiddleWhereEveryMeshIsWellResolved) {
+  SceneKit kit;
+  kit.shape(CubeShape{}, {}, kit.diffuse(.5));
+  kit.shape(CubeShape{}, translate({100, 0, 0}), kit.diffuse(.5));
+  const auto g = Geometry::build(kit.scene, AssetLoader{kit.scene, kit.files});
+  ASSERT_TRUE(g.has_value());
+  EXPECT_EQ(g->center.x, 50);
+}
+
 TEST(DiskIntersection, EndsAtItsRimAndIgnoresParallelRays) {
   Disk d;
   d.center = {0, 0, 1e-5};

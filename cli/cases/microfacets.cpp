@@ -1,0 +1,100 @@
+// Densities of facets at roughness 1e-3, where their peak is 1e5 and more, and normals that are not the
+// surface's.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cli/cases/case.h"
+#include "cli/cases/checks.h"
+#include "cli/cases/stages.h"
+#include "cli/validate_measure.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kSlant = 30;  // degrees from the normal, of the view
+
+// A white metal in z = 0, seen by parallel rays and lit by a point of the sky at which the half vector is off
+// the normal by this angle.
+SceneKit glint(double alpha, Microfacet d, double off) {
+  SceneKit kit;
+  const TextureIndex a = kit.texture(rgb(alpha));
+  kit.shape(RectangleShape{}, scale(10),
+            kit.bsdf(RoughConductorBsdf{d, a, a, {0, 0, 0}, {1, 1, 1}, kit.texture(rgb(1))}));
+  const double view = kSlant * kPi / 180, light = view + 2 * off;
+  kit.scene.emitters.push_back(DirectionalEmitter{{std::sin(light), 0, -std::cos(light)}, rgb(1)});
+  kit.scene.integrator.max_depth = kOnce;
+  kit.look({5 * std::sin(view), 0, 5 * std::cos(view)}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  kit.scene.sensor.projection = Projection::orthographic;
+  kit.scene.sensor.to_world = kit.scene.sensor.to_world * scale(.01, .01, 1);
+  return kit;
+}
+
+// D / (4 cos) of the light's irradiance; masking takes less than alpha^2 of it.
+void peaks(Table& t) {
+  for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
+    for (const double alpha : {2e-3, .01, .1})
+      for (const int slopes : {0, 3}) {  // tan of the angle, in alphas
+        const double tangent = slopes * alpha, c4 = std::pow(1 + tangent * tangent, -2),
+                     s2 = static_cast<double>(slopes * slopes),
+                     density = (d == Microfacet::ggx ? std::pow(1 + s2, -2) : std::exp(-s2)) /
+                               (kPi * alpha * alpha * c4);
+        // Directions are good to 2^-24: against alpha, squared in the exponent.
+        const double tolerance = 1e-5 + alpha * alpha + 2. * slopes * 4 * 0x1p-24 / alpha;
+        t.exact(fmt::format("N34-{}-alpha-{:g}-{}", d == Microfacet::ggx ? "ggx" : "beckmann", alpha,
+                            slopes > 0 ? "tail" : "peak"),
+                "N34 N33",
+                "The density of facets at its peak, and where its exponent is -9: by slopes, not cosines.",
+                [=](const Bench& b) {
+                  return every_value(b, glint(alpha, d, std::atan(tangent)), 4,
+                                     grey(density / (4 * std::cos(kSlant * kPi / 180))), tolerance);
+                });
+      }
+}
+
+// A floor whose normals lean 80 degrees towards +x.
+SceneKit leaning() {
+  SceneKit kit;
+  MeshShape m;
+  m.file = text_file(kit, "floor.obj",
+                     "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn .984807753 0 .173648178\n"
+                     "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n");
+  kit.shape(m, scale(4), kit.diffuse(1));
+  kit.look({1, -3, 2}, {0, 0, 0}, 10);
+  return kit;
+}
+
+void normals(Table& t) {
+  t.exact("N37-light-from-behind", "N37",
+          "Lights below a floor whose normals lean towards them: they don't shine through it.",
+          [](const Bench& b) {
+            SceneKit kit = leaning();
+            kit.scene.emitters.push_back(PointEmitter{{5, 0, -.5}, rgb(100)});
+            kit.shape(SphereShape{}, translate({6, 0, -1.5}), kit.diffuse(0)).emitter =
+                AreaEmitter{kit.texture(rgb(10))};
+            return every_value(b, kit, 64, grey(0), 0);
+          });
+  t.exact(
+      "N37-furnace", "N37 N38", "That floor, white, in a white sky: it gives no more than it gets.",
+      [](const Bench& b) -> Figure {
+        SceneKit kit = leaning();
+        kit.environment();
+        const auto p = shoot(kit, 256, b.seed, b.threads);
+        if (!p) return {.why = p.error().message};
+        double mean = 0;
+        const auto n = static_cast<double>(p->sums.size() / 6);
+        for (std::size_t i = 0; i < p->sums.size() / 6; ++i) mean += p->mean(i, 1) / n;
+        // Half of the directions about the leaning normal, and more, are below the floor.
+        return {
+            .expected = .5, .got = mean, .tolerance = .5, .unhealthy = cli::samples_gone_wrong(p->health)};
+      });
+}
+
+}  // namespace
+
+void add_microfacets(Table& t) {
+  peaks(t);
+  normals(t);
+}
+
+}  // namespace ls::cases
