@@ -1,15 +1,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/commands.h"
+#include "cli/job_options.h"
+#include "cli/local_scene.h"
 #include "cli/output_file.h"
 #include "cli/say.h"
 #include "common/image/final_image.h"
 #include "common/image/merge.h"
 #include "common/protocol/limits.h"
+#include "common/scene/prune.h"
+#include "common/scene/serialize.h"
+#include "coordinator/mattes.h"
 #include "coordinator/store/files.h"
 
 namespace ls::cli {
@@ -18,8 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Flags {
-  std::vector<std::string> partials;
-  std::string out, report;
+  std::vector<std::string> partials, defines;
+  std::string out, report, scene;
+  std::optional<std::uint32_t> frame;
   bool float_output = false;
 };
 
@@ -61,6 +69,34 @@ Result<void> write_report(const Flags& flags, const Merged& merged, const std::s
   return save_result(flags.report, j.dump(2) + "\n");
 }
 
+// The scene as some job of it renders it: which integrator that had is not told by partials.
+bool is_of(const Scene& scene, const Digest& digest) {
+  const std::string own = scene.integrator.name;
+  return std::ranges::any_of(
+      std::array<std::string, 3>{own, "path", "volpath"}, [&](const std::string& name) {
+        return digest_of(scene::pruned(scene, scene::pruned_for(name, scene.integrator.max_depth)).scene) ==
+               digest;
+      });
+}
+
+// Partials bear numbers alone; the names behind the mattes' numbers are the scene's.
+tl::expected<MatteManifests, coordinator::Rejected> manifests(const Flags& flags, const Merged& merged) {
+  const AovSet aovs = merged.film.aovs();
+  const auto defines = parse_defines(flags.defines);
+  if (!defines) return tl::unexpected(coordinator::Rejected{defines.error(), {}});
+  const auto scene =
+      read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
+  if (!scene) return tl::unexpected(scene.error());
+  if (!is_of(scene->scene, merged.scene))
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument,
+         fmt::format("the partials are of scene {}, and {} is another one: give the same scene file, with "
+                     "the same -D and --frame",
+                     merged.scene.hex(), flags.scene)},
+        {}});
+  return coordinator::manifests_of(scene->scene, aovs);
+}
+
 int run(const Flags& flags) {
   if (const auto ok = check_output("-o", flags.out); !ok) return say_error(ok.error());
   if (!flags.report.empty())
@@ -79,6 +115,11 @@ int run(const Flags& flags) {
   provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;
+  if (!flags.scene.empty()) {
+    auto names = manifests(flags, *merged);
+    if (!names) return say_rejected(names.error());
+    provenance.manifests = std::move(*names);
+  }
   const auto image = final_exr(merged->film, provenance, flags.float_output);
   if (!image) return say_error(image.error());
   if (const auto saved = save_result(flags.out, image->exr); !saved) return say_error(saved.error());
@@ -101,6 +142,14 @@ void add_merge(CLI::App& app, Action& action) {
       ->type_name("PARTIAL.exr...");
   merge->add_option("-o,--output", flags->out, "the image")->required()->type_name("OUT.exr");
   merge->add_option("--report", flags->report, "write digest and error as JSON")->type_name("REPORT.json");
+  merge
+      ->add_option("--scene", flags->scene,
+                   "what they were rendered from: gives mattes the names of things, which partials lack")
+      ->type_name("SCENE");
+  merge->add_option("-D,--define", flags->defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
   merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }

@@ -6,8 +6,7 @@ namespace ls::coordinator {
 
 bool wants_labels(const RenderSettings& settings) { return aovs_of(settings).any_of(aovs_of(AovKind::ids)); }
 
-MatteManifests manifests_of(const Scene& scene, const RenderSettings& settings) {
-  const AovSet aovs = aovs_of(settings);
+MatteManifests manifests_of(const Scene& scene, AovSet aovs) {
   MatteManifests out;
   std::vector<std::string> shapes, materials;
   for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {

@@ -10,6 +10,6 @@ namespace ls::coordinator {
 // Whether the settings ask for mattes, so that the scene must be read with labels.
 bool wants_labels(const RenderSettings& settings);
 
-MatteManifests manifests_of(const Scene& scene, const RenderSettings& settings);
+MatteManifests manifests_of(const Scene& scene, AovSet aovs);
 
 }  // namespace ls::coordinator

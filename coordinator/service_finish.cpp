@@ -6,8 +6,8 @@
 
 #include "common/base/log.h"
 #include "common/image/final_image.h"
-#include "coordinator/intake.h"
 #include "common/scene/serialize.h"
+#include "coordinator/intake.h"
 #include "coordinator/mattes.h"
 #include "coordinator/service_impl.h"
 
@@ -41,7 +41,7 @@ MatteManifests Service::mattes_of(const StoredJob& job) const {
                          : Result<std::vector<std::byte>>(fail(Errc::not_found, "its scene is not stored"));
   const auto scene = json ? deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()})
                           : Result<Scene>(tl::unexpected(json.error()));
-  if (scene) return manifests_of(*scene, job.settings);
+  if (scene) return manifests_of(*scene, aovs_of(job.settings));
   log_warn(fmt::format("job={}", job.id.value), "mattes without names: " + scene.error().message);
   return {};
 }

@@ -115,12 +115,14 @@ struct SceneKit {
   VolumeIndex constant(const Rgb& v, const Transform& to_world = {}) {
     return push<VolumeTag>(scene.volumes, ConstVolume{v, to_world});
   }
-  // nx * ny * nz values at the centres of the voxels of the unit cube, x fastest, moved by to_world.
-  VolumeIndex grid(std::array<int, 3> n, const std::vector<float>& values, const Transform& to_world) {
+  // nx * ny * nz values at the centres of the voxels of the unit cube, x fastest, moved by to_world. Of
+  // several channels the values are interleaved.
+  VolumeIndex grid(std::array<int, 3> n, const std::vector<float>& values, const Transform& to_world,
+                   int channels = 1) {
     static const ScratchFolder folder;
     std::string bytes = "VOL\3";
     const auto put = [&](auto v) { bytes.append(reinterpret_cast<const char*>(&v), sizeof v); };
-    for (const std::int32_t v : {1, n[0], n[1], n[2], 1}) put(v);
+    for (const std::int32_t v : {1, n[0], n[1], n[2], channels}) put(v);
     for (const float v : {0.f, 0.f, 0.f, 1.f, 1.f, 1.f}) put(v);
     for (const float v : values) put(v);
     const Asset asset{"grid.vol", sha256(bytes), bytes.size()};

@@ -225,8 +225,11 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
 ## Grids and light given off by media
 
 - What a file is follows from its name. A grid of an OpenVDB or NanoVDB file is placed by the file's own transform, then by
-  `to_world`; the volumes of a medium may name several grids of one file, each by its `grid_name`. Grids of numbers are read (of
-  NanoVDB, ABI 32: float, double, half, Fp4, Fp8, Fp16, FpN; plain, zlib or Blosc), level sets and vectors are refused.
+  `to_world`; the volumes of a medium may name several grids of one file, each by its `grid_name`. Grids of one number a voxel or
+  three are read (of OpenVDB float, double, vec3s, vec3d; of NanoVDB, ABI 32: float, double, vec3f, vec3d, half, Fp4, Fp8, Fp16,
+  FpN; plain, zlib or Blosc); level sets, staggered flows, points and whole numbers are refused.
+- Three numbers a voxel (of a `.vol`, too) are of red, green and blue: as a `sigma_t` each channel has a density of its own, as in
+  Mitsuba's RGB modes. Where all three are the same everywhere the medium is grey, and renders as one of a single channel.
 - A `.bin` file is int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of its box; nx ny nz values of float32; all little
   endian and nothing else. The outermost values lie on the faces of the box, in scene units, which `to_world` then moves. `order`
   says whether x or z runs fastest.
@@ -252,6 +255,10 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
 - The camera is in the medium that the sensor names; where media overlap, in those of the closed boundaries around it as well (at the
   middle of the lens). A sensor that names none begins in none, also inside of a boundary, as in Mitsuba; a cube or sphere around it
   is warned of.
+- Dielectrics know nothing of each other: each surface bends light by its own `int_ior` and `ext_ior`, whatever it lies in, as in
+  Mitsuba; `priority` is of media alone. Where one body of glass or water touches another, give the surface between them once, with
+  the two indices of its sides (water in a glass: one from water to glass); two surfaces in one place or across each other bend
+  light twice.
 - A mirrored cube, sphere or mesh keeps its interior inside, also where its normals turn inwards. (In Mitsuba 3.9 the medium is then
   outside.) `flip_normals` does turn inside and outside.
 )";

@@ -25,7 +25,15 @@ class Analyst {
     shapes();
     media();
     lights();
-    for (const Bsdf& b : s_.bsdfs) ++n_.materials[kind_of(b)];
+    for (const Bsdf& b : s_.bsdfs) {
+      ++n_.materials[kind_of(b)];
+      n_.compensated += std::visit(
+          []<class T>(const T& m) {
+            if constexpr (requires { m.multiple_scattering; }) return m.multiple_scattering;
+            return false;
+          },
+          b);
+    }
     for (const Texture& t : s_.textures) ++n_.textures[kind_of(t)];
     n_.instances = static_cast<std::uint32_t>(s_.instances.size());
     n_.lens = s_.sensor.aperture_radius > 0;
@@ -82,6 +90,8 @@ void Analyst::add(const HeterogeneousMedium& m) {
   n_.media = n_.grids = true;
   if (const auto* c = std::get_if<ConstVolume>(&s_.volumes[m.sigma_t.value]))
     n_.chromatic = n_.chromatic || !grey(c->value);
+  else
+    n_.density_files = true;
   n_.emission = n_.emission || m.emission || m.source_radiance || m.temperature;
   note_phase(m.phase);
 }

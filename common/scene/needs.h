@@ -32,6 +32,10 @@ struct Needs {
   // How many of each, by the names of describe.h; absent: none.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;
   std::uint32_t area_lights = 0, instances = 0;
+  std::uint32_t compensated = 0;  // rough materials with multiple_scattering
+  // Heterogeneous media whose density is a file: of three channels, as only the file says, they are
+  // chromatic.
+  bool density_files = false;
   // Points, spots, projectors and directions without an extent alone: no ray can hit one.
   bool only_delta_lights = false;
   std::vector<FileNeed> files;  // in the scene's order

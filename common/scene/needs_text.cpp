@@ -65,6 +65,7 @@ class Words {
     say("rough surfaces", count<RoughConductorBsdf, RoughPlasticBsdf, RoughDielectricBsdf>(n_.materials),
         "materials");
     say("principled materials", count<PrincipledBsdf>(n_.materials), "materials");
+    say("multiple scattering between microfacets", n_.compensated, "materials");
     say("blends", count<BlendBsdf>(n_.materials), "materials");
     say("surfaces that let light pass straight on", n_.veils, "masks or thin sheets: shadow rays collect",
         "no masks or thin sheets");
@@ -81,14 +82,19 @@ class Words {
         if (use.starts_with("grid")) grids.push_back(fmt::format("{} of {}", use, f.name));
     say("volume grids", !grids.empty(), fmt::format("{}", fmt::join(grids, ", ")), "no grid file");
     say("chromatic extinction", n_.chromatic, "extinction differs between channels",
-        n_.media ? "extinction is grey" : none);
+        n_.density_files ? "extinction is grey, but for density files of three channels"
+        : n_.media       ? "extinction is grey"
+                         : none);
     say("light given off by media", n_.emission, "some medium glows", n_.media ? "no medium glows" : none);
     say("anisotropic phase functions", n_.anisotropic, "scattering has a direction",
         n_.media ? "all scattering is isotropic" : none);
     say("camera inside a medium", n_.camera_in_medium, "the sensor names a medium", "it stands in vacuum");
     say("index-matched boundaries", n_.boundaries, "surfaces that light passes unchanged", "no such surface");
   }
-  void textures() { say("bitmap textures", count<BitmapTexture>(n_.textures), "bitmaps"); }
+  void textures() {
+    say("bitmap textures", count<BitmapTexture>(n_.textures), "bitmaps");
+    say("mesh attributes", count<MeshAttributeTexture>(n_.textures), "textures that meshes carry");
+  }
   void lights() {
     const std::uint32_t sampled = n_.sampled_lights();
     say("next-event estimation", sampled > 0, fmt::format("{} lights to sample", sampled),
@@ -127,6 +133,8 @@ std::string canonical_json(const Needs& n) {
                {"lights", n.lights},
                {"media_kinds", n.media_kinds},
                {"area_lights", n.area_lights},
+               {"compensated", n.compensated},
+               {"density_files", n.density_files},
                {"instances", n.instances},
                {"only_delta_lights", n.only_delta_lights}};
   return j.dump(-1, ' ', false, json::error_handler_t::replace);

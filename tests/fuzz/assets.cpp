@@ -128,7 +128,8 @@ void nvdb(std::string_view file, bool whole) {
   try {
     whole ? render::decode_nvdb(bytes, "", kMostValues, grid)
           : render::expand_nvdb("fuzz", bytes, kMostValues, grid);
-    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2]; ++i)
+    const auto nodes = static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2];
+    for (std::uint64_t i = 0; i < nodes * static_cast<std::uint64_t>(grid.channels); ++i)
       must(std::isfinite(grid.values[i]) && grid.values[i] >= 0,
            "a grid's values are finite and not negative");
   } catch (const render::Refused& refused) {

@@ -31,6 +31,7 @@ void add_materials(std::vector<Case>& cases);
 void add_distant(std::vector<Case>& cases);
 void add_overlaps(std::vector<Case>& cases);
 void add_points_in_grids(std::vector<Case>& cases);
+void add_channels(std::vector<Case>& cases);
 
 inline std::array<double, 3> grey(double v) { return {v, v, v}; }
 inline Rgb rgb(double v) { return {v, v, v}; }

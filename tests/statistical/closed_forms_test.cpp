@@ -19,6 +19,7 @@ const cases::Table& table() {
     add_distant(list);
     add_overlaps(list);
     add_points_in_grids(list);
+    add_channels(list);
     cases::Table t;
     for (const Case& c : list)
       t.mean(c.name, "more", "More closed forms.", c.kit, c.expected,

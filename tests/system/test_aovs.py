@@ -60,6 +60,14 @@ def test_partials_have_the_channels_and_merge_to_the_same_layers(fog, expected, 
     assert digest(lightshaft("merge", kept, "-o", tmp_path / "merged.exr")) == expected[0]
 
     assert layers(tmp_path / "merged.exr") == layers(expected[1])
+    # Partials bear no names: those are the scene's.
+    def names(image):
+        return {key: text for key, text in read(image)[1].items() if key.startswith("cryptomatte/")}
+    assert not any(key.endswith("/manifest") for key in names(tmp_path / "merged.exr"))
+    lightshaft("merge", kept, "-o", tmp_path / "named.exr", "--scene", fog)
+    assert names(tmp_path / "named.exr") == names(expected[1]) and layers(tmp_path / "named.exr") == layers(expected[1])
+    said = lightshaft("merge", kept, "-o", tmp_path / "no.exr", "--scene", fog, "-D", "density=3", code=2).stderr
+    assert "is another one: give the same scene file" in said and not (tmp_path / "no.exr").exists()
     # Nobody who does not ask for them pays for them.
     plain = tmp_path / "plain"
     render(fog, tmp_path / "out.exr", "--partial-dir", plain)

@@ -67,7 +67,7 @@ def test_a_vdb_is_read_and_is_no_other_grid_than_the_vol(tmp_path):
 
 @pytest.mark.parametrize("kind, text", [
     ("truncated", "fog.vdb"), ("garbage", "fog.vdb"), ("empty file", "fog.vdb"),
-    ("empty grid", "no active voxel"), ("level set", "level set"), ("two grids", "smoke"), ("vectors", "vec3"), ("nan", "not a finite number"),
+    ("empty grid", "no active voxel"), ("level set", "level set"), ("two grids", "smoke"), ("flow", "staggered"), ("yes and no", "type bool"), ("nan", "not a finite number"),
 ])
 def test_a_bad_vdb_is_refused_by_name(tmp_path, kind, text):
     path = tmp_path / "fog.vdb"
@@ -77,11 +77,17 @@ def test_a_bad_vdb_is_refused_by_name(tmp_path, kind, text):
         vdb.write(str(path), grids=[sphere])
     elif kind == "two grids":
         vdb.write(str(path), grids=[grid(fog_array(), "smoke"), grid(fog_array(), "heat")])
-    elif kind == "vectors":
+    elif kind == "flow":
         flow = vdb.Vec3SGrid()
         flow.fill((0, 0, 0), (3, 3, 3), (1, 2, 3))
         flow.name = "density"
+        flow.gridClass = vdb.GridClass.STAGGERED
         vdb.write(str(path), grids=[flow])
+    elif kind == "yes and no":
+        where = vdb.BoolGrid()
+        where.fill((0, 0, 0), (3, 3, 3), True)
+        where.name = "density"
+        vdb.write(str(path), grids=[where])
     elif kind == "empty grid":
         nothing = vdb.FloatGrid()
         nothing.name = "density"
@@ -150,6 +156,28 @@ def test_of_grids_of_one_name_one_must_be_meant(tmp_path):
 
     assert "'density[0]', 'density[1]'" in said
     assert seen[0] != seen[1]
+
+
+def coloured(*factors):
+    """The fog in three channels, each times its factor."""
+    one = grid(fog_array())
+    made = vdb.Vec3SGrid()
+    made.copyFromArray(numpy.stack([fog_array() * f for f in factors], axis=-1), tolerance=(-1, -1, -1))
+    made.transform = one.transform
+    made.name = "density"
+    made.gridClass = vdb.GridClass.FOG_VOLUME
+    return made
+
+
+def test_three_equal_channels_are_one_and_others_are_red_green_and_blue(tmp_path):
+    def seen(made):
+        vdb.write(str(tmp_path / "fog.vdb"), grids=[made])
+        return digest(lightshaft("render", write_scene(tmp_path), "-o", tmp_path / "a.exr", "--spp", 2))
+
+    grey, equal, tinted = seen(grid(fog_array())), seen(coloured(1, 1, 1)), seen(coloured(0, 1, 4))
+
+    assert equal == grey
+    assert tinted != grey
 
 
 def test_a_grid_lies_where_its_affine_map_puts_it(tmp_path):

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "worker/render/black_body.h"
+#include "worker/render/glow_points.h"
 
 namespace ls::render {
 namespace {
@@ -14,15 +15,6 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // A stretch with an emission sample is at most this many voxels long, of either grid, where it matters.
 constexpr double kStretchVoxels = 1;
-
-// (1 - e^-x) / x, the mean of e^-t up to x.
-double mean_transmittance(double x) { return x > 0 ? -std::expm1(-x) / x : 1; }
-
-// t in [0, h] with density k e^-kt / (1 - e^-kh); uniform where that is flat to double precision.
-double truncated_exponential(double u, double k, double h) {
-  if (!(k * h > 1e-14)) return u * h;
-  return std::min(h, -std::log1p(u * std::expm1(-k * h)) / k);
-}
 
 // Where a ray is in a grid, by distance from the ray's origin: in a cell, in front of the grid, or past it.
 class Steps {
@@ -174,7 +166,7 @@ class GlowWalk {
 
   // Where the light is absorbed that this channel loses on the stretch.
   double absorption_point(double a, double b, double s, double absorbed, double u) const {
-    const Passage p = density_.pass(*m_.density, a, b, -std::log1p(-u * absorbed) / s);
+    const Passage p = density_.pass(*m_.density, a, b, absorption_depth(u, s, absorbed));
     return p.reached ? density_.distance(p.t) : b;
   }
 
@@ -202,7 +194,7 @@ class GlowWalk {
     const double h = b - a, s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
     for (const double t : {a + u * h, absorption_point(a, b, s, absorbed, v)}) {
       const double rest = std::exp(-s * depth(a, t));
-      add(c, source(t), rest / (1 / h + s * density_at(t) * rest / absorbed));
+      add(c, source(t), rest / (1 / h + absorption_pdf(s, density_at(t), rest, absorbed)));
     }
   }
 
@@ -247,6 +239,17 @@ C3 glow_of_length(const Medium& m, float t_max) {
 }
 
 C3 glow_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
+  if (m.by_channel[0]) {
+    // Each channel as if all had its density.
+    C3 light;
+    for (int c = 0; c < 3; ++c) {
+      Medium one = m;
+      one.density = m.by_channel[static_cast<std::size_t>(c)];
+      one.by_channel = {};
+      light[c] = GlowWalk(one, o, d, t_max, stream).run()[c];
+    }
+    return light;
+  }
   return GlowWalk(m, o, d, t_max, stream).run();
 }
 

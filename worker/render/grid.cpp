@@ -54,7 +54,7 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
   step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
            size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
   for (float v : values_) max_value_ = std::max(max_value_, v);
-  build_macro_cells(density_to_sigma);
+  use_cells(wanted_cell_size(density_to_sigma));
 }
 
 // Around the grid one layer of nodes from the opposite end: so interpolation needs no test for the end, and
@@ -104,13 +104,28 @@ std::uint64_t Grid::count_above(float limit) const {
   return n;
 }
 
-void Grid::build_macro_cells(double density_to_sigma) {
+Grid Grid::mean(const Grid& a, const Grid& b, const Grid& c) {
+  Grid m = a;
+  m.max_value_ = 0;
+  for (std::size_t i = 0; i < m.values_.size(); ++i) {
+    m.values_[i] = static_cast<float>((double{a.values_[i]} + b.values_[i] + c.values_[i]) / 3);
+    m.max_value_ = std::max(m.max_value_, m.values_[i]);
+  }
+  m.use_cells(a.cell_size_);
+  return m;
+}
+
+int Grid::wanted_cell_size(double density_to_sigma) const {
   // Wanted: majorant x cell diagonal about 1.44 (Fong et al. 2017, section 3.3), between 4 and 16 voxels:
   // smaller cells cost more steps than the null collisions they save, larger ones bound nothing.
   const Affine inverse = exact_.inverse();
   const double voxel = inverse.vector({1, 1, 1}).length();
   const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
-  cell_size_ = wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+  return wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+}
+
+void Grid::use_cells(int cell_size) {
+  cell_size_ = cell_size;
   for (int k = 0; k < 3; ++k) {
     cells_[k] = std::max(1, static_cast<int>(std::ceil((hi_[k] - lo_[k]) / static_cast<float>(cell_size_))));
   }

@@ -93,12 +93,19 @@ class Grid {
   const MacroCell& cell(int x, int y, int z) const {
     return macro_[(static_cast<std::size_t>(z) * cells_[1] + y) * cells_[0] + x];
   }
+  const MacroCell& cell(std::size_t number) const { return macro_[number]; }
   V3 domain_lo() const { return lo_; }
   V3 domain_hi() const { return hi_; }
   float max_value() const { return max_value_; }
   std::uint64_t value_count() const { return values_.size(); }
   std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
   std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
+
+  // With macro cells of this many voxels a side, whatever the density: grids that are walked together.
+  void use_cells(int size);
+  bool same_values(const Grid& other) const { return values_ == other.values_; }
+  // Of grids of one shape.
+  static Grid mean(const Grid& a, const Grid& b, const Grid& c);
 
   // Values above `limit`, each counted once.
   std::uint64_t count_above(float limit) const;
@@ -117,7 +124,7 @@ class Grid {
   friend class CellWalk;
   void repeat_ends();
   V3 wrapped(const V3& index) const;
-  void build_macro_cells(double density_to_sigma);
+  int wanted_cell_size(double density_to_sigma) const;
   MacroCell bound_cell(int x, int y, int z) const;
 
   std::array<int, 3> size_{}, last_{};
@@ -159,6 +166,10 @@ class CellWalk {
     return true;
   }
   const MacroCell& cell() const { return *cell_; }
+  // Of the cell, in the table of the grid that is walked.
+  std::size_t number(const Grid& walked) const {
+    return static_cast<std::size_t>(cell_ - walked.macro_.data());
+  }
   // Where the cell begins and ends, from entry() on.
   float begin() const { return begin_; }
   float end() const { return end_; }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <span>
 
 #include "common/assets/raw_grid.h"
 #include "common/assets/vol.h"
@@ -33,6 +34,12 @@ Result<LoadedVolume> constant_volume(const ConstVolume& v, V3d center, double sc
   }
   if (v.value[0] == v.value[1] && v.value[1] == v.value[2]) out.channels.resize(1);
   return out;
+}
+
+std::vector<float> channel(std::span<const float> interleaved, std::size_t c, std::size_t of) {
+  std::vector<float> values(interleaved.size() / of);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = interleaved[of * i + c];
+  return values;
 }
 
 // A .vol, or a raw grid, whose values are nodes from face to face of its own box.
@@ -75,18 +82,11 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
   const Affine world_to_index = from_world(to_nodes * unit_to_scene.inverse(), center, scale);
   LoadedVolume out;
   out.clamped = data->negatives;
-  const std::size_t count = static_cast<std::size_t>(n[0]) * n[1] * n[2];
-  for (std::uint32_t c = 0; c < data->channels; ++c) {
-    std::vector<float> values;
-    if (data->channels == 1) {
-      values = std::move(data->values);
-    } else {
-      values.resize(count);
-      for (std::size_t i = 0; i < count; ++i) values[i] = data->values[data->channels * i + c];
-    }
-    out.channels.emplace_back(std::array<int, 3>{n[0], n[1], n[2]}, std::move(values), world_to_index,
-                              V3d(-margin), last + V3d(margin), to_sigma, v.filter, v.wrap);
-  }
+  for (std::uint32_t c = 0; c < data->channels; ++c)
+    out.channels.emplace_back(
+        std::array<int, 3>{n[0], n[1], n[2]},
+        data->channels == 1 ? std::move(data->values) : channel(data->values, c, data->channels),
+        world_to_index, V3d(-margin), last + V3d(margin), to_sigma, v.filter, v.wrap);
   return out;
 }
 
@@ -138,13 +138,16 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
     return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform has no inverse", name));
   }
   const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
-  std::vector<float> values(raw.values, raw.values + static_cast<std::size_t>(size[0]) * size[1] * size[2]);
+  const auto of = static_cast<std::size_t>(raw.channels);
+  const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
   out.clamped = raw.negatives;
   // Values sit at nodes. Towards the background they fall within one voxel of the active ones, and the grid
   // ends there: nothing is left to wrap.
-  out.channels.emplace_back(size, std::move(values), from_world(nodes_to_scene.inverse(), center, scale),
-                            V3d(0), V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma, v.filter);
+  for (std::size_t c = 0; c < of; ++c)
+    out.channels.emplace_back(size, channel(values, c, of),
+                              from_world(nodes_to_scene.inverse(), center, scale), V3d(0),
+                              V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma, v.filter);
   return out;
 }
 

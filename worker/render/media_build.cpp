@@ -110,14 +110,24 @@ Result<void> HeteroBuilder::density() {
   }
   auto loaded = load(shape, per_unit);
   if (!loaded) return tl::unexpected(loaded.error());
-  if (loaded->channels.size() != 1)
-    return fail(
-        Errc::invalid_argument,
-        fmt::format("{}: a density grid has one channel, this one has {}; give colour through the albedo",
-                    files.name(std::get<GridVolume>(volume).file), loaded->channels.size()));
-  if (auto ok = check_extinction(sigma, loaded->channels[0].max_value(), w.geometry.scale); !ok)
-    return tl::unexpected(ok.error());
-  out.density = keep(*loaded)[0];
+  std::vector<Grid>& grids = loaded->channels;
+  if (grids.size() == 3 && grids[0].same_values(grids[1]) && grids[0].same_values(grids[2])) grids.resize(1);
+  float largest = 0;
+  int cells = grids[0].cell_size();
+  for (const Grid& g : grids) {
+    largest = std::max(largest, g.max_value());
+    cells = std::min(cells, g.cell_size());
+  }
+  if (auto ok = check_extinction(sigma, largest, w.geometry.scale); !ok) return tl::unexpected(ok.error());
+  if (grids.size() == 3) {
+    for (Grid& g : grids)
+      if (g.cell_size() != cells) g.use_cells(cells);
+    Grid mean = Grid::mean(grids[0], grids[1], grids[2]);
+    out.by_channel = keep(*loaded);
+    out.density = &w.grids.emplace_back(std::move(mean));
+  } else {
+    out.density = keep(*loaded)[0];
+  }
   out.sigma_t = color(sigma);
   return {};
 }

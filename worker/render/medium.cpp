@@ -1,8 +1,11 @@
 #include "worker/render/medium.h"
 
+#include "worker/render/medium_channels.h"
+
 namespace ls::render {
 
 Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t) {
+  if (m.by_channel[0]) return passed_channels(m, hero, o, d, t);
   double depth = t;
   if (m.grid) {
     depth = 0;

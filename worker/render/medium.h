@@ -37,6 +37,9 @@ struct Medium {
   // is albedo times it.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
+  // Null, or a density of its own for each channel: three grids of one shape with the same macro cells. Then
+  // `density` is their mean, which places points, and sigma_t the same for all (medium_channels.h).
+  std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
   // Of a grid with a constant albedo, 1 less that: what is left of an albedo of 1 - 1e-7 in float32 is a
   // fifth off.
@@ -50,7 +53,7 @@ struct Medium {
   std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
   float kelvin_scale = 1, kelvin_offset = 0;
   int priority = 0;  // where media overlap, the highest are in effect
-  bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z; }
+  bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 
   // Scattering coefficient per unit of extinction density at a point of a grid.
   C3 scattering_at(const V3& p) const {
@@ -75,6 +78,11 @@ struct Flight {
 struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
+
+// Of grids with a density for each channel; only chromatic code knows them (medium_channels.cpp).
+Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
+                    RandomStream stream, MediumCounters& counters);
+C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream);
 
 namespace detail {
 
@@ -265,6 +273,10 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
                    RandomStream stream, MediumCounters& counters) {
   const float depth = exponential(bits);
   if constexpr (F.grids) {
+    if constexpr (F.chromatic) {
+      if (m.by_channel[0]) [[unlikely]]
+        return fly_channels(m, hero, depth, o, d, t_max, stream, counters);
+    }
     if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
       return detail::fly_nearest<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
     if (m.grid)
@@ -282,6 +294,10 @@ Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 template <Features F>
 C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   if constexpr (F.grids) {
+    if constexpr (F.chromatic) {
+      if (m.by_channel[0]) [[unlikely]]
+        return transmittance_channels(m, o, d, t0, t1, stream);
+    }
     if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
       return detail::transmittance_nearest<F.chromatic>(m, o, d, t0, t1, stream);
     if (m.grid)

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "worker/render/medium_channels.h"
+
 namespace ls::render {
 namespace {
 
@@ -55,6 +57,7 @@ Stretch::Spot Stretch::grid_after(float x) const {
 }
 
 C3 Stretch::grid_scattering(const Spot& spot, const V3& p) const {
+  if (medium_->by_channel[0]) return medium_->scattering_at(p) * densities(*medium_, spot.index);
   const Grid& g = *medium_->density;
   const float density =
       g.filter() == VolumeFilter::trilinear ? g.trilinear(spot.index) : g.nearest(spot.index);

@@ -212,7 +212,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
-  w.need.overlaps = found.overlaps;  // a matter of where the shapes' files put them
+  w.need.overlaps = found.overlaps;                        // a matter of where the shapes' files put them
+  w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
   if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
   if (!w.need.covers(found))
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");

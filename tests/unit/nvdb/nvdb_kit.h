@@ -31,8 +31,16 @@ struct NvdbKit {
     return first + static_cast<float>(x + 2 * y + 16 * z);
   }
 
-  std::uint64_t value_bytes() const { return type == 2 ? 8 : type == 9 ? 2 : 4; }
-  std::uint64_t leaf_table() const { return type == 2 ? 128 : 96; }
+  bool doubles() const { return type == 2 || type == 7; }
+  std::uint64_t channels() const { return type == 6 || type == 7 ? 3 : 1; }
+  // Of a channel: the first one's, twice and three times that.
+  static float of_channel(float value, std::uint64_t c) { return value * static_cast<float>(c + 1); }
+  std::uint64_t value_bytes() const { return doubles() ? 8 : type == 9 ? 2 : 4; }
+  std::uint64_t leaf_table() const { return type == 7 ? 160 : channels() == 3 || type == 2 ? 128 : 96; }
+  std::uint64_t table_step() const { return type == 7 ? 24 : type == 6 ? 16 : 8; }
+  std::uint64_t upper_table() const { return type == 7 ? 8288 : 8256; }
+  std::uint64_t lower_table() const { return type == 7 ? 1120 : 1088; }
+  std::uint64_t root_tile() const { return type == 7 ? 64 : 32; }
   std::uint64_t leaf_bytes() const {
     switch (type) {
       case 2:
@@ -48,20 +56,27 @@ struct NvdbKit {
       case 16:
         return 96 + 512;  // codes of 8 bits
       default:
-        return 96 + 4 * 512;
+        return leaf_table() + value_bytes() * channels() * 512;
     }
   }
   static constexpr std::uint64_t kRoot = 672 + 64;
-  std::uint64_t upper() const { return kRoot + (type == 2 ? 96 : 64) + 32; }
-  std::uint64_t lower() const { return upper() + 270400; }
-  std::uint64_t leaf(int i) const { return lower() + 33856 + static_cast<std::uint64_t>(i) * leaf_bytes(); }
+  std::uint64_t upper() const {
+    return kRoot + (type == 7 ? 192 : channels() == 3 || type == 2 ? 96 : 64) + root_tile();
+  }
+  std::uint64_t lower() const { return upper() + upper_table() + 32768 * table_step(); }
+  std::uint64_t leaf(int i) const {
+    return lower() + lower_table() + 4096 * table_step() + static_cast<std::uint64_t>(i) * leaf_bytes();
+  }
 
   template <class T>
   static void put(std::string& b, std::uint64_t at, const T& v) {
     std::memcpy(b.data() + at, &v, sizeof v);
   }
   void put_number(std::string& b, std::uint64_t at, float v) const {
-    if (type == 2)
+    if (channels() == 3)
+      for (std::uint64_t c = 0; c < 3; ++c)
+        type == 7 ? put(b, at + 8 * c, double{of_channel(v, c)}) : put(b, at + 4 * c, of_channel(v, c));
+    else if (type == 2)
       put(b, at, double{v});
     else if (type == 9)
       put(b, at, Imath::half(v).bits());
@@ -84,27 +99,27 @@ struct NvdbKit {
       put(b, kRoot + 12 + 4 * k, origin[k] + hi[k]);
     }
     put(b, kRoot + 24, std::uint32_t{1});
-    put_number(b, kRoot + (type == 2 ? 32 : 28), background);
-    const std::uint64_t tile_at = upper() - 32;
+    put_number(b, kRoot + (doubles() ? 32 : 28), background);
+    const std::uint64_t tile_at = upper() - root_tile();
     std::uint64_t key = 0;
     for (std::size_t k = 0; k < 3; ++k)
       key |= std::uint64_t{static_cast<std::uint32_t>(origin[k]) >> 12} << 21 * (2 - k);
     put(b, tile_at, key);
     put(b, tile_at + 8, upper() - kRoot);
-    put_number_all(b, upper() + 8256, 32768, background);
+    put_number_all(b, upper() + upper_table(), 32768, background);
     put(b, upper() + 4128, std::uint8_t{1});  // child 0
-    put(b, upper() + 8256, lower() - upper());
-    put_number_all(b, lower() + 1088, 4096, background);
+    put(b, upper() + upper_table(), lower() - upper());
+    put_number_all(b, lower() + lower_table(), 4096, background);
     for (int i = 0; i < 2; ++i) {  // along x, child (i, 0, 0) is number 256 i
       put(b, lower() + 544 + 32 * static_cast<std::uint64_t>(i), std::uint8_t{1});
-      put(b, lower() + 1088 + 8 * 256 * static_cast<std::uint64_t>(i), leaf(i) - lower());
+      put(b, lower() + lower_table() + table_step() * 256 * static_cast<std::uint64_t>(i), leaf(i) - lower());
       put_leaf(b, i);
     }
-    put_number(b, lower() + 1088 + 8 * 512, tile);
+    put_number(b, lower() + lower_table() + table_step() * 512, tile);
     return b;
   }
   void put_number_all(std::string& b, std::uint64_t at, int n, float v) const {
-    for (int i = 0; i < n; ++i) put_number(b, at + 8 * static_cast<std::uint64_t>(i), v);
+    for (int i = 0; i < n; ++i) put_number(b, at + table_step() * static_cast<std::uint64_t>(i), v);
   }
   void put_leaf(std::string& b, int i) const {
     const std::uint64_t at = leaf(i), table = at + leaf_table();
@@ -122,7 +137,7 @@ struct NvdbKit {
           const auto n = static_cast<std::uint64_t>((x * 8 + y) * 8 + z);
           const float v = value(8 * i + x, y, z);
           if (!coded) {
-            put_number(b, table + value_bytes() * n, v);
+            put_number(b, table + value_bytes() * channels() * n, v);
             continue;
           }
           const auto code = static_cast<std::uint32_t>((v - first) / quantum);

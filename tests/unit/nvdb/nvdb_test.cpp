@@ -20,8 +20,9 @@ struct Read {
   std::string error;
   std::vector<float> values;
 
-  float at(int x, int y, int z) const {
-    return values.at(static_cast<std::size_t>((z * grid.size[1] + y) * grid.size[0] + x));
+  float at(int x, int y, int z, int channel = 0) const {
+    const int node = (z * grid.size[1] + y) * grid.size[0] + x;
+    return values.at(static_cast<std::size_t>(grid.channels * node + channel));
   }
 };
 
@@ -29,7 +30,8 @@ Read read(const std::string& file, const std::string& wanted = "", std::uint64_t
   Read r;
   try {
     decode_nvdb(std::as_bytes(std::span(file.data(), file.size())), wanted, max_values, r.grid);
-    const auto n = static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2];
+    const auto n =
+        static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2] * r.grid.channels;
     r.values.assign(r.grid.values, r.grid.values + n);
   } catch (const Refused& e) {
     r.error = e.text;
@@ -50,16 +52,21 @@ void expect_the_kits_values(const Read& r, const NvdbKit& kit, float step = 1) {
       for (int x = -1; x < 25; ++x) {
         const bool inside = x >= 0 && x < 24 && y >= 0 && y < 8 && z >= 0 && z < 8;
         const float value = kit.value(x, y, z), held = x < 16 ? std::floor(value / step) * step : value;
-        ASSERT_EQ(r.at(x + 1, y + 1, z + 1), inside ? held : kit.background) << x << " " << y << " " << z;
+        for (int c = 0; c < r.grid.channels; ++c)
+          ASSERT_EQ(r.at(x + 1, y + 1, z + 1, c),
+                    NvdbKit::of_channel(inside ? held : kit.background, static_cast<std::uint64_t>(c)))
+              << x << " " << y << " " << z << " " << c;
       }
 }
 
 TEST(Nvdb, ReadsEveryKindOfNumber) {
-  for (const std::uint32_t type : {1, 2, 9, 13, 14, 15, 16}) {
+  for (const std::uint32_t type : {1, 2, 6, 7, 9, 13, 14, 15, 16}) {
     NvdbKit kit;
     kit.type = type;
     SCOPED_TRACE(type);
-    expect_the_kits_values(read(kit.file()), kit, type == 13 ? 16 : 1);
+    const Read r = read(kit.file());
+    EXPECT_EQ(r.grid.channels, static_cast<int>(kit.channels()));
+    expect_the_kits_values(r, kit, type == 13 ? 16 : 1);
   }
 }
 
@@ -114,7 +121,7 @@ TEST(Nvdb, RefusesWhatIsNoDensityByName) {
   EXPECT_THAT(read(kit.file()).error, HasSubstr("grid 'density' is a level set"));
   kit.grid_class = 0;
   for (const auto& [type, name] :
-       {std::pair{4u, "int32"}, {6u, "vec3f"}, {19u, "index"}, {77u, "number 77"}}) {
+       {std::pair{4u, "int32"}, {17u, "vec4f"}, {19u, "index"}, {77u, "number 77"}}) {
     kit.type = type;
     EXPECT_THAT(read(kit.file()).error, HasSubstr(std::string("has values of type ") + name));
   }
@@ -130,6 +137,10 @@ TEST(Nvdb, RefusesWhatIsTooLargeBeforeItIsAllocated) {
   NvdbKit kit;
   EXPECT_THAT(read(kit.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
   EXPECT_EQ(read(kit.file(), "", 2600).error, "");
+  kit.type = 6;
+  EXPECT_THAT(read(kit.file(), "", 7799).error, HasSubstr("2600 voxels of 3 values; the limit is 2599"));
+  EXPECT_EQ(read(kit.file(), "", 7800).error, "");
+  kit.type = 1;
   kit.hi[1] = 20000;
   EXPECT_THAT(read(kit.file()).error, HasSubstr("along an axis; the limit is 16384"));
   kit = {};

@@ -104,6 +104,12 @@ std::vector<Named> scenes() {
                    return k.heterogeneous(k.constant({0, 1, 4}), {.9, .9, .9}, 1, .5);
                  }),
                  2});
+  all.push_back({"grid of three channels", with_medium([](SceneKit& k) {
+                   std::vector<float> three;
+                   for (const float x : cloud()) three.insert(three.end(), {x, .3f, 2 - x / 2});
+                   return k.heterogeneous(k.grid({6, 5, 4}, three, kBox, 3), {.9, .6, .9}, 1, .5);
+                 }),
+                 2});
   all.push_back({"veils", veiled(room()), 6});
   all.push_back({"veils and a chromatic medium", veiled(with_medium([](SceneKit& k) {
                    return k.homogeneous({0, .8, 3}, {.9, .9, .9}, -.3);

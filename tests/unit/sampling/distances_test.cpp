@@ -9,6 +9,7 @@
 #include "tests/unit/render/grids.h"
 #include "worker/render/equiangular.h"
 #include "worker/render/medium.h"
+#include "worker/render/stretch.h"
 #include "worker/render/truncated.h"
 #include "worker/render/variant.h"
 
@@ -102,6 +103,75 @@ void equiangular(test::ChiSquareBook& book) {
   }
 }
 
+// The same where each channel has a density of its own: tracked, and followed exactly.
+void channel_flights(test::ChiSquareBook& book) {
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  for (const float sigma : {.4f, 40.f}) {
+    std::vector<Grid> grids;
+    for (int c = 0; c < 3; ++c) {
+      std::vector<float> v = random_values({9, 9, 9}, static_cast<unsigned>(30 + c), c == 1);
+      for (float& x : v) x *= c == 2 ? 3.f : 1.f;
+      grids.push_back(unit_grid({9, 9, 9}, std::move(v)));
+      grids.back().use_cells(4);
+    }
+    const Grid mean = Grid::mean(grids[0], grids[1], grids[2]);
+    Medium m;
+    m.grid = true;
+    m.density = &mean;
+    m.by_channel = {&grids[0], &grids[1], &grids[2]};
+    m.sigma_t = C3(sigma);
+    for (const int hero : {0, 1, 2}) {
+      const Grid& own = grids[static_cast<std::size_t>(hero)];
+      const auto depth = [&](double t) { return double{sigma} * own.exact_integral(V3d(o), V3d(d), 0, t); };
+      MediumCounters counters;
+      compare(
+          book, fmt::format("channel {} of a grid of {}", hero, sigma), even(1, sigma > 10 ? 3 : 14),
+          [&](double a, double b) { return std::exp(-depth(a)) - std::exp(-depth(b)); },
+          [&](RandomStream& r) {
+            const std::uint32_t bits = r.bits();
+            const Flight f =
+                free_flight<kEverything>(m, hero, bits, o, d, 30, RandomStream(r.next()), counters);
+            return f.scattered ? double{f.t} : 1e9;
+          });
+      EXPECT_EQ(counters.majorant_violations, 0u);
+    }
+  }
+}
+
+// Points that `volpath_distant_mis` proposes by depth: along the macro cells' means.
+void proposals_in_grids(test::ChiSquareBook& book) {
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  std::vector<float> plume(17 * 17 * 17, 0);
+  for (std::size_t i = 0; i < plume.size(); ++i)
+    plume[i] = i % 17 > 5 && i % 17 < 12 ? static_cast<float>(i % 7) / 3 : 0.f;
+  for (const auto& [name, grid] : {std::pair{"dense", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5))},
+                                   {"sparse", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 6, true))},
+                                   {"plume", unit_grid({17, 17, 17}, plume)}}) {
+    Medium m;
+    m.grid = true;
+    m.density = &grid;
+    const float sigma = .8f;
+    m.sigma_t = C3(sigma);
+    const Stretch s(m, o, d, 30);
+    compare(
+        book, fmt::format("proposed by depth in a {} grid", name), even(s.from(), s.to() * (1 + 1e-6)),
+        [&](double a, double b) {
+          // The integral over a cell of the table, which is one of x: rate is dx / dt.
+          const auto share = [&](double t) {
+            const float x = s.at(std::min(static_cast<float>(t), s.to())).x;
+            const double even = x / s.total(), part = std::expm1(-sigma * x) / std::expm1(-sigma * s.total());
+            const double kept = kEvenShare * 0x1p-32;
+            return (1 - kept) * part + kept * even;
+          };
+          return share(b) - share(a);
+        },
+        [&](RandomStream& r) { return s.after(mixed_depth_sample(sigma, s.total(), r.bits())).t; });
+    // And x and rate belong together.
+    const Stretch::Spot a = s.at(6), b = s.at(6.001f);
+    EXPECT_NEAR((b.x - a.x) / .001, a.rate, .01 * a.rate + 1e-3) << name;
+  }
+}
+
 // First collisions of delta tracking in a grid: the hero's exact optical depth by quadrature of the voxels.
 void flights(test::ChiSquareBook& book) {
   struct Field {
@@ -142,6 +212,8 @@ void flights(test::ChiSquareBook& book) {
           });
       EXPECT_EQ(counters.majorant_violations, 0u) << f.name;
     }
+  channel_flights(book);
+  proposals_in_grids(book);
   Medium fog;
   fog.sigma_t = C3(.2f, .5f, 2);
   for (const int hero : {0, 1, 2})

@@ -16,18 +16,32 @@ using Coord = std::array<std::int64_t, 3>;
 // ---- layout: of the grid, 672 bytes; of the tree behind it; of nodes, by the type of values
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
-constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544, kUpperTable = 8256, kLowerTable = 1088;
+constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
 constexpr int kUpperSide = 4096, kLowerSide = 128, kLeafSide = 8;
-constexpr std::uint64_t kRootTile = 32;
 
-enum Type : std::uint32_t { kFloat = 1, kDouble = 2, kHalf = 9, kFp4 = 13, kFp8 = 14, kFp16 = 15, kFpN = 16 };
+enum Type : std::uint32_t {
+  kFloat = 1,
+  kDouble = 2,
+  kVec3f = 6,
+  kVec3d = 7,
+  kHalf = 9,
+  kFp4 = 13,
+  kFp8 = 14,
+  kFp16 = 15,
+  kFpN = 16
+};
 struct Layout {
-  std::uint64_t background, root_size, tile_value, leaf_table;
+  std::uint64_t background, root_size, tile_value, root_tile, upper_table, lower_table, table_step,
+      leaf_table;
 };
 Layout layout_of(Type type) {
-  if (type == kDouble) return {32, 96, 24, 128};
-  return {28, 64, 20, 96};
+  if (type == kDouble) return {32, 96, 24, 32, 8256, 1088, 8, 128};
+  if (type == kVec3f) return {28, 96, 20, 32, 8256, 1088, 16, 128};
+  if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
+  return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
+// Of a voxel; the first of them, or all three.
+using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {
   static constexpr const char* kNames[] = {"unknown", "float", "double", "int16",  "int32", "int64", "vec3f",
@@ -48,8 +62,8 @@ class Tree {
     place();
     const auto count = std::uint64_t{static_cast<std::uint64_t>(out_.size[0])} *
                        static_cast<std::uint64_t>(out_.size[1]) * static_cast<std::uint64_t>(out_.size[2]);
-    out_.values = new float[count];
-    fill(lo_, end_, number(root_ + layout_.background));
+    out_.values = new float[count * channels()];
+    fill(lo_, end_, value(root_ + layout_.background));
     read_root();
   }
 
@@ -69,6 +83,8 @@ class Tree {
     switch (type) {
       case kFloat:
       case kDouble:
+      case kVec3f:
+      case kVec3d:
       case kHalf:
       case kFp4:
       case kFp8:
@@ -77,10 +93,12 @@ class Tree {
         type_ = static_cast<Type>(type);
         break;
       default:
-        throw Refused{1, "grid '" + name_ + "' has values of type " + type_name(type) +
-                             "; a density is float, double, half or one of Fp4, Fp8, Fp16 and FpN"};
+        throw Refused{
+            1, "grid '" + name_ + "' has values of type " + type_name(type) +
+                   "; a density is float, double, vec3f, vec3d, half or one of Fp4, Fp8, Fp16 and FpN"};
     }
     layout_ = layout_of(type_);
+    out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
 
   // The box of the active voxels and one voxel around it, and where it is.
@@ -99,9 +117,10 @@ class Tree {
       out_.size[k] = static_cast<std::int32_t>(n);
       count *= static_cast<std::uint64_t>(n);
     }
-    if (count > max_values_)
-      throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(count) + " voxels; the limit is " +
-                           std::to_string(max_values_)};
+    if (const std::uint64_t most = max_values_ / channels(); count > most)
+      throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(count) +
+                           (channels() > 1 ? " voxels of 3 values" : " voxels") + "; the limit is " +
+                           std::to_string(most)};
     double m[9], v[3];
     for (int i = 0; i < 9; ++i) m[i] = b_.get<double>(kMap + kMatrix + 8 * i);
     for (int i = 0; i < 3; ++i) v[i] = b_.get<double>(kMap + kOffset + 8 * i);
@@ -118,20 +137,27 @@ class Tree {
       if (!std::isfinite(t[i])) fault("its transform is not finite");
   }
 
+  std::uint64_t channels() const { return static_cast<std::uint64_t>(out_.channels); }
   double number(std::uint64_t at) const {
-    if (type_ == kDouble) return b_.get<double>(at);
+    if (type_ == kDouble || type_ == kVec3d) return b_.get<double>(at);
     if (type_ != kHalf) return b_.get<float>(at);
     Imath::half h;
     h.setBits(b_.get<std::uint16_t>(at));
     return h;
   }
+  Value value(std::uint64_t at) const {
+    Value v{};
+    for (std::uint64_t c = 0; c < channels(); ++c)
+      v[c] = static_cast<float>(number(at + (type_ == kVec3d ? 8 : 4) * c));
+    return v;
+  }
 
   // Voxel n of a leaf. Quantised ones are codes of 1 to 16 bits, and the leaf's minimum and step.
-  double voxel(std::uint64_t leaf, std::uint32_t n) const {
+  Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
-    if (type_ == kDouble) return number(table + 8 * n);
-    if (type_ == kFloat) return number(table + 4 * n);
-    if (type_ == kHalf) return number(table + 2 * n);
+    if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
+    if (type_ == kFloat || type_ == kVec3f) return value(table + 4 * channels() * n);
+    if (type_ == kHalf) return value(table + 2 * n);
     const std::uint32_t log_bits = type_ == kFp4    ? 2
                                    : type_ == kFp8  ? 3
                                    : type_ == kFp16 ? 4
@@ -140,14 +166,14 @@ class Tree {
     const std::uint32_t per_word = 5 - log_bits, bits = 1u << log_bits;
     const auto word = b_.get<std::uint32_t>(table + 4 * (n >> per_word));
     const std::uint32_t code = word >> ((n & ((1u << per_word) - 1)) << log_bits) & ((1u << bits) - 1);
-    return static_cast<float>(code) * b_.get<float>(table - 12) + b_.get<float>(table - 16);
+    return {static_cast<float>(code) * b_.get<float>(table - 12) + b_.get<float>(table - 16)};
   }
 
   void read_root() {
     const auto tiles = b_.get<std::uint32_t>(root_ + 24);
     std::set<std::uint64_t> keys;
     for (std::uint32_t i = 0; i < tiles; ++i) {
-      const std::uint64_t tile = root_ + layout_.root_size + kRootTile * i;
+      const std::uint64_t tile = root_ + layout_.root_size + layout_.root_tile * i;
       const auto key = b_.get<std::uint64_t>(tile);
       if (!keys.insert(key).second) fault("two of its tiles are at one place");
       Coord origin;
@@ -157,7 +183,7 @@ class Tree {
       if (!meets(origin, kUpperSide)) continue;
       const auto child = b_.get<std::int64_t>(tile + 8);
       if (child == 0)
-        fill_node(origin, kUpperSide, number(tile + layout_.tile_value));
+        fill_node(origin, kUpperSide, value(tile + layout_.tile_value));
       else
         inner(at(root_, child), origin, kUpperSide);
     }
@@ -173,7 +199,7 @@ class Tree {
     const bool upper = side == kUpperSide;
     const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;
     const std::uint64_t mask = node + (upper ? kUpperChildMask : kLowerChildMask),
-                        table = node + (upper ? kUpperTable : kLowerTable);
+                        table = node + (upper ? layout_.upper_table : layout_.lower_table);
     std::array<int, 3> first{}, last{};
     for (int k = 0; k < 3; ++k) {
       first[k] = static_cast<int>(std::max<std::int64_t>(0, lo_[k] - origin[k]) / child_side);
@@ -186,10 +212,10 @@ class Tree {
           const Coord at_child{origin[0] + x * child_side, origin[1] + y * child_side,
                                origin[2] + z * child_side};
           if (!b_.bit(mask, n)) {
-            fill_node(at_child, child_side, number(table + 8 * n));
+            fill_node(at_child, child_side, value(table + layout_.table_step * n));
             continue;
           }
-          const std::uint64_t child = at(node, b_.get<std::int64_t>(table + 8 * n));
+          const std::uint64_t child = at(node, b_.get<std::int64_t>(table + layout_.table_step * n));
           if (upper)
             inner(child, at_child, kLowerSide);
           else
@@ -211,7 +237,7 @@ class Tree {
       if (c[k] >= end_[k] || c[k] + side <= lo_[k]) return false;
     return true;
   }
-  void fill_node(const Coord& c, int side, double value) {
+  void fill_node(const Coord& c, int side, const Value& value) {
     Coord a, e;
     for (int k = 0; k < 3; ++k) {
       a[k] = std::max(c[k], lo_[k]);
@@ -219,18 +245,17 @@ class Tree {
     }
     fill(a, e, value);
   }
-  void fill(const Coord& a, const Coord& e, double value) {
+  void fill(const Coord& a, const Coord& e, const Value& value) {
     for (std::int64_t z = a[2]; z < e[2]; ++z)
       for (std::int64_t y = a[1]; y < e[1]; ++y)
         for (std::int64_t x = a[0]; x < e[0]; ++x) set({x, y, z}, value);
   }
-  void set(const Coord& c, double value) {
-    const auto v = static_cast<float>(value);
-    if (!std::isfinite(v))
+  void set(const Coord& c, const Value& value) {
+    if (!std::isfinite(value[0]) || !std::isfinite(value[1]) || !std::isfinite(value[2]))
       throw Refused{1, "voxel (" + std::to_string(c[0]) + ", " + std::to_string(c[1]) + ", " +
                            std::to_string(c[2]) + ") of grid '" + name_ + "' is not a finite number"};
     const auto i = ((c[2] - lo_[2]) * out_.size[1] + (c[1] - lo_[1])) * out_.size[0] + (c[0] - lo_[0]);
-    out_.values[i] = v;
+    std::copy_n(value.begin(), channels(), out_.values + static_cast<std::uint64_t>(i) * channels());
   }
 
   const std::string& name_;
@@ -249,7 +274,7 @@ void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std
                  LsVdbGrid& out) {
   const NvdbBytes bytes(buffer, "its buffer");
   Tree(name, bytes, max_values, out).expand();
-  const auto n = static_cast<std::size_t>(out.size[0]) * out.size[1] * out.size[2];
+  const auto n = static_cast<std::size_t>(out.size[0]) * out.size[1] * out.size[2] * out.channels;
   for (std::size_t i = 0; i < n; ++i) {
     if (!(out.values[i] < 0)) continue;
     ++out.negatives;

@@ -52,6 +52,15 @@ std::string choose(const openvdb::io::File& file, const std::string& wanted) {
   throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(file)};
 }
 
+template <class T>
+float component(const T& value, int) {
+  return static_cast<float>(value);
+}
+template <class T>
+float component(const openvdb::math::Vec3<T>& value, int k) {
+  return static_cast<float>(value[k]);
+}
+
 template <class GridType>
 void copy_values(const GridType& grid, const openvdb::CoordBBox& box, LsVdbGrid& out) {
   auto access = grid.getConstAccessor();
@@ -62,14 +71,18 @@ void copy_values(const GridType& grid, const openvdb::CoordBBox& box, LsVdbGrid&
     for (int y = 0; y < out.size[1]; ++y) {
       for (int x = 0; x < out.size[0]; ++x, ++i) {
         c.reset(lo.x() + x, lo.y() + y, lo.z() + z);
-        const auto v = static_cast<float>(access.getValue(c));
-        if (!std::isfinite(v)) {
-          throw Refused{1, "voxel (" + std::to_string(c.x()) + ", " + std::to_string(c.y()) + ", " +
-                               std::to_string(c.z()) + ") of grid '" + grid.getName() +
-                               "' is not a finite number"};
+        const auto value = access.getValue(c);
+        for (int k = 0; k < out.channels; ++k) {
+          const float v = component(value, k);
+          if (!std::isfinite(v)) {
+            throw Refused{1, "voxel (" + std::to_string(c.x()) + ", " + std::to_string(c.y()) + ", " +
+                                 std::to_string(c.z()) + ") of grid '" + grid.getName() +
+                                 "' is not a finite number"};
+          }
+          out.negatives += v < 0;
+          out.values[i * static_cast<std::size_t>(out.channels) + static_cast<std::size_t>(k)] =
+              v < 0 ? 0.f : v;
         }
-        out.negatives += v < 0;
-        out.values[i] = v < 0 ? 0.f : v;
       }
     }
   }
@@ -97,6 +110,7 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
   openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
   if (box.empty()) throw Refused{1, "grid '" + grid->getName() + "' is empty: it has no active voxel"};
   box.expand(1);
+  out.channels = openvdb::VecTraits<typename GridType::ValueType>::IsVec ? 3 : 1;
   std::uint64_t count = 1;
   for (int k = 0; k < 3; ++k) {
     const auto n = static_cast<std::int64_t>(box.max()[k]) - box.min()[k] + 1;
@@ -106,12 +120,13 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
     out.size[k] = static_cast<std::int32_t>(n);
     count *= static_cast<std::uint64_t>(n);
   }
-  if (count > max_values) {
-    throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(count) +
-                         " voxels; the limit is " + std::to_string(max_values)};
+  if (count > max_values / static_cast<std::uint64_t>(out.channels)) {
+    throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(count) + " voxels" +
+                         (out.channels > 1 ? " of 3 values; the limit is " : "; the limit is ") +
+                         std::to_string(max_values / static_cast<std::uint64_t>(out.channels))};
   }
   place(*grid, box.min(), out);
-  out.values = new float[count];
+  out.values = new float[count * static_cast<std::uint64_t>(out.channels)];
   copy_values(*grid, box, out);
 }
 
@@ -125,10 +140,22 @@ void read(const char* path, const std::string& wanted, std::uint64_t max_values,
     throw Refused{1,
                   "grid '" + base->getName() + "' is a level set, not a density; convert it to a fog volume"};
   }
+  if (base->getGridClass() == openvdb::GRID_STAGGERED) {
+    throw Refused{1, "grid '" + base->getName() +
+                         "' is staggered: its values are flows through the faces of voxels, not a density"};
+  }
   if (base->isType<openvdb::FloatGrid>()) return convert<openvdb::FloatGrid>(base, max_values, out);
   if (base->isType<openvdb::DoubleGrid>()) return convert<openvdb::DoubleGrid>(base, max_values, out);
+  if (base->isType<openvdb::Vec3SGrid>()) return convert<openvdb::Vec3SGrid>(base, max_values, out);
+  if (base->isType<openvdb::Vec3DGrid>()) return convert<openvdb::Vec3DGrid>(base, max_values, out);
+  if (base->type().find("ptdataidx") != std::string::npos ||
+      base->type().find("ptidx") != std::string::npos) {
+    throw Refused{1,
+                  "grid '" + base->getName() +
+                      "' holds points, not a density; convert it to a fog volume, or give another grid_name"};
+  }
   throw Refused{1, "grid '" + base->getName() + "' has values of type " + base->valueType() +
-                       "; a density is float or double"};
+                       "; a density is float or double, one number or three"};
 }
 
 }  // namespace

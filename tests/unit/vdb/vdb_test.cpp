@@ -1,0 +1,198 @@
+// What the module makes of OpenVDB files of every kind of grid, of points among them, and of files of older
+// versions of the format. All of them are written here.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/points/PointConversion.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "worker/render/vdb_module.h"
+
+namespace {
+
+using testing::HasSubstr;
+
+class Scratch {
+ public:
+  Scratch()
+      : path_(std::filesystem::temp_directory_path() / ("vdb-test-" + std::to_string(::getpid()) + ".vdb")) {}
+  ~Scratch() {
+    std::error_code ec;
+    std::filesystem::remove(path_, ec);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct Read {
+  std::string error;
+  LsVdbGrid grid{};
+  std::vector<float> values;
+
+  float at(int x, int y, int z, int channel = 0) const {
+    const int node = (z * grid.size[1] + y) * grid.size[0] + x;
+    return values.at(static_cast<std::size_t>(grid.channels * node + channel));
+  }
+};
+
+Read read(const std::filesystem::path& path, std::uint64_t max_values = 1 << 20) {
+  Read r;
+  char error[512] = {};
+  if (ls_vdb_read(path.c_str(), "", max_values, &r.grid, error, sizeof error) != 0) {
+    r.error = error;
+    return r;
+  }
+  const auto n = static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2] * r.grid.channels;
+  r.values.assign(r.grid.values, r.grid.values + n);
+  ls_vdb_free(&r.grid);
+  return r;
+}
+
+void write(const std::filesystem::path& path, const openvdb::GridBase::Ptr& grid,
+           std::uint32_t compression = openvdb::io::COMPRESS_ACTIVE_MASK) {
+  grid->setName("density");
+  openvdb::io::File file(path.string());
+  file.setCompression(compression);
+  file.write({grid});
+  file.close();
+}
+
+// Active from (0, 0, 0) to (9, 4, 2), with a number of its own for each voxel.
+template <class GridType, class Make>
+typename GridType::Ptr filled(const typename GridType::ValueType& background, Make value) {
+  const auto grid = GridType::create(background);
+  auto access = grid->getAccessor();
+  for (int x = 0; x < 10; ++x)
+    for (int y = 0; y < 5; ++y)
+      for (int z = 0; z < 3; ++z) access.setValue(openvdb::Coord(x, y, z), value(x + 10 * y + 100 * z));
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  return grid;
+}
+// One layer of background around them; channel c holds (c + 1) times the number.
+void expect_them(const Read& r, int channels) {
+  ASSERT_EQ(r.error, "");
+  EXPECT_EQ(r.grid.channels, channels);
+  EXPECT_EQ(r.grid.size[0], 12);
+  EXPECT_EQ(r.grid.size[1], 7);
+  EXPECT_EQ(r.grid.size[2], 5);
+  for (int z = 0; z < 5; ++z)
+    for (int y = 0; y < 7; ++y)
+      for (int x = 0; x < 12; ++x)
+        for (int c = 0; c < channels; ++c) {
+          const bool inside = x > 0 && x < 11 && y > 0 && y < 6 && z > 0 && z < 4;
+          const int value = inside ? (x - 1 + 10 * (y - 1) + 100 * (z - 1)) * (c + 1) : 0;
+          ASSERT_EQ(r.at(x, y, z, c), static_cast<float>(value)) << x << " " << y << " " << z << " " << c;
+        }
+}
+template <class T>
+openvdb::math::Vec3<T> three(int i) {
+  return {static_cast<T>(i), static_cast<T>(2 * i), static_cast<T>(3 * i)};
+}
+
+class Vdb : public testing::Test {
+ protected:
+  Vdb() { openvdb::initialize(); }
+  Scratch file_;
+};
+
+TEST_F(Vdb, ReadsOneNumberAVoxelAndThree) {
+  write(file_.path(), filled<openvdb::FloatGrid>(0, [](int i) { return static_cast<float>(i); }));
+  expect_them(read(file_.path()), 1);
+  write(file_.path(), filled<openvdb::DoubleGrid>(0, [](int i) { return static_cast<double>(i); }));
+  expect_them(read(file_.path()), 1);
+  write(file_.path(), filled<openvdb::Vec3SGrid>(openvdb::Vec3s(0), three<float>));
+  expect_them(read(file_.path()), 3);
+  write(file_.path(), filled<openvdb::Vec3DGrid>(openvdb::Vec3d(0), three<double>));
+  expect_them(read(file_.path()), 3);
+}
+
+TEST_F(Vdb, HalvesAreNumbersToo) {
+  const auto grid = filled<openvdb::FloatGrid>(0, [](int i) { return static_cast<float>(i); });
+  grid->setSaveFloatAsHalf(true);
+  write(file_.path(), grid);
+  expect_them(read(file_.path()), 1);
+}
+
+TEST_F(Vdb, NegativesOfEveryChannelAreCounted) {
+  write(file_.path(), filled<openvdb::Vec3SGrid>(openvdb::Vec3s(0), [](int i) {
+          return i == 0 ? openvdb::Vec3s(1, -2, -3) : openvdb::Vec3s(1, 2, 3);
+        }));
+
+  const Read r = read(file_.path());
+
+  EXPECT_EQ(r.grid.negatives, 2u);
+  EXPECT_EQ(r.at(1, 1, 1, 0), 1);
+  EXPECT_EQ(r.at(1, 1, 1, 1), 0);
+}
+
+TEST_F(Vdb, ALimitCountsEveryValue) {
+  write(file_.path(), filled<openvdb::Vec3SGrid>(openvdb::Vec3s(0), three<float>));
+
+  EXPECT_THAT(read(file_.path(), 3 * 420 - 1).error, HasSubstr("420 voxels of 3 values; the limit is 419"));
+  EXPECT_EQ(read(file_.path(), 3 * 420).error, "");
+}
+
+TEST_F(Vdb, RefusesPointsAndOtherGridsByTheirTypes) {
+  const std::vector<openvdb::Vec3s> where{{.1f, .2f, .3f}, {1, 2, 3}};
+  const auto transform = openvdb::math::Transform::createLinearTransform(.5);
+  openvdb::points::PointAttributeVector<openvdb::Vec3s> positions(where);
+  const auto index =
+      openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(positions, *transform);
+  write(file_.path(),
+        openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(
+            *index, positions, *transform));
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("holds points"));
+  write(file_.path(), filled<openvdb::Int32Grid>(0, [](int i) { return i; }));
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("has values of type int32"));
+  write(file_.path(), filled<openvdb::BoolGrid>(false, [](int) { return true; }));
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("has values of type bool"));
+  write(file_.path(), filled<openvdb::Vec3IGrid>(openvdb::Vec3i(0), three<int>));
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("has values of type vec3i"));
+  const auto flow = filled<openvdb::Vec3SGrid>(openvdb::Vec3s(0), three<float>);
+  flow->setGridClass(openvdb::GRID_STAGGERED);
+  write(file_.path(), flow);
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("is staggered"));
+}
+
+// The number of the format stands behind the magic one. What is written for a grid of numbers without Blosc
+// has not changed since version 222.
+TEST_F(Vdb, ReadsOlderVersionsOfTheFormat) {
+  constexpr std::uint32_t kMask = openvdb::io::COMPRESS_ACTIVE_MASK, kZip = openvdb::io::COMPRESS_ZIP;
+  for (const std::uint32_t compression : {std::uint32_t{0}, kMask, kMask | kZip})
+    for (const std::uint32_t version : {222u, 223u, 224u}) {
+      SCOPED_TRACE(version);
+      write(file_.path(), filled<openvdb::FloatGrid>(0, [](int i) { return static_cast<float>(i); }),
+            compression);
+      {
+        std::fstream bytes(file_.path(), std::ios::in | std::ios::out | std::ios::binary);
+        bytes.seekp(8);
+        bytes.write(reinterpret_cast<const char*>(&version), sizeof version);
+      }
+      expect_them(read(file_.path()), 1);
+    }
+}
+
+TEST_F(Vdb, RefusesAFormatThatIsTooOldOrTooNew) {
+  for (const std::uint32_t version : {100u, 9999u}) {
+    write(file_.path(), filled<openvdb::FloatGrid>(0, [](int i) { return static_cast<float>(i); }));
+    {
+      std::fstream bytes(file_.path(), std::ios::in | std::ios::out | std::ios::binary);
+      bytes.seekp(8);
+      bytes.write(reinterpret_cast<const char*>(&version), sizeof version);
+    }
+    EXPECT_THAT(read(file_.path()).error, HasSubstr("not a readable OpenVDB file")) << version;
+  }
+}
+
+}  // namespace
