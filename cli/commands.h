@@ -18,6 +18,7 @@ void add_farm_commands(CLI::App& app,
 void add_merge(CLI::App& app, Action& action);
 void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
+void add_compare(CLI::App& app, Action& action);
 
 // "lightshaft 0.1.0, build ..."
 std::string version_text();

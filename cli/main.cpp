@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
   add_merge(app, action);
   add_validate(app, action);
   add_verify(app, action);
+  add_compare(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,0 +1,55 @@
+#include "cli/compare/machine.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "common/base/plain_text.h"
+
+namespace ls::race {
+namespace {
+
+std::string processor() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line))
+    if (line.starts_with("model name"))
+      if (const auto at = line.find(": "); at != std::string::npos) return plain_text(line.substr(at + 2));
+  return "a processor that does not tell its name";
+}
+
+}  // namespace
+
+Result<void> use_cores(int count) {
+  cpu_set_t all, some;
+  CPU_ZERO(&some);
+  if (::sched_getaffinity(0, sizeof all, &all) != 0)
+    return fail(Errc::internal, fmt::format("sched_getaffinity: {}", std::strerror(errno)));
+  const int there = CPU_COUNT(&all);
+  if (count > there)
+    return fail(
+        Errc::resource_exhausted,
+        fmt::format("--threads {}: there are {} cores, and a race with more threads than cores is none",
+                    count, there));
+  for (int cpu = 0; cpu < CPU_SETSIZE && CPU_COUNT(&some) < count; ++cpu)
+    if (CPU_ISSET(cpu, &all)) CPU_SET(cpu, &some);
+  if (::sched_setaffinity(0, sizeof some, &some) != 0)
+    return fail(Errc::internal, fmt::format("sched_setaffinity: {}", std::strerror(errno)));
+  return {};
+}
+
+std::string machine_words(int cores) {
+  return fmt::format("{}, {} of {} cores", processor(), cores, ::sysconf(_SC_NPROCESSORS_ONLN));
+}
+
+double load_average() {
+  double load = 0;
+  return ::getloadavg(&load, 1) == 1 ? load : -1;
+}
+
+}  // namespace ls::race

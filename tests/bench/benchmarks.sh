@@ -1,0 +1,43 @@
+#!/bin/bash
+# Makes docs/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
+#
+# usage: benchmarks.sh SCENES [--clock wall|cpu] [--time S] [--seeds K] [--only races|curves] [--out DIR]
+# SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references.
+# Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba and bpy; what is missing is said.
+# The curves have the demo scenes, too, made here if they are not there; they are counted by CPU seconds, and so may be made while
+# others use the machine. The races want a quiet one, or --clock cpu.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+BIN=${LIGHTSHAFT_BIN:-build/release/bin}
+ADAPTERS=tests/bench/adapters
+clock=wall time=5 seeds=3 only= out=docs/benchmarks
+[ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
+scenes=$1; shift
+while [ $# -ge 2 ]; do
+  case $1 in
+    --clock) clock=$2 ;; --time) time=$2 ;; --seeds) seeds=$2 ;; --only) only=$2 ;; --out) out=$2 ;;
+    *) echo "benchmarks.sh: unknown option $1" >&2; exit 2 ;;
+  esac
+  shift 2
+done
+[ $# -eq 0 ] || { echo "benchmarks.sh: $1 needs a value" >&2; exit 2; }
+
+programs=()
+add_programs() {  # PACKAGE ADAPTER...
+  local package=$1; shift
+  if ! python3 -c "import $package" 2>/dev/null; then echo "benchmarks.sh: without $package (pip install $package)" >&2; return; fi
+  for adapter in "$@"; do programs+=(--program "$ADAPTERS/$adapter.json"); done
+}
+
+if [ "$only" != curves ]; then
+  add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
+  add_programs bpy cycles
+  "$BIN/lightshaft" compare "$scenes"/*.xml --references "$scenes/refs" --integrators volpath "${programs[@]}" \
+    --time "$time" --seeds "$seeds" --clock "$clock" --report "$out/races"
+fi
+if [ "$only" != races ]; then
+  bath=build/benchmarks/bath
+  [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" >&2
+  "$BIN/lightshaft" compare "$scenes"/*.xml "$bath/bath.xml" --integrators volpath --size 96x64 \
+    --time 600 --spp 1024 --seeds "$seeds" --clock cpu --report "$out/curves"
+fi

@@ -1,0 +1,172 @@
+"""lightshaft compare: integrators of ours race, and a program that is none of ours, well-behaved or not."""
+
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cli_kit import bin_dir, lightshaft, write_fog
+
+# A program that "renders" by running ours: what an adapter calls.
+OTHER = """import json, subprocess, sys
+ours, scene, image, times, spp, seed, size = sys.argv[1:8]
+report = times + ".report"
+subprocess.run([ours, "render", scene, "-o", image, "--float", "--quiet", "--spp", spp, "--seed", str(1000 + int(seed)), "--threads", "1",
+                "--size", size, "--report", report], check=True)
+told = json.load(open(report))
+json.dump({"seconds": told["render_seconds"], "cpu_seconds": told["core_seconds"]}, open(times, "w"))
+"""
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def adapter(folder, command, **more):
+    path = folder / "adapter.json"
+    path.write_text(json.dumps({"name": "Other", "command": command, **more}))
+    return path
+
+
+def other(folder):
+    (folder / "other.py").write_text(OTHER)
+    return adapter(folder, [sys.executable, "{adapter}/other.py", str(bin_dir() / "lightshaft"), "{scene}", "{image}", "{times}", "{spp}",
+                            "{seed}", "{size}"], first_spp=2)
+
+
+def compare(folder, *arguments, code=0):
+    return lightshaft("compare", write_fog(folder), "--size", "48x32", "--threads", "1", "--clock", "cpu", "--report", folder / "out", "--quiet",
+                      *arguments, code=code)
+
+
+def test_integrators_of_ours_race_with_intervals(tmp_path):
+    done = compare(tmp_path, "--integrators", "volpath,volpath_distant_mis", "--time", "60", "--spp", "64", "--seeds", "3")
+    out = tmp_path / "out"
+
+    points = rows(out / "points.csv")
+    assert {p["entrant"] for p in points} == {"Lightshaft volpath", "Lightshaft volpath_distant_mis"}
+    assert [float(p["spp"]) for p in points if p["entrant"] == "Lightshaft volpath" and p["seed"] == "0"] == [2, 4, 8, 16, 32, 64]
+    # What the other seeds say of a picture and what it says of itself are the same error: within a factor, over six points.
+    logs = [math.log(float(p["relmse"]) / float(p["estimated_relmse"])) for p in points if float(p["spp"]) >= 8]
+    assert abs(sum(logs) / len(logs)) < .35, logs
+    summary = rows(out / "summary.csv")
+    assert float(summary[1]["ratio_lo"]) < float(summary[1]["ratio"]) < float(summary[1]["ratio_hi"])
+    assert float(summary[0]["efficiency"]) == pytest.approx(1 / (float(summary[0]["relmse"]) * float(summary[0]["seconds"])), rel=1e-4)
+    assert "times as efficient" in done.stdout
+    page = (out / "index.html").read_text()
+    assert page.count("<svg") == 1 and "<script" not in page and "Lightshaft volpath_distant_mis" in page
+    assert (out / "fog.svg").stat().st_size < 100_000
+    assert "![fog: error against time](fog.svg)" in (out / "report.md").read_text()
+    assert rows(out / "forecasts.csv") is not None
+
+
+def test_time_ends_a_race(tmp_path):
+    compare(tmp_path, "--time", "0.3", "--seeds", "2")
+    points = rows(tmp_path / "out" / "points.csv")
+
+    ends = [float(p["seconds"]) for p in points if p["last"] == "1"]
+    assert len(ends) == 2
+    # The last round is cut to the time left, by what the rounds before it cost: those vary.
+    assert all(.1 < seconds < .6 for seconds in ends), ends
+
+
+def test_the_pictures_are_those_of_render(tmp_path):
+    """Measured against its own picture, a race of the same seed has no error but that of the file's halves."""
+    scene = write_fog(tmp_path)
+    lightshaft("render", scene, "-o", tmp_path / "r.exr", "--float", "--quiet", "--spp", "16", "--size", "48x32", "--seed", "5")
+    compare(tmp_path, "--time", "60", "--spp", "16", "--seeds", "1", "--seed", "5", "--reference", tmp_path / "r.exr")
+
+    last = [p for p in rows(tmp_path / "out" / "points.csv") if p["last"] == "1"][0]
+    assert float(last["relmse"]) == 0
+
+
+def test_another_program_races(tmp_path):
+    compare(tmp_path, "--program", other(tmp_path), "--time", "0.5", "--seeds", "2")
+    points = rows(tmp_path / "out" / "points.csv")
+
+    theirs = [p for p in points if p["entrant"] == "Other" and p["seed"] == "1"]
+    assert [p["last"] for p in theirs] == ["0"] * (len(theirs) - 1) + ["1"]
+    assert [float(p["spp"]) for p in theirs] == sorted(float(p["spp"]) for p in theirs) and theirs[0]["spp"] == "2"
+    summary = {row["entrant"]: row for row in rows(tmp_path / "out" / "summary.csv")}
+    # It is ours behind a wrapper: as efficient, as far as two seeds tell.
+    assert .2 < float(summary["Other"]["ratio"]) < 5
+
+
+BAD = {
+    "exits": (["sh", "-c", "echo no licence; exit 7", "{scene}", "{spp}", "{image}"], "exit code 7; its last words: no licence"),
+    "dies": (["sh", "-c", "kill -ABRT $$", "{scene}", "{spp}", "{image}"], "signal 6"),
+    "hangs": (["tail", "-f", "/dev/null", "{scene}", "--pid={spp}", "--retry", "{image}"], "ran for more than"),
+    "writes nothing": (["true", "{scene}", "{spp}", "{image}"], "exr"),
+    "writes nonsense": (["sh", "-c", "echo hello > $0", "{image}", "{scene}", "{spp}"], "exr"),
+    "has no program": (["no-such-program-here", "{scene}", "{spp}", "{image}"], "cannot be started"),
+    "lists nothing": (["true", "{scene}", "{time}", "{folder}"], "has not written pictures.jsonl"),
+    "lists what is elsewhere": (["sh", "{adapter}/lists.sh", "{folder}", "{scene}", "{time}"], "line 1: 'image' must be"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_faulty_program_is_out_and_the_race_goes_on(tmp_path, kind):
+    command, said = BAD[kind]
+    (tmp_path / "lists.sh").write_text("echo '{\"image\": \"../x.exr\", \"spp\": 1, \"seconds\": 0.1}' > $1/pictures.jsonl\n")
+    done = compare(tmp_path, "--program", adapter(tmp_path, command, most_seconds=1), "--time", "0.1", "--seeds", "2", code=1)
+
+    assert said in done.stderr and "Other" in done.stderr
+    assert [row["entrant"] for row in rows(tmp_path / "out" / "summary.csv")] == ["Lightshaft volpath"]
+    assert "Other failed:" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_a_picture_of_another_size_is_refused(tmp_path):
+    lightshaft("render", write_fog(tmp_path), "-o", tmp_path / "small.exr", "--quiet", "--spp", "2", "--size", "40x32")
+    path = adapter(tmp_path, ["sh", "-c", f"cp {tmp_path}/small.exr $0", "{image}", "{scene}", "{spp}"])
+    done = compare(tmp_path, "--program", path, "--time", "0.1", "--seeds", "2", code=1)
+
+    assert "is 40 x 32 pixels, and the race is one of 48 x 32" in done.stderr, done.stderr
+
+
+def test_wrong_use_is_told_before_anything_is_rendered(tmp_path):
+    scene = write_fog(tmp_path)
+    start = ["compare", scene, "--time", "1", "--report", tmp_path / "out"]
+    for arguments, said in ((["--integrators", "volpth"], "volpth"), (["--seeds", "1"], "--seeds 1 needs a --reference"),
+                            (["--reference", tmp_path / "none.exr"], "none.exr"), (["--clock", "sun"], "--clock"),
+                            (["--program", tmp_path / "none.json"], "there is no such file"), (["--threads", "9999"], "--threads"),
+                            (["--program", adapter(tmp_path, ["x", "{scene}"])], "either {spp}")):
+        done = lightshaft(*start, *arguments, code=2)
+        assert said in done.stderr, done.stderr
+    assert not (tmp_path / "out" / "points.csv").exists()
+
+
+def test_a_set_of_scenes_has_one_table(tmp_path):
+    (tmp_path / "b").mkdir()
+    first = write_fog(tmp_path)
+    shutil.copy(write_fog(tmp_path / "b"), tmp_path / "b" / "scene.xml")
+    lightshaft("compare", first, tmp_path / "b" / "scene.xml", "--size", "32x16", "--threads", "1", "--clock", "cpu", "--time", "60", "--spp", "4", "--seeds", "2",
+               "--report", tmp_path / "out", "--quiet")
+
+    assert [row["scene"] for row in rows(tmp_path / "out" / "summary.csv")] == ["fog", "b"]
+    assert (tmp_path / "out" / "b.svg").exists()
+
+
+def test_interrupting_keeps_what_was_done(tmp_path):
+    scene = write_fog(tmp_path)
+    shutil.copy(scene, tmp_path / "long.xml")
+    out = tmp_path / "out"
+    run = subprocess.Popen([bin_dir() / "lightshaft", "compare", scene, tmp_path / "long.xml", "--size", "48x32", "--threads", "1", "--time", "3", "--clock", "cpu",
+                            "--seeds", "2", "--report", out], stderr=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(tmp_path)})
+    for line in run.stderr:
+        if re.search("long: seed 1", line):
+            run.send_signal(2)
+            break
+    began = time.monotonic()
+    run.stderr.read()
+    assert run.wait(timeout=60) == 1
+    assert time.monotonic() - began < 30
+    assert [row["scene"] for row in rows(out / "summary.csv")] == ["fog"]
+    assert not list(tmp_path.glob("lightshaft-race-*")), "pictures were left behind"

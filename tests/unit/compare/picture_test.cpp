@@ -1,0 +1,78 @@
+// Pictures handed in by others.
+#include "cli/compare/picture.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "common/image/exr_file.h"
+
+namespace ls::race {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr FrameSize kSize{4, 3};
+
+std::filesystem::path write_picture(const Scratch& scratch, FrameSize size, float first) {
+  const auto values = static_cast<std::size_t>(size.width * size.height);
+  ExrPicture picture{size, {}, {}};
+  for (const char* channel : {"R", "G", "B"})
+    picture.channels[channel] = ExrFloat{std::vector<float>(values, first)};
+  const auto bytes = write_exr(picture);
+  const auto file = scratch.folder() / "picture.exr";
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
+  return file;
+}
+
+TEST(HandedIn, PicturesAreReadAndKept) {
+  const auto scratch = Scratch::make();
+  const auto pixels = read_picture(write_picture(*scratch, kSize, .25f), kSize);
+  ASSERT_TRUE(pixels) << pixels.error().message;
+
+  ASSERT_TRUE(keep(scratch->folder() / "kept", *pixels));
+  EXPECT_EQ(*kept(scratch->folder() / "kept", kSize), *pixels);
+  EXPECT_EQ(pixels->size(), 36u);
+}
+
+TEST(HandedIn, OtherSizesAreNamed) {
+  const auto scratch = Scratch::make();
+  EXPECT_THAT(read_picture(write_picture(*scratch, {3, 3}, 1), kSize).error().message,
+              HasSubstr("is 3 x 3 pixels"));
+}
+
+TEST(HandedIn, LargerOnesAreRefusedUnread) {
+  const auto scratch = Scratch::make();
+  EXPECT_FALSE(read_picture(write_picture(*scratch, {40, 30}, 1), kSize));
+}
+
+TEST(HandedIn, ValuesThatAreNoNumbersAreCounted) {
+  const auto scratch = Scratch::make();
+  const auto bad = read_picture(write_picture(*scratch, kSize, std::nanf("")), kSize);
+  EXPECT_THAT(bad.error().message, HasSubstr("36 values that are NaN or infinite, the first in pixel 0,0"));
+}
+
+TEST(HandedIn, WhatIsNoExrIsNamed) {
+  const auto scratch = Scratch::make();
+  const auto file = scratch->folder() / "picture.exr";
+  std::ofstream(file) << "this is no picture";
+  EXPECT_THAT(read_picture(file, kSize).error().message, HasSubstr("picture.exr"));
+  EXPECT_FALSE(read_picture(scratch->folder() / "none.exr", kSize));
+}
+
+TEST(HandedIn, TheFolderGoesWithTheRace) {
+  std::filesystem::path folder;
+  {
+    const auto scratch = Scratch::make();
+    folder = scratch->folder();
+    std::ofstream(folder / "left") << "behind";
+    EXPECT_TRUE(std::filesystem::exists(folder));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder));
+}
+
+}  // namespace
+}  // namespace ls::race

@@ -1,0 +1,122 @@
+// Turns, rounds and runs of a race, at times that are told.
+#include "cli/compare/schedule.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <vector>
+
+namespace ls::race {
+namespace {
+
+// Plays a race of turns of these lengths to time 10; who was on, in order.
+std::vector<std::size_t> play(const std::vector<double>& lengths, std::size_t first_lap = 0) {
+  std::vector<Turn> turns;
+  for (const double length : lengths) turns.push_back({false, 0, length});
+  std::vector<std::size_t> order;
+  for (std::size_t lap = first_lap;; ++lap) {
+    const auto next = next_turn(turns, lap);
+    if (!next) return order;
+    Turn& turn = turns[*next];
+    turn.used += turn.expected;
+    turn.done = turn.used >= 10;
+    order.push_back(*next);
+  }
+}
+
+TEST(Turns, ShortOnesAlternate) {
+  const auto order = play({1, 1});
+
+  ASSERT_EQ(order.size(), 20u);
+  for (std::size_t i = 0; i < order.size(); i += 2) EXPECT_NE(order[i], order[i + 1]) << i;
+}
+
+TEST(Turns, NobodyIsEverAheadByMoreThanOneTurn) {
+  const std::vector<double> lengths{.5, 2, 1};
+  std::vector<double> used(3);
+  for (const std::size_t who : play(lengths)) {
+    used[who] += lengths[who];
+    const double least = *std::min_element(used.begin(), used.end());
+    EXPECT_LE(used[who] - least, 2 + .5);
+  }
+}
+
+TEST(Turns, ALongOneFallsIntoTheMiddleOfTheOthers) {
+  const auto order = play({1, 10});
+
+  const auto at = std::find(order.begin(), order.end(), 1u) - order.begin();
+  EXPECT_GE(at, 4);
+  EXPECT_LE(at, 6);
+}
+
+TEST(Turns, EachSeedBeginsWithAnother) {
+  EXPECT_EQ(play({1, 1, 1}, 0).front(), 0u);
+  EXPECT_EQ(play({1, 1, 1}, 1).front(), 1u);
+  EXPECT_EQ(play({1, 1, 1}, 2).front(), 2u);
+}
+
+TEST(Turns, EndWhenAllAreDone) {
+  EXPECT_FALSE(next_turn(std::array{Turn{true, 1, 0}, Turn{true, 2, 0}}, 5));
+  EXPECT_FALSE(next_turn({}, 0));
+}
+
+TEST(RoundsOfARace, AreThoseOfAJobWhileTheyFit) {
+  constexpr std::uint64_t kNoLimit = 1 << 20;
+  EXPECT_EQ(next_range(0, 0, 10, kNoLimit), (SampleRange{0, 2}));
+  EXPECT_EQ(next_range(3, .1, 10, kNoLimit), (SampleRange{8, 16}));
+  EXPECT_EQ(next_range(7, .1, 10, kNoLimit), (SampleRange{128, 192}));
+}
+
+TEST(RoundsOfARace, AreCutToTheTimeLeft) {
+  constexpr std::uint64_t kNoLimit = 1 << 20;
+  EXPECT_EQ(next_range(7, .1, 3.15, kNoLimit), (SampleRange{128, 158}));  // 31 fit, and samples come in pairs
+  EXPECT_FALSE(next_range(7, .1, .5, kNoLimit));                          // 4 after 128 say nothing new
+  EXPECT_FALSE(next_range(3, .1, 0, kNoLimit));
+  EXPECT_FALSE(next_range(3, .1, -2, kNoLimit));
+}
+
+TEST(RoundsOfARace, EndAtTheSamplesAskedFor) {
+  EXPECT_EQ(next_range(6, .1, 1e9, 100), (SampleRange{64, 100}));
+  EXPECT_EQ(next_range(0, 0, 1e9, 1), (SampleRange{0, 2}));
+  EXPECT_FALSE(next_range(6, .1, 1e9, 64));
+}
+
+// Runs a program that needs 2 s to start and .5 s a sample.
+std::vector<std::uint64_t> runs(double start, double per_sample, double time, std::uint64_t most = 1 << 20) {
+  std::vector<PastRun> past;
+  std::vector<std::uint64_t> spp;
+  while (const auto next = next_run(past, 4, time, most)) {
+    past.push_back({next->spp, start + per_sample * static_cast<double>(next->spp)});
+    spp.push_back(next->spp);
+    if (spp.size() > 100) break;
+  }
+  return spp;
+}
+
+TEST(RunsOfAProgram, GrowFourfoldAndFillTheTime) {
+  const auto spp = runs(2, .5, 100);
+
+  EXPECT_EQ(spp, (std::vector<std::uint64_t>{4, 16, 64, 196}));  // 2 + 196 / 2 = 100
+}
+
+TEST(RunsOfAProgram, OneRunIsEnoughIfItFills) { EXPECT_EQ(runs(0, 10, 20), (std::vector<std::uint64_t>{4})); }
+
+TEST(RunsOfAProgram, EndForOneWhoseCostDoesNotRise) {
+  EXPECT_LE(runs(1, 0, 100, UINT64_MAX / 8).size(), 12u);
+}
+
+TEST(RunsOfAProgram, KeepTheSamplesAskedFor) {
+  EXPECT_EQ(runs(0, .001, 100, 30), (std::vector<std::uint64_t>{4, 16, 30}));
+  EXPECT_EQ(runs(0, .001, 100, 2), (std::vector<std::uint64_t>{2}));
+}
+
+TEST(Costs, CpuSecondsCountByTheThread) {
+  const Cost cost{3, 8};
+  EXPECT_EQ(cost.seconds(RaceClock::wall, 4), 3);
+  EXPECT_EQ(cost.seconds(RaceClock::cpu, 4), 2);
+}
+
+}  // namespace
+}  // namespace ls::race
