@@ -69,6 +69,10 @@ class RedisJobStore final : public JobStore {
     if (auto added = local_->add_point(job, point); !added) return added;
     return note(job, [](Due& due) { due.points = true; });
   }
+  Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
+    if (auto set = local_->set_truth(job, spp, truth); !set) return set;
+    return note(job, [](Due& due) { due.points = true; });
+  }
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     return local_->points(job);
   }

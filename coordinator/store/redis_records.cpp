@@ -19,10 +19,22 @@ return 1
 
 std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
+std::optional<TrueFigures> truth_of(const json& t) {
+  if (t.is_null()) return {};
+  TrueFigures truth{t.at(0), t.at(1), {}};
+  if (!t.at(2).is_null()) truth.flip = t.at(2).get<double>();
+  return truth;
+}
+
+json truth_value(const std::optional<TrueFigures>& truth) {
+  if (!truth) return nullptr;
+  return json::array({truth->rmse, truth->relmse, truth->flip ? json(*truth->flip) : json()});
+}
+
 std::vector<ConvergencePoint> parse_points(const std::string& text) {
   std::vector<ConvergencePoint> points;
   for (const json& p : json::parse(text))
-    points.push_back({p.at(0), p.at(1), p.at(2), {p.at(3), p.at(4), p.at(5), p.at(6)}});
+    points.push_back({p.at(0), p.at(1), p.at(2), {p.at(3), p.at(4), p.at(5), p.at(6)}, truth_of(p.at(7))});
   return points;
 }
 
@@ -59,8 +71,8 @@ std::vector<RedisLink::Command> remove_commands(const JobId& id) {
 std::string points_json(const std::vector<ConvergencePoint>& points) {
   json all = json::array();
   for (const auto& p : points)
-    all.push_back({p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse, p.error.relmse_lo,
-                   p.error.relmse_hi});
+    all.push_back({p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
+                   truth_value(p.truth)});
   return dumped(all);
 }
 
