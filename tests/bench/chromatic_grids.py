@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Makes scenes with densities of three channels for agreement.py: `chromatic_grids.py DIR`, then `agreement.py --scenes DIR --mitsuba 512`.
 
-What stays the same everywhere, and differs by channel: steam with a density of its own in red, green and blue, lit by a lamp and a sky
-(volpath); by a sky alone, absorbing only; dense, with an albedo grid. The grids are smooth and their values lie where Mitsuba has them.
+Steam with a density of its own in red, green and blue: lit by a lamp and a sky; by a sky alone, absorbing only; dense, with an albedo grid (where Mitsuba's weights have no bound, and its noise is large).
+The grids are smooth and their values lie where Mitsuba has them.
 """
 import math
 import pathlib
