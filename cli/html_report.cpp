@@ -9,7 +9,9 @@ Result<void> save_html_report(const std::filesystem::path& file, const coordinat
                               const JobId& job, const std::string& report) {
   auto image = coordinator.image_png(job, 0);
   if (!image) return tl::unexpected(image.error());
-  const auto page = report::job_page({report, std::move(*image), {}, {}});
+  const auto page = report::job_page({report, std::move(*image),
+                                      coordinator.error_png(job).value_or(std::vector<std::byte>{}),
+                                      coordinator.samples_png(job).value_or(std::vector<std::byte>{})});
   return page ? save_result(file, *page) : tl::unexpected(page.error());
 }
 

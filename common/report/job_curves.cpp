@@ -102,7 +102,9 @@ std::string slope(const Json& report) {
   if (const auto ci = interval(report, "slope_ci95"))
     out +=
         fmt::format(" ({} to {}; independent samples give −1)", with_sign(ci->first), with_sign(ci->second));
-  if (const std::string trend = text(report, "trend"); !trend.empty()) out += ": " + escape_html(trend);
+  const std::string verdict = text(report, "verdict"),
+                    trend = verdict.empty() ? text(report, "trend") : verdict;
+  if (!trend.empty()) out += ": " + escape_html(trend);
   return out + ". ";
 }
 

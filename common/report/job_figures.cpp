@@ -64,7 +64,8 @@ std::string lesser_figures(const Json& report) {
   std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
   out += true_figures(report);
   out += fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)");
-  out += fact("per core", figure(number(report, "efficiency_per_core")), "1 / (relMSE × core seconds)");
+  out += fact("Efficiency per core", figure(number(report, "efficiency_per_core")),
+              "1 / (relMSE × core seconds)");
   out += fact("Samples", count(number(report, "samples")), "");
   out += fact("Loading", duration(number(report, "load_seconds")), "");
   return out + fact("Memory", byte_size(number(report, "peak_rss_bytes")), "at its peak");

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <iterator>
 
+#include "common/image/maps.h"
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"
@@ -36,10 +38,15 @@ std::string how_it_ended(const Json& report) {
   return state + (state == "running" ? ": figures so far" : "");
 }
 
+bool doubtful(const Json& report) {
+  const std::string kind = text(report, "verdict_kind");
+  return kind.empty() ? !flag(report, "trusted", true) : kind == "heavy_tail" || kind == "bias_floor";
+}
+
 std::string verdict(const Json& report) {
   const std::string note = text(report, "note"), words = text(report, "verdict");
   std::string out;
-  if (!flag(report, "trusted", true) && !words.empty())
+  if (doubtful(report) && !words.empty())
     out += "<p class=\"verdict\" role=\"note\">" + escape_html(words) + "</p>";
   if (!note.empty()) out += "<p class=\"note\">" + escape_html(note) + "</p>";
   return out;
@@ -63,18 +70,38 @@ std::string picture(const std::vector<std::byte>& png, const std::string& alt) {
   return fmt::format("<img alt=\"{}\" src=\"{}\">", alt, data_url("image/png", png));
 }
 
+// The maps' colours from end to end, in equal factors.
+std::string legend(const std::string& least, const std::string& most) {
+  std::string out = R"(<svg class="ramp" viewBox="0 0 64 4" preserveAspectRatio="none" aria-hidden="true">)";
+  for (int i = 0; i < 64; ++i) {
+    const auto c = map_colour((i + 0.5) / 64);
+    fmt::format_to(std::back_inserter(out),
+                   R"(<rect x="{}" width="1.1" height="4" fill="#{:02x}{:02x}{:02x}"/>)", i, c[0], c[1],
+                   c[2]);
+  }
+  return fmt::format("<span class=\"legend\">{}{}</svg>{}</span>", least, out, most);
+}
+
+std::string map(const std::vector<std::byte>& png, const char* name, const char* meaning,
+                const std::string& ramp) {
+  if (png.empty()) return "";
+  return fmt::format("<figure class=\"map\">{}<figcaption><b>{}</b> {}{}</figcaption></figure>\n",
+                     picture(png, fmt::format("Map of the {} over the image", name)), name, meaning, ramp);
+}
+
 std::string pictures(const JobPage& page, const Json& report) {
-  std::string out, maps;
+  std::string out;
   if (!page.image.empty())
     out += "<figure class=\"image\">" + picture(page.image, escape_html(name_of(report)) + ", the image") +
            "</figure>\n";
-  const auto add = [&](const std::vector<std::byte>& png, const char* name, const char* meaning) {
-    if (png.empty()) return;
-    maps += fmt::format("<figure class=\"map\">{}<figcaption><b>{}</b> {}</figcaption></figure>\n",
-                        picture(png, fmt::format("Map of the {} over the image", name)), name, meaning);
-  };
-  add(page.error_map, "error", "of each pixel, relative to its brightness: dark is exact, bright is noisy");
-  add(page.samples_map, "samples", "of each pixel: dark is few, bright is many");
+  const bool flagged = number(report, "few_hits_pixels") > 0;
+  const std::string maps =
+      map(page.error_map, "error",
+          flagged ? "of each pixel: its relative standard error; magenta: too few hits to know it"
+                  : "of each pixel: its relative standard error",
+          legend(given(100 * kMapLeastError) + " %", given(100 * kMapMostError) + " %")) +
+      map(page.samples_map, "samples", "of each pixel",
+          legend(count(kMapLeastSamples), count(kMapMostSamples)));
   return out + (maps.empty() ? "" : "<div class=\"pair\">" + maps + "</div>");
 }
 

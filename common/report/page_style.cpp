@@ -24,6 +24,7 @@ section{margin-top:2.75rem;padding-top:1.5rem;border-top:1px solid var(--edge)}
 .image{background:#050608;border-radius:10px;overflow:hidden;text-align:center;line-height:0}
 .image img{width:100%;max-height:80vh;object-fit:contain}
 .map img{width:100%;border-radius:8px;background:#050608}
+.legend{display:flex;align-items:center;gap:.7rem;margin-top:.3rem;font-variant-numeric:tabular-nums}.ramp{flex:1;height:.6rem;border-radius:3px}
 .map figcaption b{color:var(--ink);font-weight:500;text-transform:capitalize}
 figcaption{font-size:.85rem;margin:.35rem 0}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,24rem),1fr));gap:1.25rem 2rem;margin-top:1.25rem}

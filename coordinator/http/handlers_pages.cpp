@@ -15,7 +15,9 @@ Response get_report_page(Api& api, const Request& request, const Params& params)
   if (!image) return problem(image.error());
   auto report = api.coordinator().report_json(*id);
   if (!report) return problem(report.error());
-  auto page = report::job_page({std::move(*report), std::move(*image), {}, {}});
+  auto page = report::job_page({std::move(*report), std::move(*image),
+                                api.coordinator().error_png(*id).value_or(std::vector<std::byte>{}),
+                                api.coordinator().samples_png(*id).value_or(std::vector<std::byte>{})});
   if (!page) return problem(page.error());
   Response response = text_response(200, "text/html; charset=utf-8", std::move(*page));
   response.headers.emplace_back("Content-Security-Policy",

@@ -80,7 +80,7 @@ def test_downloads_are_what_the_coordinator_gives(real_farm, page):
       return [link.download.split('.').pop(), response.status, bytes.length, [...bytes.slice(0, 4)]];
     }))""")
 
-    assert [kind for kind, *_ in sizes] == ["exr", "json", "csv", "log"]
+    assert [kind for kind, *_ in sizes] == ["exr", "", "json", "csv", "log"], "the page is opened, not saved"
     assert all(status == 200 and size > 0 for _, status, size, _ in sizes), sizes
     assert sizes[0][3] == [0x76, 0x2F, 0x31, 0x01]  # OpenEXR's magic number
 
@@ -148,6 +148,62 @@ def test_names_from_outside_are_shown_as_text(real_farm, page):
     page.wait(f"document.querySelector('.tag')?.innerText === {json.dumps(markup)}", timeout=30)
 
     assert page.count("main img") == 0 and "stolen" not in page.evaluate("document.title")
+
+
+def test_a_job_that_somebody_removes_leaves_the_page(real_farm, page):
+    real_farm.add_worker()
+    job = real_farm.submit(SCENE, spp=2)
+    real_farm.wait_for_job(job)
+    page.wait("document.querySelector('[data-job] .pill')?.innerText === 'done'", timeout=30)
+
+    real_farm.request("DELETE", f"/api/v1/jobs/{job}")
+
+    page.wait("!document.querySelector('[data-job]')", timeout=30)
+
+
+def test_the_maps_come_from_the_farm(real_farm, page):
+    real_farm.add_worker()
+    job = real_farm.submit(SCENE, spp=16)
+    real_farm.wait_for_job(job)
+    page.evaluate(f"void (location.hash = '#/jobs/{job}')")
+    page.wait("document.querySelector('live-image')?.dataset.painted")
+    colours = """(() => {
+      const canvas = document.querySelector('live-image canvas');
+      const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+      return [canvas.width, new Set(Array.from({ length: data.length / 4 }, (_, i) => data.slice(4 * i, 4 * i + 3).join())).size];
+    })()"""
+
+    found = {}
+    for kind in ("error", "samples"):
+        painted = int(page.evaluate("document.querySelector('live-image').dataset.painted"))
+        page.click(f".image-tools [value={kind}]")
+        page.wait(f"Number(document.querySelector('live-image').dataset.painted) > {painted}")
+        found[kind] = page.evaluate(colours)
+
+    assert found["error"][0] == 96 and found["error"][1] > 16, "noise differs from pixel to pixel"
+    assert found["samples"] == [96, 1], "every pixel has 16 samples"
+
+
+@pytest.mark.parametrize("width", [1280, 375])
+def test_the_report_page_stands_alone(real_farm, page, width):
+    """Its own policy is in force: a style or picture that it forbids would be a complaint, and so would any address."""
+    markup = "<img src=x onerror=document.title='stolen'>"
+    real_farm.add_worker()
+    job = real_farm.submit(SCENE, spp=64, name=urllib.parse.quote(markup))
+    real_farm.wait_for_job(job)
+    page.call("Emulation.setDeviceMetricsOverride", {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 500})
+
+    page.go(f"http://127.0.0.1:{real_farm.http}/api/v1/jobs/{job}/report.html")
+
+    assert page.text("h1") == markup and page.evaluate("document.title") == f"{markup} · Lightshaft report"
+    assert page.evaluate("[...document.images].map(image => image.naturalWidth)") == [96, 96, 96], "the image and both maps"
+    assert page.evaluate("[...document.images].every(image => image.alt)")
+    assert page.count("svg.plot polyline") == 2 and page.count("script") == 0
+    assert page.evaluate("getComputedStyle(document.body).marginTop") == "0px", "the style is in force"
+    assert page.evaluate("performance.getEntriesByType('resource').filter(entry => !entry.name.startsWith('data:')).length") == 0
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.click("details summary")
+    assert page.wait("document.querySelectorAll('details tbody tr').length") >= 3
 
 
 def test_a_sequence_shows_its_frames_and_each_ones_image(real_farm, page):

@@ -12,7 +12,7 @@ FACTS = {
             "3.1 min to 5.5 min", "with 8 more: 66 s", "slope −0.98 (−1.06 to −0.90)", "converging as expected", "target 0.001 at 7.3 min (6.2 min to 8.6 min)",
             "Where the core time went", "transfer 6.2 s 1 %"],
     "job-reference": ["True relMSE 0.00443 against the reference", "FLIP 0.0271", "12 pixels got too few hits", "against the reference 0.00443, FLIP 0.0273"],
-    "job-map": ["exact", "noisy", "12 min of core time", "target 0.001 at 29 min (25 min to 34 min)"],
+    "job-map": ["0.1 %", "100 %", "12 min of core time", "target 0.001 at 29 min (25 min to 34 min)"],
     "job-removed": ["Somebody has removed this job"],
     "job-sequence": ["smoke.xml", "Frame 5", "4 of 10 done, 1 failed", "following what is rendered", "smoke.0009.vdb has no grid", "0.00390 – 0.00448"],
     "job-queued": ["Waiting for a worker", "The first point appears"],

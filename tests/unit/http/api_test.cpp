@@ -167,22 +167,6 @@ TEST_F(Jobs, HaveImagesReportAndFigures) {
   EXPECT_EQ(json_of(ask(Method::get, "/api/v1/workers"))["workers"].size(), 2u);
 }
 
-TEST_F(Jobs, HaveAPageThatNeedsNothingElseAndMayRunNothing) {
-  const std::string url = "/api/v1/jobs/" + submit() + "/report.html";
-  const Response page = ask(Method::get, url);
-
-  EXPECT_EQ(page.status, 200);
-  EXPECT_EQ(page.content_type, "text/html; charset=utf-8");
-  EXPECT_NE(text(page).find("Samples per pixel</dt><dd><b>16</b>"), std::string::npos);
-  EXPECT_NE(text(page).find("src=\"data:image/png;base64,"), std::string::npos);
-  std::string policy;
-  for (const auto& [name, value] : page.headers)
-    if (name == "Content-Security-Policy") policy += value;
-  EXPECT_EQ(policy.find("default-src 'none'; img-src data:; style-src 'sha256-"), 0u) << policy;
-  EXPECT_EQ(policy.find("unsafe"), std::string::npos);
-  EXPECT_NE(policy.find("frame-ancestors 'none'"), std::string::npos);
-}
-
 TEST_F(Jobs, ThatDoNotExistAre404EverywhereTheyAreNamed) {
   for (const auto& route : routes()) {
     if (route.pattern.find("{id}") == std::string_view::npos) continue;

@@ -73,7 +73,7 @@ export const workers = [
 // Error falls as 1/time, with the scatter of a real run; [seconds, relative scatter].
 const kRun = [[0.9, 1.06], [1.8, 0.97], [3.6, 1.03], [7.1, 1.01], [14.4, 0.985], [28.6, 1.02], [57.8, 0.99], [116, 1.01], [187, 1]];
 export const report = {
-  target_error: 0.001, slope: -0.98, slope_ci95: [-1.06, -0.9], trend: "converging as expected", trusted: true, verdict: "",
+  target_error: 0.001, slope: -0.98, slope_ci95: [-1.06, -0.9], trend: "converging as expected", trusted: true, verdict: "converging as expected", verdict_kind: "converging",
   forecast: { target: 0.001, asked: true, spp: 896, core_seconds: 1000, core_seconds_ci95: [739, 1310] },
   convergence: kRun.map(([seconds, scatter]) => {
     const relmse = (0.00418 * 187 * scatter) / seconds;
@@ -81,7 +81,7 @@ export const report = {
     return { seconds, core_seconds: seconds * 3.97, spp: Math.max(2, 1.147 * seconds), rmse: Math.sqrt(relmse) * 0.48, relmse, relmse_ci95: [relmse / (1 + spread), relmse * (1 + spread)] };
   }),
 };
-export const doubtful = { ...report, trusted: false, verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
+export const doubtful = { ...report, trusted: false, verdict_kind: "heavy_tail", verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
 
 // With a reference, the true error stands beside the estimate.
 export const compared = { ...report, convergence: report.convergence.map((p, i) => ({ ...p, true_relmse: p.relmse * (1.06 - 0.02 * (i % 4)), true_rmse: p.rmse, true_flip: 0.4 / Math.sqrt(p.spp) })) };

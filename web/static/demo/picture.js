@@ -59,7 +59,7 @@ export function paint(width, height, done, exposure) {
   return canvas;
 }
 
-const kStops = [[0, 0, 4], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]];
+const kStops = [[13, 8, 70], [45, 60, 142], [33, 120, 140], [70, 180, 105], [250, 230, 50]];
 
 function heat(part) {
   const at = Math.min(0.9999, Math.max(0, part)) * (kStops.length - 1);

@@ -6,7 +6,8 @@ import { choice, safeClass } from "./pieces.js";
 
 const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Samples"]];
 const kNames = { picture: "as it is now", error: "error of each pixel", samples: "samples of each pixel" };
-const kLegends = { error: ["exact", "noisy"], samples: ["few", "many"] };
+// The ends of the maps' colours (common/image/maps.h), with equal factors between.
+const kLegends = { error: ["0.1 %", "100 %", "relative standard error of a pixel"], samples: ["2", "16,384", "samples of a pixel"] };
 const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
 
 export function imagePanel(state, job, actions) {
@@ -22,7 +23,7 @@ export function imagePanel(state, job, actions) {
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
       choice("layer", "What is shown", kLayers, open.layer, actions.setLayer),
-      open.layer === "picture" ? exposureTool(open, actions) : legend(open.layer),
+      open.layer === "picture" ? exposureTool(open, actions) : legend(open.layer, job.few_hits),
       h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
 }
 
@@ -34,7 +35,12 @@ const exposureTool = (open, actions) => h("span", { key: "exposure", class: "ima
   }),
   h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)));
 
-const legend = (layer) => h("span", { key: "legend", class: "image-tool legend" }, kLegends[layer][0], h("i", { "aria-hidden": "true" }), kLegends[layer][1]);
+function legend(layer, fewHits) {
+  const [least, most, meaning] = kLegends[layer];
+  return h("span", { key: "legend", class: "image-tool legend", title: meaning },
+    h("span", { class: "unseen" }, `${meaning}, from `), least, h("i", { "aria-hidden": "true" }), h("span", { class: "unseen" }, " to "), most,
+    layer === "error" && fewHits > 0 ? h("span", { key: "few", class: "few-hits" }, "too few hits") : null);
+}
 
 function stageText(job) {
   if (job.state === "failed" || job.state === "cancelled") return "No sample was taken.";

@@ -81,10 +81,13 @@ function verdict(report) {
   const ci = Array.isArray(report.slope_ci95) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
   return [
     typeof report.slope === "number" ? h("span", { key: "slope", title: "Of log error over log time; independent samples give −1" }, "slope ", h("b", null, signed(report.slope)), ci) : null,
-    report.trusted === false
+    doubtful(report)
       ? h("span", { key: "words", class: "doubt" }, report.verdict || "This error estimate can't be trusted yet.")
-      : h("span", { key: "words" }, report.trend ?? report.verdict)];
+      : h("span", { key: "words" }, report.verdict || report.trend)];
 }
+
+const kDoubtful = ["heavy_tail", "bias_floor"];
+const doubtful = ({ verdict_kind: kind, trusted }) => (kind ? kDoubtful.includes(kind) : trusted === false);
 
 const kColumns = ["Time", "Core time", "Samples", "relMSE", "95 % interval"];
 
