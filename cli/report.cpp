@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/health_lines.h"
@@ -35,6 +36,8 @@ std::string outlook(const json& report) {
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts) {
   json j = json::parse(report, nullptr, false);
   if (!j.is_object()) return fail(Errc::internal, "the coordinator's report cannot be read");
+  // The scene's place on this machine is nobody's business whom the report is sent to.
+  j["name"] = std::filesystem::path(text_field(j, "name")).filename().string();
   j["load_seconds"] = facts.load_seconds;
   j["peak_rss_bytes"] = facts.peak_rss_bytes;
   j["threads"] = facts.threads;
