@@ -172,8 +172,10 @@ void Service::on(const Checkpoint& e, Todo&) {
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {  // known from before the restart
-    const ConvergencePoint& last = entry->points.back();
-    if (last.spp == error.spp && !last.truth) compare_locked(entry, e.rounds, error.spp);
+    const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
+      return p.spp == error.spp && !p.truth;
+    });
+    if (!compared) compare_locked(entry, e.rounds, error.spp);
     return;
   }
   double core = entry->stored.totals.core_seconds;

@@ -1,5 +1,5 @@
-// Jobs with a reference: every checkpoint's picture is compared with it on a thread of its own, since to see a
-// picture takes longer than to add up its error. A job's final image and report wait for its comparisons.
+// Jobs with a reference: every checkpoint's picture is compared with it on a thread of its own, since to see
+// a picture takes longer than to add up its error. A job's final image and report wait for its comparisons.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,20 +11,24 @@
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
+namespace {
+// That wait, each with a picture; then checkpoints go without, but for the last.
+constexpr std::size_t kMaxComparisons = 64;
+}  // namespace
 
 // Of the checkpoint that has just been taken, or was before a restart without a comparison.
 void Service::compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp) {
   if (!entry->truths) return;
   auto tiles = entry->truths->at(rounds);
   entry->truths->checkpoint_taken(rounds);
-  if (!tiles) return;
+  if (!tiles || comparisons_.size() >= kMaxComparisons) return;
   comparisons_.push([this, entry, spp, tiles = std::move(*tiles)] { compare(entry, spp, tiles, false); });
 }
 
 // The image as it is handed out, so that the report has all figures of it.
 void Service::compare_last_locked(const EntryPtr& entry) {
   if (!entry->truths || entry->points.empty()) return;
-  auto tiles = entry->truths->now();
+  auto tiles = entry->truths->latest();
   if (!tiles) return;
   comparisons_.push([this, entry, spp = entry->points.back().spp, tiles = std::move(*tiles)] {
     compare(entry, spp, tiles, true);
@@ -70,8 +74,7 @@ void Service::compare(const EntryPtr& entry, double spp, const std::vector<TileP
   const std::vector<float> image = joined(tiles, size);
   const TrueError error = true_error(*reference, image);
   TrueFigures truth{error.rmse, error.relmse, std::nullopt};
-  if (flip)
-    truth.flip = mean_of(hdr_flip({size, reference->rgb}, {size, image}));
+  if (flip) truth.flip = mean_of(hdr_flip({size, reference->rgb}, {size, image}));
   lock.lock();
   const auto point = std::find_if(entry->points.begin(), entry->points.end(), of_spp);
   if (entry->removed || point == entry->points.end()) return;

@@ -121,7 +121,7 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
 }
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
-  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,ref_rmse,ref_relmse,ref_flip\n";
+  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n";
   const auto or_nothing = [](const auto& truth, auto figure) {
     return truth ? fmt::format("{}", figure(*truth)) : std::string();
   };

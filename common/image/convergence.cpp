@@ -187,11 +187,16 @@ std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
 const char* to_string(Judgement::Kind kind) {
   using Kind = Judgement::Kind;
   switch (kind) {
-    case Kind::early: return "early";
-    case Kind::converging: return "converging";
-    case Kind::fast: return "fast";
-    case Kind::heavy_tail: return "heavy_tail";
-    case Kind::bias_floor: return "bias_floor";
+    case Kind::early:
+      return "early";
+    case Kind::converging:
+      return "converging";
+    case Kind::fast:
+      return "fast";
+    case Kind::heavy_tail:
+      return "heavy_tail";
+    case Kind::bias_floor:
+      return "bias_floor";
   }
   return "";
 }
@@ -201,11 +206,12 @@ Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt) {
   const auto trend = trend_of(points);
   if (!doubt.empty()) return {trend ? Kind::heavy_tail : Kind::early, doubt};
   if (stands_on_a_floor(points))
-    return {Kind::bias_floor,
-            fmt::format("bias floor: the true relMSE stays near {:.2g} while the estimated one falls to {:.2g}: "
-                        "image and reference do not agree, or the reference is noisy and brings no error of its "
-                        "own",
-                        *points.back().true_relmse, points.back().relmse)};
+    return {
+        Kind::bias_floor,
+        fmt::format("bias floor: the true relMSE stays near {:.2g} while the estimated one falls to {:.2g}: "
+                    "image and reference do not agree, or the reference is noisy and brings no error of its "
+                    "own",
+                    *points.back().true_relmse, points.back().relmse)};
   if (!trend) return {Kind::early, "too early to tell how it converges"};
   if (trend->slope_hi < kSlow) return {Kind::heavy_tail, "don't trust yet: " + trend->verdict};
   return {trend->slope_lo > kFast ? Kind::fast : Kind::converging, trend->verdict};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/base/check.h"
 
@@ -14,10 +15,12 @@ constexpr double kDark = 0.01;             // of relMSE's denominator
 constexpr int kReach = 2;                  // of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
 // Fewer pixels than this carry the error: their own scatter (sqrt(4/3/100) = 12 % of the sum) says more than
-// the sum does. Gaussian noise of even strength spreads over a third of the pixels, so small images are asked
-// for half of that.
-constexpr double kFewPixels = 100;
-constexpr double kLargeShare = 0.1;
+// the sum does. Small images are asked for less: in one of 32 x 32, edges of things alone carry it at times.
+constexpr double kFewPixels = 100, kPartOfSmall = 48;
+constexpr double kLargeShare = 0.1;  // of one pixel, where there are many
+// Where the picture is smooth, fourth powers are this much above what pairs of neighbours say of the
+// variance: a Gaussian has 1, the low-discrepancy points of a smooth image up to 6 (tests/coverage).
+constexpr double kHeavy = 10;
 
 // Sums over 5 x 5 windows, clipped to the tile. Rows first, then columns, both along rows of memory.
 std::vector<double> window_sums(const std::vector<double>& values, std::size_t width, std::size_t height) {
@@ -39,7 +42,8 @@ int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::ma
 // 1 / (m^2 + c) less what noise of m, of variance s2, adds to it in the mean.
 double weight_of(double m, double s2) {
   const double q = m * m + kDark, f = 1 / q;
-  const double unbiased = f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
+  const double unbiased =
+      f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
   return std::clamp(unbiased, f / 2, 2 * f);
 }
 
@@ -50,19 +54,29 @@ struct Surroundings {
   double sum, squares, noise;  // of S, S^2 and D^2
 };
 
-double weight_of(const Surroundings& s) {
-  if (s.others == 0) return weight_of(s.own, 0);
+// 1 / (m^2 + c), and the share g of the pixel's own value in m.
+struct Weight {
+  double weight, gain;
+};
+
+Weight weight_of(const Surroundings& s) {
+  if (s.others == 0) return {weight_of(s.own, 0), 1};
   constexpr double kSignificant = 9;
-  const double mean = s.sum / s.others, u = s.noise / s.others, v = std::max(u, s.own_noise);
-  const double apart = (s.own - mean) * (s.own - mean);
+  const double mean = s.sum / s.others, u = s.noise / s.others, apart = (s.own - mean) * (s.own - mean);
   double structure = std::max(0.0, s.squares / s.others - mean * mean - u * (1 - 1 / s.others));
-  if (apart > kSignificant * v) structure = std::max(structure, apart);
+  if (apart > kSignificant * std::max(u, s.own_noise)) structure = std::max(structure, apart);
+  const double v = s.own_noise > structure + u ? s.own_noise : u;
   const double g = structure > 0 ? structure / (structure + v) : 0;
-  return weight_of(mean + g * (s.own - mean), u * (g * g + (1 - g) * (1 - g) / s.others));
+  return {weight_of(mean + g * (s.own - mean), u * (g * g + (1 - g) * (1 - g) / s.others)), g};
 }
 
-// One channel's weights of relMSE; see the header.
-std::vector<double> weights(const HalfMeans& h, std::size_t plane) {
+// Of each pixel: the square root of the weight in each channel, planar, and the square of the mean of g over
+// channels.
+struct Weights {
+  std::vector<double> roots, edges;
+};
+
+void add_channel(const HalfMeans& h, std::size_t plane, Weights& to) {
   const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
   const double *a = &h.a[plane], *b = &h.b[plane];
   std::vector<double> own(width * height), square(width * height), noise(width * height);
@@ -73,29 +87,70 @@ std::vector<double> weights(const HalfMeans& h, std::size_t plane) {
   }
   const auto sum = window_sums(own, width, height), squares = window_sums(square, width, height),
              noises = window_sums(noise, width, height);
-  std::vector<double> out(own.size());
   std::size_t i = 0;
   for (int y = 0; y < h.height; ++y)
     for (int x = 0; x < h.width; ++x, ++i) {
       const int others = span_of(x, h.width) * span_of(y, h.height) - 1;
-      out[i] = weight_of({own[i], noise[i], static_cast<double>(others), sum[i] - own[i], squares[i] - square[i],
-                          std::max(0.0, noises[i] - noise[i])});
+      const Weight w = weight_of({own[i], noise[i], static_cast<double>(others), sum[i] - own[i],
+                                  squares[i] - square[i], std::max(0.0, noises[i] - noise[i])});
+      to.roots[plane + i] = std::sqrt(w.weight);
+      to.edges[i] += w.gain / 3;
     }
+}
+
+Weights weights(const HalfMeans& h) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  Weights out{std::vector<double>(3 * n), std::vector<double>(n)};
+  for (std::size_t c = 0; c < 3; ++c) add_channel(h, c * n, out);
+  for (double& g : out.edges) g *= g;
   return out;
 }
 
-// d: three planes of `width` x `height` values.
-NoiseSums noise_sums(const std::vector<double>& d, int width, int height) {
+// Three planes of one tile, and what a pixel and its neighbour have in common.
+struct Differences {
+  std::span<const double> r, g, b;
+  double dot(std::size_t p, std::size_t q) const { return r[p] * r[q] + g[p] * g[q] + b[p] * b[q]; }
+};
+
+// Of (D(p) . D(q))^2 over the neighbours beside, above and below.
+double mean_of_pairs(const Differences& d, int x, int y, int width, int height) {
+  const auto w = static_cast<std::size_t>(width),
+             p = static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x);
+  double sum = 0;
+  int count = 0;
+  const auto add = [&](bool there, std::size_t q) {
+    if (!there) return;
+    const double dot = d.dot(p, q);
+    sum += dot * dot;
+    ++count;
+  };
+  add(x > 0, p - 1);
+  add(x + 1 < width, p + 1);
+  add(y > 0, p - w);
+  add(y + 1 < height, p + w);
+  return count > 0 ? sum / count : 0;
+}
+
+// `values`: three planes of `width` x `height`; `edges`: one.
+NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
+                     int height) {
   NoiseSums out;
   const auto n = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const double *r = d.data(), *g = r + n, *b = g + n;
+  const std::span<const double> all(values);
+  const Differences d{all.first(n), all.subspan(n, n), all.last(n)};
+  const auto &r = d.r, &g = d.g, &b = d.b;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const std::size_t p = static_cast<std::size_t>(y) * width + x;
+      const std::size_t p =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       const double rr = r[p] * r[p], gg = g[p] * g[p], bb = b[p] * b[p], sum = rr + gg + bb;
+      const double fourth = rr * rr + gg * gg + bb * bb;
       out.squares += sum;
-      out.channel_fourth += rr * rr + gg * gg + bb * bb;
+      out.channel_fourth += fourth;
       out.pixel_fourth += sum * sum;
+      out.edge_channel_fourth += edges[p] * fourth;
+      out.edge_pixel_fourth += edges[p] * sum * sum;
+      out.flat_pairs += (1 - edges[p]) * mean_of_pairs(d, x, y, width, height);
       out.largest = std::max(out.largest, sum);
       if (x == 0) continue;
       const std::size_t q = p - 1;
@@ -110,26 +165,41 @@ NoiseSums noise_sums(const std::vector<double>& d, int width, int height) {
 
 // Standard deviation of (estimated - realised) sum of squares over the estimated sum; see the header for the
 // derivation.
-double relative_spread(const NoiseSums& s) {
+double relative_spread(const NoiseSums& s, bool trusted) {
   if (!(s.squares > 0)) return 0;
   const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
-  const double cross = std::max(0.0, s.pixel_fourth - s.channel_fourth);
-  return std::sqrt(4 * (s.channel_fourth / 3 + cross * r2 / (1 + 2 * r2))) / s.squares;
+  const double channel = trusted ? s.edge_channel_fourth : s.channel_fourth,
+               pixel = trusted ? s.edge_pixel_fourth : s.pixel_fourth;
+  const double cross = std::max(0.0, pixel - channel);
+  const double trace = channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
+  return std::sqrt(4 * trace) / s.squares;
 }
 
-void judge(ImageError& out, double pixels) {
-  const double few = std::min(kFewPixels, pixels / 6);
+// Fourth powers over pairs of neighbours where the picture is smooth; 0 where edges rule.
+double heaviness(const NoiseSums& s) {
+  constexpr double kPart = .25;
+  const double flat = s.pixel_fourth - s.edge_pixel_fourth;
+  if (!(flat > kPart * s.pixel_fourth)) return 0;
+  return s.flat_pairs > 0 ? flat / 3 / s.flat_pairs : std::numeric_limits<double>::infinity();
+}
+
+void judge(ImageError& out, const NoiseSums& sums, double pixels) {
+  const double few = std::min(kFewPixels, pixels / kPartOfSmall);
   if (out.effective_pixels == 0) {
     out.trusted = out.spp >= 64;
     if (!out.trusted)
       out.verdict = "the two halves of the samples do not differ yet: too few samples to tell the error";
   } else if (out.effective_pixels < few ||
-             (out.top_share > kLargeShare && pixels * kLargeShare > kFewPixels)) {
+             (out.top_share > kLargeShare && pixels * kLargeShare > 4 * kFewPixels)) {
     out.verdict = fmt::format(
         "don't trust yet: few pixels carry the error (like {:.0f} of {:.0f}; the worst one {:.0f} %); bright "
-        "outliers may still "
-        "be missing, so the true error may be larger",
+        "outliers may still be missing, so the true error may be larger",
         out.effective_pixels, pixels, 100 * out.top_share);
+  } else if (heaviness(sums) > kHeavy) {
+    out.verdict =
+        "don't trust yet: single pixels differ far more than those around them; more bright outliers may "
+        "still be "
+        "missing, so the true error may be larger";
   } else {
     out.trusted = true;
   }
@@ -148,7 +218,9 @@ double light(std::span<const double> half, std::size_t pixel, std::size_t pixels
 bool has_few_hits(const HalfMeans& h, int x, int y) {
   constexpr double kOneSided = 19;
   const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
-  const auto at = [&](int i, int j) { return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i); };
+  const auto at = [&](int i, int j) {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
+  };
   const double a = light(h.a, at(x, y), pixels), b = light(h.b, at(x, y), pixels);
   if (a != 0 || b != 0) return std::max(a, b) > kOneSided * std::min(a, b);
   int lit = 0, all = 0;
@@ -166,6 +238,9 @@ void NoiseSums::add(const NoiseSums& o) {
   pixel_fourth += o.pixel_fourth;
   pair_covariance += o.pair_covariance;
   pair_variance += o.pair_variance;
+  edge_channel_fourth += o.edge_channel_fourth;
+  edge_pixel_fourth += o.edge_pixel_fourth;
+  flat_pairs += o.flat_pairs;
   largest = std::max(largest, o.largest);
 }
 
@@ -186,35 +261,45 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp) {
     for (int x = 0; x < h.width; ++x) out.few_hits += has_few_hits(h, x, y);
   std::vector<double> d(3 * n);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
-  out.plain = noise_sums(d, h.width, h.height);
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::vector<double> w = weights(h, c * n);
-    for (std::size_t i = 0; i < n; ++i) d[c * n + i] *= std::sqrt(w[i]);
-  }
-  out.relative = noise_sums(d, h.width, h.height);
+  const Weights w = weights(h);
+  out.plain = noise_sums(d, w.edges, h.width, h.height);
+  for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
+  out.relative = noise_sums(d, w.edges, h.width, h.height);
   return out;
 }
+
+namespace {
+
+// Of the 95 % interval of the logarithm of a sum of squares; a log scale, so that the lower end stays above
+// zero. The spread is an estimate, too, from fourth powers: of n even Gaussian pixels these have a relative
+// variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so theirs is that of a chi square with e / 2
+// degrees of freedom. Student's t of these, to first order (Abramowitz and Stegun 26.7.5).
+double half_width(const NoiseSums& s, bool trusted) {
+  if (!(s.pixel_fourth > 0)) return 0;
+  const double freedom = s.squares * s.squares / s.pixel_fourth / 2;
+  return k95 * (1 + (k95 * k95 + 1) / (4 * freedom)) * relative_spread(s, trusted);
+}
+
+}  // namespace
 
 ImageError image_error(const TileError& sums) {
   ImageError out;
   if (sums.pixels == 0) return out;
   const auto pixels = static_cast<double>(sums.pixels);
-  // The interval is laid on a log scale, so that its lower end stays above zero.
-  const double spread = k95 * relative_spread(sums.plain),
-               relative_spread_95 = k95 * relative_spread(sums.relative);
   out.rmse = std::sqrt(sums.plain.squares / (3 * pixels));
-  out.rmse_lo = out.rmse * std::exp(-spread / 2);
-  out.rmse_hi = out.rmse * std::exp(spread / 2);
   out.relmse = sums.relative.squares / (3 * pixels);
-  out.relmse_lo = out.relmse * std::exp(-relative_spread_95);
-  out.relmse_hi = out.relmse * std::exp(relative_spread_95);
   out.spp = static_cast<double>(sums.samples) / pixels;
   out.few_hits = sums.few_hits;
   if (sums.relative.pixel_fourth > 0) {
     out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
     out.top_share = sums.relative.largest / sums.relative.squares;
   }
-  judge(out, pixels);
+  judge(out, sums.relative, pixels);
+  const double plain = half_width(sums.plain, out.trusted), relative = half_width(sums.relative, out.trusted);
+  out.rmse_lo = out.rmse * std::exp(-plain / 2);
+  out.rmse_hi = out.rmse * std::exp(plain / 2);
+  out.relmse_lo = out.relmse * std::exp(-relative);
+  out.relmse_hi = out.relmse * std::exp(relative);
   return out;
 }
 

@@ -11,24 +11,30 @@
 //   m = W + g (S - W),   g = T / (T + v),
 // local Wiener filtering (Lee 1980) with
 //   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
-//   v   the noise: the window's mean of D^2, or the pixel's own, whichever is more (a firefly has D^2 = (S-W)^2);
-//   T   the picture's structure: the window's variance of S less its noise; or (S - W)^2 where that is beyond 9 v,
-//       three standard deviations, as of a small bright thing.
-// In a flat or dark place g is near 0 and m does not depend on the pixel; where the picture's structure exceeds its
-// noise g is near 1. A tile of one pixel uses S.
-// The noise that is left in m, of variance s^2 = g^2 u + (1 - g)^2 u / n (u: the window's mean of D^2, n its
-// pixels), would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2: that is subtracted, within [f/2, 2 f]. What
-// remains is of second order: in the dark 3 s^4 / c^2 of the value.
+//   u   the window's mean of D^2;
+//   v   the noise: u, or D^2 of the pixel where that is beyond T + u (a firefly has D^2 = (S - W)^2);
+//   T   the picture's structure: the window's variance of S less its noise u; or (S - W)^2 where that is
+//       beyond 9 u and 9 D^2, three standard deviations, as of a small bright thing.
+// In a flat or dark place g is near 0 and m does not depend on the pixel; where the picture's structure
+// exceeds its noise g is near 1. A tile of one pixel uses S. The noise that is left in m, of variance s^2 =
+// g^2 u + (1 - g)^2 u / n (n: the window's pixels), would bias f = 1/(m^2 + c), c = 0.01,
+// by f" s^2 / 2: that is subtracted, within [f/2, 2 f]. What remains is of second order: in the dark 3 s^4 /
+// c^2 of the value.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b; over channels, 4 tr(V^2) with V the covariance of the channels of D.
-// For Gaussian D E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2 r^2), r the correlation of two
-// channels, hence
-//   tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
-// With grey noise (r = 1) this is E[x^2]/3 for x = sum_c D_c^2, and the variance 4/3 sum x^2. r^2 is taken
-// from products of neighbouring pixels p, q, E[D_c D_k (p) D_c D_k (q)] / E[D_c^2 (p) D_k^2 (q)], a ratio in
-// which image structure cancels. Heavier tails than Gaussian make E[D^4] larger than 3 v^2: the interval errs
-// on the wide side.
+// Two ways lead to tr(V^2), and each pixel takes its share g^2 of the first and 1 - g^2 of the second:
+//   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
+//   r^2), r the correlation of two channels, hence
+//     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
+//   With grey noise (r = 1) this is E[x^2]/3 for x = sum_c D_c^2. r^2 is taken from products of neighbouring
+//   pixels p, q, E[D_c D_k (p) D_c D_k (q)] / E[D_c^2 (p) D_k^2 (q)], a ratio in which image structure
+//   cancels. Heavier tails than Gaussian make E[D^4] larger than 3 v^2.
+//
+//   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), as their D are
+//   independent. That is tr V^2 where the noise varies slowly, which it does where the picture does: where g
+//   is small.
+// An image that is not trusted has an interval of fourth powers alone, the wider one.
 #pragma once
 
 #include <cstdint>
@@ -44,11 +50,13 @@ namespace ls {
 
 // Sums over the pixels of one tile (or of many: they add).
 struct NoiseSums {
-  double squares = 0;                             // sum over pixels and channels of D^2
-  double channel_fourth = 0;                      // sum over pixels and channels of D^4
-  double pixel_fourth = 0;                        // sum over pixels of (sum over channels of D^2)^2
-  double pair_covariance = 0, pair_variance = 0;  // numerator and denominator of r^2
-  double largest = 0;                             // largest sum over channels of D^2 of one pixel
+  double squares = 0;                                     // sum over pixels and channels of D^2
+  double channel_fourth = 0;                              // sum over pixels and channels of D^4
+  double pixel_fourth = 0;                                // sum over pixels of (sum over channels of D^2)^2
+  double pair_covariance = 0, pair_variance = 0;          // numerator and denominator of r^2
+  double edge_channel_fourth = 0, edge_pixel_fourth = 0;  // the fourth powers again, times g^2
+  double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
+  double largest = 0;     // largest sum over channels of D^2 of one pixel
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
 };
@@ -56,14 +64,14 @@ struct NoiseSums {
 struct TileError {
   std::uint64_t pixels = 0;
   std::uint64_t samples = 0;  // spp x pixels
-  // Pixels of which at least one half holds next to nothing of the light, though there is some: what they show
-  // came from very few samples, and neither their value nor their difference says much. A pixel counts if one
-  // half has 19 times as much as the other, or if both have nothing and more than half of the neighbours in its
-  // window have something. (k equal hits fall all into one half once in 2^(k-1): of pixels with 2 hits half are
-  // told, with 5 one in 16, with 10 one in 500.)
+  // Pixels of which at least one half holds next to nothing of the light, though there is some: what they
+  // show came from very few samples, and neither their value nor their difference says much. A pixel counts
+  // if one half has 19 times as much as the other, or if both have nothing and more than half of the
+  // neighbours in its window have something. (k equal hits fall all into one half once in 2^(k-1): of pixels
+  // with 2 hits half are told, with 5 one in 16, with 10 one in 500.)
   std::uint64_t few_hits = 0;
-  NoiseSums plain;            // of D
-  NoiseSums relative;         // of D / sqrt(window^2 + 0.01)
+  NoiseSums plain;     // of D
+  NoiseSums relative;  // of D / sqrt(window^2 + 0.01)
   void add(const TileError& other);
   bool operator==(const TileError&) const = default;
 };

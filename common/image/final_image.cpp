@@ -104,14 +104,19 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool floa
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
-  picture.strings = {{"lightshaft:scene", from.scene.hex()},
-                     {"lightshaft:job", from.settings_json},
-                     {"lightshaft:build", from.build},
-                     {"lightshaft:class", from.numeric_class.hex()},
-                     {"lightshaft:seed", fmt::format("{}", from.seed)},
-                     {"lightshaft:relmse", fmt::format("{:.9g}", image_error(film.error()).relmse)},
-                     {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
-                     {"lightshaft:tiles", tile_digests(film)}};
+  const ImageError error = image_error(film.error());
+  picture.strings = {
+      {"lightshaft:scene", from.scene.hex()},
+      {"lightshaft:job", from.settings_json},
+      {"lightshaft:build", from.build},
+      {"lightshaft:class", from.numeric_class.hex()},
+      {"lightshaft:seed", fmt::format("{}", from.seed)},
+      {"lightshaft:relmse", fmt::format("{:.9g}", error.relmse)},
+      {"lightshaft:relmse_ci95", fmt::format("{:.9g} {:.9g}", error.relmse_lo, error.relmse_hi)},
+      {"lightshaft:rmse", fmt::format("{:.9g}", error.rmse)},
+      {"lightshaft:few_hits", fmt::format("{}", error.few_hits)},
+      {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
+      {"lightshaft:tiles", tile_digests(film)}};
   if (!from.health.empty()) picture.strings["lightshaft:health"] = from.health;
   out.clamped += add_aov_layers(film, from.manifests, float_output, picture);
   auto exr = write_exr(picture);

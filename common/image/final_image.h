@@ -20,7 +20,8 @@ namespace ls {
 // row by row, little endian. Pixels not rendered yet are zero.
 Digest pixels_sha256(const Film& film);
 
-// The header strings `lightshaft:...` of the final EXR; `:relmse` and `:tiles` come from the film.
+// The header strings `lightshaft:...` of the final EXR; `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:few_hits`
+// (pixels) and `:tiles` come from the film.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings

@@ -147,7 +147,8 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
   // The larger x at which the curve is .85: a quadratic equation.
   constexpr float kLevel = .85F;
-  const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4], c = kTone[2] - kLevel * kTone[5];
+  const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
+              c = kTone[2] - kLevel * kTone[5];
   const float x = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
   FlipExposures out{std::log2(x / most), std::log2(x / median), 2};
   constexpr int kMost = 64;  // of exposures: an image of 64 stops is no picture
@@ -159,7 +160,8 @@ std::vector<float> hdr_flip(const FlipImage& reference, const FlipImage& image, 
   const FlipExposures exposures = flip_exposures(reference.rgb);
   std::vector<float> out;
   for (int i = 0; i < exposures.count; ++i) {
-    const std::vector<float> r = exposed(reference.rgb, exposures.at(i)), t = exposed(image.rgb, exposures.at(i));
+    const std::vector<float> r = exposed(reference.rgb, exposures.at(i)),
+                             t = exposed(image.rgb, exposures.at(i));
     const std::vector<float> error = ldr_flip({reference.size, r}, {image.size, t}, pixels_per_degree);
     if (i == 0) out = error;
     for (std::size_t p = 0; p < out.size(); ++p) out[p] = std::max(out[p], error[p]);

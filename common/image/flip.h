@@ -1,13 +1,16 @@
 // FLIP: how visible the difference of two images is to somebody who flips between them, 0 (not at all) to 1.
 //
-//   [LDR] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020, "FLIP: A Difference Evaluator
+//   [LDR] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020, "FLIP: A Difference
+//   Evaluator
 //         for Alternating Images", HPG (equations (1) to (14) there).
-//   [HDR] Andersson, Nilsson, Shirley, Akenine-Moeller 2021, "Visualizing Errors in Rendered High Dynamic Range
-//         Images", Eurographics short papers: LDR-FLIP of both images tone-mapped at several exposures, of which
-//         each pixel keeps its largest; the exposures follow from the reference alone.
+//   [HDR] Andersson, Nilsson, Shirley, Akenine-Moeller 2021, "Visualizing Errors in Rendered High Dynamic
+//   Range
+//         Images", Eurographics short papers: LDR-FLIP of both images tone-mapped at several exposures, of
+//         which each pixel keeps its largest; the exposures follow from the reference alone.
 //
 // Pixels are linear, Rec. 709 primaries, R, G, B interleaved, row by row. Beyond the edge the nearest pixel
-// stands. Values are single precision; sums are in a fixed order, so that the same images give the same number.
+// stands. Values are single precision; sums are in a fixed order, so that the same images give the same
+// number.
 #pragma once
 
 #include <cstddef>
@@ -35,7 +38,9 @@ std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
 struct FlipExposures {
   float first = 0, last = 0;
   int count = 2;
-  float at(int i) const { return first + (last - first) * static_cast<float>(i) / static_cast<float>(count - 1); }
+  float at(int i) const {
+    return first + (last - first) * static_cast<float>(i) / static_cast<float>(count - 1);
+  }
 };
 FlipExposures flip_exposures(std::span<const float> reference_rgb);
 

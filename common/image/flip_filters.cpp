@@ -87,8 +87,8 @@ Plane filtered(const Plane& in, FrameSize size, const std::array<Sensitivity, 2>
 // Gaussian and its derivatives of the width of a feature ([LDR] section 4.2), each made so that its positive
 // weights sum to 1 and its negative ones to -1 over the window.
 struct FeatureKernels {
-  Kernel across;        // the Gaussian, of the other coordinate; sums to 1
-  Kernel edge, point;   // first and second derivative
+  Kernel across;       // the Gaussian, of the other coordinate; sums to 1
+  Kernel edge, point;  // first and second derivative
 };
 
 void balance(Kernel& kernel) {

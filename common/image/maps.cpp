@@ -30,7 +30,8 @@ Result<std::vector<std::byte>> drawn(const Film& film, const DrawTile& draw) {
     auto from = colours.begin();
     for (int y = tile.rect.y0; y < tile.rect.y1; ++y)
       for (int x = tile.rect.x0; x < tile.rect.x1; ++x, ++from)
-        std::copy_n(from->begin(), 3, &rgb[3 * (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x))]);
+        std::copy_n(from->begin(), 3,
+                    &rgb[3 * (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x))]);
   }
   return write_png(frame, rgb);
 }
@@ -61,7 +62,8 @@ double averaged(const std::vector<double>& values, const PixelRect& rect, std::s
   int count = 0;
   for (int j = std::max(0, y - 1); j <= std::min(rect.height() - 1, y + 1); ++j)
     for (int i = std::max(0, x - 1); i <= std::min(rect.width() - 1, x + 1); ++i, ++count)
-      sum += values[static_cast<std::size_t>(j) * static_cast<std::size_t>(rect.width()) + static_cast<std::size_t>(i)];
+      sum += values[static_cast<std::size_t>(j) * static_cast<std::size_t>(rect.width()) +
+                    static_cast<std::size_t>(i)];
   return sum / count;
 }
 
@@ -69,13 +71,15 @@ double averaged(const std::vector<double>& values, const PixelRect& rect, std::s
 
 Colour map_colour(double t) {
   // Dark blue, blue, green, yellow: lightness rises evenly, so the order is seen in grey, too.
-  constexpr std::array<Colour, 5> kStops = {{{13, 8, 70}, {45, 60, 142}, {33, 120, 140}, {70, 180, 105}, {250, 230, 50}}};
+  constexpr std::array<Colour, 5> kStops = {
+      {{13, 8, 70}, {45, 60, 142}, {33, 120, 140}, {70, 180, 105}, {250, 230, 50}}};
   const double at = std::clamp(std::isnan(t) ? 1.0 : t, 0.0, 1.0) * (kStops.size() - 1);
   const auto below = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
   const double part = at - static_cast<double>(below);
   Colour out;
   for (std::size_t c = 0; c < 3; ++c)
-    out[c] = static_cast<std::uint8_t>(std::lround((1 - part) * kStops[below][c] + part * kStops[below + 1][c]));
+    out[c] =
+        static_cast<std::uint8_t>(std::lround((1 - part) * kStops[below][c] + part * kStops[below + 1][c]));
   return out;
 }
 

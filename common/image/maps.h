@@ -2,8 +2,8 @@
 //
 // One scale for both, as a ramp from dark blue over green to yellow, in steps of equal factors:
 //   error: each pixel's relative standard error, sqrt of the mean over channels of d w (error_estimate.h),
-//     averaged over 3 x 3 pixels of its tile: a single pixel's difference of two halves says little. 10^-3 and
-//     less is the lowest colour, 1 and more the highest: three decades.
+//     averaged over 3 x 3 pixels of its tile: a single pixel's difference of two halves says little. 10^-3
+//     and less is the lowest colour, 1 and more the highest: three decades.
 //   samples: per pixel, 2 is the lowest colour, 2^14 the highest: thirteen doublings.
 // Magenta in the map of errors: pixels with too few hits (error_estimate.h). Tiles without a sample are grey.
 // The maps have the image's size, so that they can be laid over it.
@@ -19,7 +19,7 @@
 
 namespace ls {
 
-inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;      // relative standard error
+inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;       // relative standard error
 inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;  // per pixel
 
 // 0..1 to a colour; darker is less, in lightness alone, too (for who sees no hues).

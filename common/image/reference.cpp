@@ -28,7 +28,8 @@ Result<Reference> read_reference(std::span<const std::byte> exr, const std::stri
   if (image.size != size)
     return refuse(name, fmt::format("it is {} x {}, the image {} x {}: they must have one size",
                                     image.size.width, image.size.height, size.width, size.height));
-  const auto bad = std::count_if(image.rgb.begin(), image.rgb.end(), [](float v) { return !std::isfinite(v); });
+  const auto bad =
+      std::count_if(image.rgb.begin(), image.rgb.end(), [](float v) { return !std::isfinite(v); });
   if (bad > 0) return refuse(name, fmt::format("{} of its values are NaN or infinite", bad));
   if (std::any_of(read->error.begin(), read->error.end(), [](float v) { return !(v >= 0) || std::isinf(v); }))
     return refuse(name, "its layers stderr.R, stderr.G, stderr.B hold values that are no standard errors");
@@ -57,7 +58,8 @@ TrueError true_error(const Reference& reference, std::span<const float> rgb) {
   }
   const auto values = static_cast<double>(std::max<std::size_t>(1, rgb.size()));
   const ReferenceNoise noise = noise_of(reference);
-  return {std::sqrt(std::max(0.0, squares / values - noise.mse)), std::max(0.0, relative / values - noise.relmse)};
+  return {std::sqrt(std::max(0.0, squares / values - noise.mse)),
+          std::max(0.0, relative / values - noise.relmse)};
 }
 
 }  // namespace ls

@@ -36,28 +36,31 @@ json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& tr
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// What each checkpoint said of the time to the target, as it was then: for who wants to know how far to trust it.
+// What each checkpoint said of the time to the target, as it was then: for who wants to know how far to trust
+// it.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  double next = 0;  // at doubling samples only: there is little news in between, and all points are looked at again
+  double next =
+      0;  // at doubling samples only: there is little news in between, and all points are looked at again
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;
     const auto forecast = forecast_of(std::span(all).first(i + 1), target);
     if (!forecast || forecast->core_seconds == 0) continue;
     next = 2 * all[i].spp;
-    curve[i]["forecast"] = {{"core_seconds", number(forecast->core_seconds)},
-                            {"core_seconds_ci95", {number(forecast->core_seconds_lo), number(forecast->core_seconds_hi)}},
-                            {"spp", number(forecast->spp)}};
+    curve[i]["forecast"] = {
+        {"core_seconds", number(forecast->core_seconds)},
+        {"core_seconds_ci95", {number(forecast->core_seconds_lo), number(forecast->core_seconds_hi)}},
+        {"spp", number(forecast->spp)}};
   }
 }
 
 json point(const ConvergencePoint& p) {
   json j{{"seconds", number(p.seconds)},
-          {"core_seconds", number(p.core_seconds)},
-          {"spp", spp_value(p.spp)},
-          {"rmse", number(p.error.rmse)},
-          {"relmse", number(p.error.relmse)},
-          {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
+         {"core_seconds", number(p.core_seconds)},
+         {"spp", spp_value(p.spp)},
+         {"rmse", number(p.error.rmse)},
+         {"relmse", number(p.error.relmse)},
+         {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
   if (p.truth) put_truth(j, *p.truth);
   return j;
 }

@@ -16,7 +16,8 @@ void TruthBook::folded(TileIndex tile, RoundIndex round, const Film& film) {
   auto& rounds = tiles_[tile].rounds;
   while (!rounds.empty() && rounds.back().first >= round) rounds.pop_back();
   const TilePixels pixels = film.pixels(tile);
-  rounds.emplace_back(round, std::make_shared<const std::vector<float>>(pixels.mean.begin(), pixels.mean.end()));
+  rounds.emplace_back(round,
+                      std::make_shared<const std::vector<float>>(pixels.mean.begin(), pixels.mean.end()));
 }
 
 std::optional<std::vector<TilePicture>> TruthBook::at(std::span<const RoundIndex> rounds) const {
@@ -31,7 +32,7 @@ std::optional<std::vector<TilePicture>> TruthBook::at(std::span<const RoundIndex
   return out;
 }
 
-std::optional<std::vector<TilePicture>> TruthBook::now() const {
+std::optional<std::vector<TilePicture>> TruthBook::latest() const {
   return at(std::vector<RoundIndex>(tiles_.size(), std::numeric_limits<RoundIndex>::max()));
 }
 
@@ -51,7 +52,8 @@ std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame
     const auto row = 3 * static_cast<std::size_t>(tile.rect.width());
     auto from = tile.rgb->begin();
     for (int y = tile.rect.y0; y < tile.rect.y1; ++y, from += static_cast<std::ptrdiff_t>(row))
-      std::copy_n(from, row, &out[3 * (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0))]);
+      std::copy_n(from, row,
+                  &out[3 * (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0))]);
   }
   return out;
 }

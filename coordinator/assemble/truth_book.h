@@ -1,6 +1,6 @@
-// The pictures of tiles that a comparison with a reference still needs: a checkpoint says how many rounds of each
-// tile count, and shows every tile as it was then, though some are ahead already. (As round_errors.h, but whole
-// pictures: what is seen of an error is not a sum over tiles.)
+// The pictures of tiles that a comparison with a reference still needs: a checkpoint says how many rounds of
+// each tile count, and shows every tile as it was then, though some are ahead already. (As round_errors.h,
+// but whole pictures: what is seen of an error is not a sum over tiles.)
 //
 // Not thread-safe. Pictures are shared and never change: what at() gives can be worked on without a lock.
 #pragma once
@@ -27,10 +27,10 @@ class TruthBook {
 
   // After each fold; `film` has it already.
   void folded(TileIndex tile, RoundIndex round, const Film& film);
-  // With `rounds` of each tile, or what it has if that is less. Nothing: a tile's picture of then is not known,
-  // because the coordinator was restarted meanwhile.
+  // With `rounds` of each tile, or what it has if that is less. Nothing: a tile's picture of then is not
+  // known, because the coordinator was restarted meanwhile.
   std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
-  std::optional<std::vector<TilePicture>> now() const;
+  std::optional<std::vector<TilePicture>> latest() const;
   void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 
  private:

@@ -11,6 +11,7 @@
 #include "common/image/convergence.h"
 #include "common/image/film.h"
 #include "common/scene/read.h"
+#include "tests/coverage/job.h"
 #include "worker/render/render.h"
 
 namespace ls::test {
@@ -39,41 +40,14 @@ T checked(Result<T> result) {
   return std::move(*result);
 }
 
-struct Job {
-  std::vector<double> image;
-  ImageError error;
-  bool heavy_tail = false;
-};
-
-Job run_job(const Scene& scene, std::uint64_t spp, std::uint64_t seed) {
-  RenderSettings settings;
-  settings.size = kGrid.frame;
-  settings.seed = seed;
-  settings.integrator = scene.integrator.name;
-  settings.max_depth = scene.integrator.max_depth;
-  settings.rr_depth = scene.integrator.rr_depth;
-  const auto world = checked(render::build_world(scene, settings, {}, 1));
-  Film film(kGrid);
-  Job job;
-  std::vector<ErrorPoint> points;
-  for (RoundIndex k = 0; k < round_count(spp); ++k) {
-    const SampleRange range = cut_range(k, spp);
-    Partial partial{{{}, {}, {}, kGrid.rect(0), range}, {}};
-    partial.sums = render::render_tile(*world, kGrid.rect(0), range, nullptr, nullptr).sums;
-    job.error = image_error(checked(film.fold(0, k, partial)));
-    points.push_back({job.error.spp, job.error.spp, job.error.relmse, job.error.relmse_lo, job.error.relmse_hi});
-  }
-  job.image = film.pixels(0).mean;
-  job.heavy_tail = !job.error.trusted || judge(points, job.error.verdict).kind == Judgement::Kind::heavy_tail;
-  return job;
-}
-
-std::vector<Job> run_jobs(const CoverageScene& scene, int jobs, int threads) {
+std::vector<CoverageJob> run_jobs(const CoverageScene& scene, int jobs, int threads) {
   const Scene description = parsed(scene);
-  std::vector<Job> out(static_cast<std::size_t>(jobs));
+  std::vector<CoverageJob> out(static_cast<std::size_t>(jobs));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i; (i = next++) < out.size();) out[i] = run_job(description, scene.spp, i + 1);
+    for (std::size_t i; (i = next++) < out.size();)
+      out[i] =
+          scene.target > 0 ? run_adaptive_job(scene, i + 1) : run_plain_job(description, scene.spp, i + 1);
   };
   std::vector<std::jthread> pool;
   for (int i = 0; i < threads; ++i) pool.emplace_back(work);
@@ -86,13 +60,13 @@ struct Truth {
   std::vector<double> sum, variance;
 };
 
-Truth truth_of(const std::vector<Job>& jobs) {
+Truth truth_of(const std::vector<CoverageJob>& jobs) {
   const std::size_t values = jobs.front().image.size();
   const auto n = static_cast<double>(jobs.size());
   Truth t{std::vector<double>(values), std::vector<double>(values)};
-  for (const Job& job : jobs)
+  for (const CoverageJob& job : jobs)
     for (std::size_t i = 0; i < values; ++i) t.sum[i] += job.image[i];
-  for (const Job& job : jobs)
+  for (const CoverageJob& job : jobs)
     for (std::size_t i = 0; i < values; ++i) {
       const double d = job.image[i] - t.sum[i] / n;
       t.variance[i] += d * d / (n - 1);
@@ -104,7 +78,7 @@ struct Realised {
   double mse = 0, relmse = 0;
 };
 
-Realised realised(const Job& job, const Truth& truth, std::size_t jobs) {
+Realised realised(const CoverageJob& job, const Truth& truth, std::size_t jobs) {
   Realised out;
   const auto others = static_cast<double>(jobs - 1), values = static_cast<double>(job.image.size());
   for (std::size_t i = 0; i < job.image.size(); ++i) {
@@ -118,6 +92,30 @@ Realised realised(const Job& job, const Truth& truth, std::size_t jobs) {
 
 }  // namespace
 
+CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t seed) {
+  RenderSettings settings;
+  settings.size = kGrid.frame;
+  settings.seed = seed;
+  settings.integrator = scene.integrator.name;
+  settings.max_depth = scene.integrator.max_depth;
+  settings.rr_depth = scene.integrator.rr_depth;
+  const auto world = checked(render::build_world(scene, settings, {}, 1));
+  Film film(kGrid);
+  CoverageJob job;
+  std::vector<ErrorPoint> points;
+  for (RoundIndex k = 0; k < round_count(spp); ++k) {
+    const SampleRange range = cut_range(k, spp);
+    Partial partial{{{}, {}, {}, kGrid.rect(0), range}, {}};
+    partial.sums = render::render_tile(*world, kGrid.rect(0), range, nullptr, nullptr).sums;
+    job.error = image_error(checked(film.fold(0, k, partial)));
+    points.push_back(
+        {job.error.spp, job.error.spp, job.error.relmse, job.error.relmse_lo, job.error.relmse_hi});
+  }
+  job.image = film.pixels(0).mean;
+  job.heavy_tail = !job.error.trusted || judge(points, job.error.verdict).kind == Judgement::Kind::heavy_tail;
+  return job;
+}
+
 Ratio Quotient::ratio() const {
   double a = 0, b = 0, squares = 0;
   for (const auto& [x, y] : pairs_) a += x, b += y;
@@ -127,12 +125,12 @@ Ratio Quotient::ratio() const {
 }
 
 Coverage measure_coverage(const CoverageScene& scene, int count, int threads) {
-  const std::vector<Job> jobs = run_jobs(scene, count, threads);
+  const std::vector<CoverageJob> jobs = run_jobs(scene, count, threads);
   const Truth truth = truth_of(jobs);
   Coverage out;
   out.jobs = count;
   Quotient mse, relmse;
-  for (const Job& job : jobs) {
+  for (const CoverageJob& job : jobs) {
     const Realised real = realised(job, truth, jobs.size());
     const ImageError& e = job.error;
     const double rmse = std::sqrt(std::max(0.0, real.mse)), share = 1.0 / count;
@@ -140,6 +138,7 @@ Coverage measure_coverage(const CoverageScene& scene, int count, int threads) {
     out.relmse += e.relmse_lo <= real.relmse && real.relmse <= e.relmse_hi ? share : 0;
     out.heavy_tail += job.heavy_tail ? share : 0;
     out.true_relmse += real.relmse * share;
+    out.spp += e.spp * share;
     mse.add(e.rmse * e.rmse, real.mse);
     relmse.add(e.relmse, real.relmse);
   }
@@ -149,9 +148,10 @@ Coverage measure_coverage(const CoverageScene& scene, int count, int threads) {
 }
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c) {
-  return fmt::format("| {} | {} | {} | {:.2g} | {:.1f} % | {:.1f} % | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} | {:.1f} % |",
-                     scene.name, scene.spp, c.jobs, c.true_relmse, 100 * c.rmse, 100 * c.relmse, c.mse_ratio.value,
-                     c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma, 100 * c.heavy_tail);
+  return fmt::format(
+      "| {} | {:.0f} | {} | {:.2g} | {:.1f} % | {:.1f} % | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} | {:.1f} % |",
+      scene.name, c.spp, c.jobs, c.true_relmse, 100 * c.rmse, 100 * c.relmse, c.mse_ratio.value,
+      c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma, 100 * c.heavy_tail);
 }
 
 }  // namespace ls::test

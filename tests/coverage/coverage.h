@@ -1,8 +1,8 @@
-// Many small independent jobs of one scene: how often is the error within the interval that the job states, and is
-// the estimate right in the mean?
+// Many small independent jobs of one scene: how often is the error within the interval that the job states,
+// and is the estimate right in the mean?
 //
-// The right answer is the mean of all other jobs' images. It is independent of a job's image x, and its own noise
-// is known: with n others its variance is v / n, v the variance among jobs, and is subtracted:
+// The right answer is the mean of all other jobs' images. It is independent of a job's image x, and its own
+// noise is known: with n others its variance is v / n, v the variance among jobs, and is subtracted:
 //   e^2 = (x - mean of others)^2 - v / n.
 #pragma once
 
@@ -32,14 +32,14 @@ class Quotient {
 
 struct Coverage {
   int jobs = 0;
+  double spp = 0;                 // mean over pixels and jobs
   double rmse = 0, relmse = 0;    // share of jobs whose interval holds the true figure
   Ratio mse_ratio, relmse_ratio;  // mean estimated / mean true
   double true_relmse = 0;         // mean
   double heavy_tail = 0;          // share of jobs that say "don't trust yet"
 };
 
-// Jobs of 32 x 32 pixels with the seeds 1 to `jobs`, each rendered and folded round by round as the coordinator
-// does. Throws std::runtime_error on a scene that cannot be read.
+// Jobs with the seeds 1 to `jobs` (job.h). Throws std::runtime_error on a scene that cannot be read.
 Coverage measure_coverage(const CoverageScene& scene, int jobs, int threads);
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c);  // for tables

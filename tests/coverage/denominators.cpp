@@ -88,14 +88,15 @@ std::vector<DenominatorRow> measure_denominators(int trials) {
         quotient.add(t.ours, t.real);
         all.real += t.real, all.own += t.own, all.neighbours += t.neighbours;
       }
-      rows.push_back({picture.name, all.real / trials, quotient.ratio(), all.own / all.real, all.neighbours / all.real});
+      rows.push_back(
+          {picture.name, all.real / trials, quotient.ratio(), all.own / all.real, all.neighbours / all.real});
     }
   return rows;
 }
 
 std::string denominator_line(const DenominatorRow& r) {
-  return fmt::format("| {} | {:.2g} | {:.3f} +- {:.3f} | {:.3f} | {:.3f} |", r.picture, r.relmse, r.ours.value,
-                     r.ours.sigma, r.own, r.neighbours);
+  return fmt::format("| {} | {:.2g} | {:.3f} +- {:.3f} | {:.3f} | {:.3f} |", r.picture, r.relmse,
+                     r.ours.value, r.ours.sigma, r.own, r.neighbours);
 }
 
 }  // namespace ls::test

@@ -1,5 +1,5 @@
-// Made-up pictures with known noise: is the relative error biased by the noise that stands in its denominator, or by
-// what takes the right value's place there?
+// Made-up pictures with known noise: is the relative error biased by the noise that stands in its
+// denominator, or by what takes the right value's place there?
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct DenominatorRow {
   double neighbours = 0;  // and with the mean of its 5 x 5 neighbours
 };
 
-// Pictures of 32 x 32 grey pixels, black to bright, flat and with edges, at several strengths of Gaussian noise;
-// `trials` of each.
+// Pictures of 32 x 32 grey pixels, black to bright, flat and with edges, at several strengths of Gaussian
+// noise; `trials` of each.
 std::vector<DenominatorRow> measure_denominators(int trials);
 
 std::string denominator_line(const DenominatorRow& row);

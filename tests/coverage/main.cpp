@@ -1,5 +1,5 @@
-// error_coverage [JOBS] [THREADS] [NAME]: the tables of docs/error.md, or those rows of the first whose name begins
-// so.
+// error_coverage [JOBS] [THREADS] [NAME]: the tables of docs/error.md, or those rows of the first whose name
+// begins so.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -17,8 +17,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: error_coverage [JOBS] [THREADS] [NAME]\n");
     return 2;
   }
-  fmt::print("| scene | spp | jobs | true relMSE | RMSE covered | relMSE covered | estimated / true MSE | relMSE | "
-             "\"don't trust yet\" |\n|---|---|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| scene | spp | jobs | true relMSE | RMSE covered | relMSE covered | estimated / true MSE | relMSE | "
+      "\"don't trust yet\" |\n|---|---|---|---|---|---|---|---|---|\n");
   try {
     for (const auto& scene : ls::test::coverage_scenes()) {
       if (!scene.name.starts_with(wanted)) continue;
@@ -26,8 +27,9 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
     }
     if (!wanted.empty()) return 0;
-    fmt::print("\n| picture | true relMSE | estimated / true | with the pixel itself | with its neighbours |\n"
-               "|---|---|---|---|---|\n");
+    fmt::print(
+        "\n| picture | true relMSE | estimated / true | with the pixel itself | with its neighbours |\n"
+        "|---|---|---|---|---|\n");
     for (const auto& row : ls::test::measure_denominators(jobs)) fmt::print("{}\n", denominator_line(row));
   } catch (const std::exception& e) {
     fmt::print(stderr, "{}\n", e.what());

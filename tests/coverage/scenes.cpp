@@ -19,15 +19,17 @@ std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9
 }
 
 std::string cube(double sx, double sy, double sz, double x, double y, double z, const std::string& rest) {
-  return fmt::format(R"(<shape type="cube"><transform name="to_world"><scale x="{}" y="{}" z="{}"/><translate x="{}" y="{}" z="{}"/></transform>{}</shape>
+  return fmt::format(
+      R"(<shape type="cube"><transform name="to_world"><scale x="{}" y="{}" z="{}"/><translate x="{}" y="{}" z="{}"/></transform>{}</shape>
 )",
-                     sx, sy, sz, x, y, z, rest);
+      sx, sy, sz, x, y, z, rest);
 }
 
 std::string sphere(double x, double y, double z, double radius, const std::string& rest) {
-  return fmt::format(R"(<shape type="sphere"><point name="center" x="{}" y="{}" z="{}"/><float name="radius" value="{}"/>{}</shape>
+  return fmt::format(
+      R"(<shape type="sphere"><point name="center" x="{}" y="{}" z="{}"/><float name="radius" value="{}"/>{}</shape>
 )",
-                     x, y, z, radius, rest);
+      x, y, z, radius, rest);
 }
 
 std::string ref(const std::string& id) { return fmt::format(R"(<ref id="{}"/>)", id); }
@@ -41,8 +43,8 @@ std::string sky(double level) {
 // In front of the room and above what the camera sees.
 std::string lamp(double level, double radius = .25) {
   return sphere(.2, 1.15, 1.7, radius,
-                fmt::format(R"(<emitter type="area"><rgb name="radiance" value="{}, {}, {}"/></emitter>)", level,
-                            .83 * level, .61 * level));
+                fmt::format(R"(<emitter type="area"><rgb name="radiance" value="{}, {}, {}"/></emitter>)",
+                            level, .83 * level, .61 * level));
 }
 
 std::string room(const std::string& light) {
@@ -53,9 +55,10 @@ std::string room(const std::string& light) {
 }
 
 std::string fog(double sigma, double albedo, double half) {
-  return fmt::format(R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{0}, {0}, {0}"/><rgb name="albedo" value="{1}, {1}, {1}"/><phase type="hg"><float name="g" value="0.2"/></phase></medium>
+  return fmt::format(
+             R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{0}, {0}, {0}"/><rgb name="albedo" value="{1}, {1}, {1}"/><phase type="hg"><float name="g" value="0.2"/></phase></medium>
 )",
-                     sigma, albedo) +
+             sigma, albedo) +
          cube(half, half, half, 0, 0, 0, R"(<bsdf type="null"/><ref name="interior" id="fog"/>)");
 }
 
@@ -63,21 +66,25 @@ std::string fog(double sigma, double albedo, double half) {
 std::string caustic() {
   return cube(1.1, .05, 1.1, 0, -1.05, 0, ref("white")) + cube(1, 1, .05, 0, 0, -1.05, ref("white")) +
          sphere(0, -.3, 0, .4, R"(<bsdf type="dielectric"><float name="int_ior" value="1.5"/></bsdf>)") +
-         sphere(.3, 1.4, .2, .03, R"(<emitter type="area"><rgb name="radiance" value="2000, 2000, 2000"/></emitter>)");
+         sphere(.3, 1.4, .2, .1,
+                R"(<emitter type="area"><rgb name="radiance" value="300, 300, 300"/></emitter>)");
 }
 
 }  // namespace
 
 const std::vector<CoverageScene>& coverage_scenes() {
   static const std::vector<CoverageScene> all = {
-      {"surfaces, smooth", scene(cube(1.5, .05, 1.5, 0, -1.05, 0, ref("white")) +
-                                 sphere(-.4, -.5, 0, .5, ref("red")) + sphere(.6, -.6, .3, .4, ref("green")) + sky(.8))},
-      {"surfaces, noisy", scene(room(lamp(40, .1)))},
-      {"surfaces, dark", scene(room(lamp(1, .1))), 16},
+      {"surfaces, smooth",
+       scene(cube(1.5, .05, 1.5, 0, -1.05, 0, ref("white")) + sphere(-.4, -.5, 0, .5, ref("red")) +
+             sphere(.6, -.6, .3, .4, ref("green")) + sky(.8))},
+      {"surfaces, noisy", scene(room(lamp(400, .1)))},
+      {"surfaces, dark", scene(room(lamp(40, .1)))},
       {"media, smooth", scene(fog(.5, .9, .9) + sky(.7))},
       {"media, noisy", scene(room(lamp(60)) + fog(.6, .9, .995))},
-      {"media, dark", scene(fog(2, .95, .9) + lamp(2)), 16},
-      {"fireflies", scene(caustic()), 32, true},
+      {"media, dark", scene(fog(2, .95, .9) + lamp(2))},
+      {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 5e-5},
+      {"media, to a target", scene(fog(2, .95, .9) + lamp(2)), 4096, false, 1.5e-5},
+      {"fireflies", scene(caustic()), 64, true},
   };
   return all;
 }

@@ -9,9 +9,10 @@ namespace ls::test {
 
 struct CoverageScene {
   std::string name;
-  std::string xml;          // Mitsuba; its film has no say
-  std::uint64_t spp = 32;
-  bool fireflies = false;   // rare bright samples: what there is of an estimate is not to be trusted
+  std::string xml;         // Mitsuba; its film has no say
+  std::uint64_t spp = 64;  // at most, with a target
+  bool fireflies = false;  // rare bright samples: what there is of an estimate is not to be trusted
+  double target = 0;       // relMSE to stop at, tile by tile; 0: all samples everywhere
 };
 
 // Smooth and noisy, surfaces and media, light and dark; fireflies last.

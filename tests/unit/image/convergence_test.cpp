@@ -135,8 +135,9 @@ std::vector<ErrorPoint> against_a_reference(double bias) {
 TEST(Judgement, TellsABiasFloorOnlyWhereTheTrueErrorStays) {
   using Kind = Judgement::Kind;
   EXPECT_EQ(judge(against_a_reference(0), "").kind, Kind::converging);
-  EXPECT_EQ(judge(against_a_reference(.005), "").kind, Kind::converging);  // 2.5e-5 beside 9.8e-4: within the interval
-  const Judgement floor = judge(against_a_reference(.05), "");             // 2.5e-3
+  EXPECT_EQ(judge(against_a_reference(.005), "").kind,
+            Kind::converging);                                  // 2.5e-5 beside 9.8e-4: within the interval
+  const Judgement floor = judge(against_a_reference(.05), "");  // 2.5e-3
   EXPECT_EQ(floor.kind, Kind::bias_floor);
   EXPECT_THAT(floor.words, HasSubstr("0.0035"));
   // Twice the estimate throughout, but falling with it: an estimate that is off, and no floor.

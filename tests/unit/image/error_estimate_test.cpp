@@ -255,7 +255,8 @@ TEST(FewHits, ArePixelsWhoseLightStandsInOneHalf) {
 
 TEST(FewHits, AreNotThePixelsBesideASilhouette) {
   std::vector<double> half(3 * kPixels);
-  for (std::size_t i = 0; i < half.size(); ++i) half[i] = i % kSide < 11 ? 1 : 0;  // lit to the left, black else
+  for (std::size_t i = 0; i < half.size(); ++i)
+    half[i] = i % kSide < 11 ? 1 : 0;  // lit to the left, black else
 
   EXPECT_EQ(estimate_error({kSide, kSide, half, half}, 64).few_hits, 0u);
 }

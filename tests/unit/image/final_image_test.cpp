@@ -75,7 +75,8 @@ TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
   const std::string text = as_text(image->exr);
   for (const char* name :
        {"stderr.R", "stderr.G", "stderr.B", "spp", "lightshaft:scene", "lightshaft:job", "lightshaft:build",
-        "lightshaft:class", "lightshaft:seed", "lightshaft:relmse", "lightshaft:seconds", "lightshaft:tiles"})
+        "lightshaft:class", "lightshaft:seed", "lightshaft:relmse", "lightshaft:relmse_ci95",
+        "lightshaft:rmse", "lightshaft:few_hits", "lightshaft:seconds", "lightshaft:tiles"})
     EXPECT_THAT(text, HasSubstr(name));
   EXPECT_THAT(text, HasSubstr(R"({"seed":7})"));
   for (TileIndex t = 0; t < kGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));

@@ -20,12 +20,14 @@ Picture flat(float r, float g, float b) {
   return p;
 }
 
-// Waves of all three channels, raised to `power` and scaled; the other one is brighter in a pattern of 11 steps.
+// Waves of all three channels, raised to `power` and scaled; the other one is brighter in a pattern of 11
+// steps.
 Picture waves(double power, double scale, bool other) {
   Picture p;
   for (int y = 0; y < p.size.height; ++y)
     for (int x = 0; x < p.size.width; ++x) {
-      const double v[3] = {.5 + .4 * std::sin(x / 9.), .4 + .3 * std::cos(y / 7.), .3 + .2 * std::sin((x + y) / 5.)};
+      const double v[3] = {.5 + .4 * std::sin(x / 9.), .4 + .3 * std::cos(y / 7.),
+                           .3 + .2 * std::sin((x + y) / 5.)};
       const double more = other ? 1 + .25 * ((x * 7 + y * 13) % 11 / 11.) : 1;
       for (int c = 0; c < 3; ++c)
         p.rgb[static_cast<std::size_t>(3 * (y * p.size.width + x) + c)] =
@@ -47,17 +49,17 @@ TEST(Flip, DoesNotDependOnWhichImageIsFirstUntilExposuresAreChosen) {
   EXPECT_NEAR(ldr(a, b), ldr(b, a), 1e-6);  // only roundings differ: both are below 1
 }
 
-// Flat images have no features, so the error is that of the colours alone. Black has L* = 0, white 100, and no hue:
-// HyAB = 100, 100^.7 = 25.119. The largest is that of Hunt-adjusted green (87.73, -75.61, 72.98) and blue (32.30,
-// 25.58, -34.84): (55.43 + sqrt(101.19^2 + 107.82^2))^.7 = 41.28. Above .4 of it the rest is .05 wide:
-// .95 + (25.119 - 16.51) / (41.28 - 16.51) * .05 = .96738.
+// Flat images have no features, so the error is that of the colours alone. Black has L* = 0, white 100, and
+// no hue: HyAB = 100, 100^.7 = 25.119. The largest is that of Hunt-adjusted green (87.73, -75.61, 72.98) and
+// blue (32.30, 25.58, -34.84): (55.43 + sqrt(101.19^2 + 107.82^2))^.7 = 41.28. Above .4 of it the rest is .05
+// wide: .95 + (25.119 - 16.51) / (41.28 - 16.51) * .05 = .96738.
 TEST(Flip, OfBlackAndWhiteIsTheHandComputedValue) {
   const auto error = ldr_flip(flat(0, 0, 0).view(), flat(1, 1, 1).view());
   for (const float e : error) EXPECT_NEAR(e, .96738, 2e-5);  // five digits by hand
 }
 
-// Greys of Y = .2 and .3: L* = 116 cbrt(Y) - 16 = 51.837 and 61.654; 9.817^.7 = 4.948, below the bend at 16.51:
-// .95 / 16.51 * 4.948 = .2847.
+// Greys of Y = .2 and .3: L* = 116 cbrt(Y) - 16 = 51.837 and 61.654; 9.817^.7 = 4.948, below the bend
+// at 16.51: .95 / 16.51 * 4.948 = .2847.
 TEST(Flip, OfTwoGreysIsTheHandComputedValue) {
   EXPECT_NEAR(ldr(flat(.2F, .2F, .2F), flat(.3F, .3F, .3F)), .2847, 1e-4);
 }
@@ -96,8 +98,9 @@ TEST(Flip, StaysBetweenZeroAndOneWhateverThePixels) {
   wild.rgb[7] = -5;
   wild.rgb[100] = INFINITY;
   wild.rgb[200] = 3e38F;
-  for (const auto& errors : {hdr_flip(waves(1, 1, false).view(), wild.view()), hdr_flip(wild.view(), flat(0, 0, 0).view()),
-                             ldr_flip(wild.view(), flat(1, 0, 1).view())})
+  for (const auto& errors :
+       {hdr_flip(waves(1, 1, false).view(), wild.view()), hdr_flip(wild.view(), flat(0, 0, 0).view()),
+        ldr_flip(wild.view(), flat(1, 0, 1).view())})
     for (const float e : errors) {
       EXPECT_GE(e, 0);
       EXPECT_LE(e, 1);

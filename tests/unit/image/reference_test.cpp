@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "common/image/maps.h"
 #include "common/image/final_image.h"
+#include "common/image/maps.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -60,9 +60,10 @@ TEST(Reference, TakesItsOwnErrorAway) {
   EXPECT_EQ(true_error(*reference, std::vector<float>(kValues, 2.1F)).rmse, 0);  // .01 - .0625
 }
 
-// A reference of four times the samples of the image has a fifth of the squared difference. With its layers of
-// errors, made of two halves as ours are, the image's own squared error is found: of 2000 images the mean is known
-// to 1 / sqrt(2000 * 576 / 2) = .13 %, but the quotient's noise is larger; the bound is its measured error times 4.
+// A reference of four times the samples of the image has a fifth of the squared difference. With its layers
+// of errors, made of two halves as ours are, the image's own squared error is found: of 2000 images the mean
+// is known to 1 / sqrt(2000 * 576 / 2) = .13 %, but the quotient's noise is larger; the bound is its measured
+// error times 4.
 TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
   std::mt19937_64 random(7);
   std::normal_distribution<float> normal;
@@ -84,7 +85,7 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
   }
   const double mean = sum / kTrials, sigma = std::sqrt((squares / kTrials - mean * mean) / kTrials);
   EXPECT_LT(std::abs(mean - .04), 4 * sigma);
-  EXPECT_LT(sigma, .0001);                      // or the bound would say nothing
+  EXPECT_LT(sigma, .0001);                     // or the bound would say nothing
   EXPECT_GT(raw / kTrials, .045 - 4 * sigma);  // with the reference's noise left in
 }
 
@@ -117,7 +118,8 @@ TEST(Maps, ColoursRiseInLightness) {
   double before = -1;
   for (int i = 0; i <= 100; ++i) {
     const auto c = map_colour(i / 100.);
-    const double light = .2126 * std::pow(c[0] / 255., 2.2) + .7152 * std::pow(c[1] / 255., 2.2) + .0722 * std::pow(c[2] / 255., 2.2);
+    const double light = .2126 * std::pow(c[0] / 255., 2.2) + .7152 * std::pow(c[1] / 255., 2.2) +
+                         .0722 * std::pow(c[2] / 255., 2.2);
     EXPECT_GT(light, before) << i;
     before = light;
   }

@@ -142,7 +142,10 @@ TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
 
 TEST(Views, CsvHasOneLineForEachPoint) {
   EXPECT_EQ(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}}}),
-            "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi\n1.5,3,4,0.5,0.25,0.125,0.375\n");
+            "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n"
+            "1.5,3,4,0.5,0.25,0.125,0.375,,,\n");
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}}).ends_with(",2,4,0.5\n"));
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,\n"));
 }
 
 }  // namespace

@@ -1,0 +1,54 @@
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "cli/local_farm.h"
+#include "common/image/exr_file.h"
+#include "tests/coverage/job.h"
+
+namespace ls::test {
+namespace {
+
+using nlohmann::json;
+
+template <class T>
+T checked(Result<T> result) {
+  if (!result) throw std::runtime_error(result.error().message);
+  return std::move(*result);
+}
+
+ImageError error_of(const json& report) {
+  ImageError e;
+  e.rmse = report.at("rmse");
+  e.rmse_lo = report.at("rmse_ci95").at(0), e.rmse_hi = report.at("rmse_ci95").at(1);
+  e.relmse = report.at("relmse");
+  e.relmse_lo = report.at("relmse_ci95").at(0), e.relmse_hi = report.at("relmse_ci95").at(1);
+  e.spp = report.at("spp");
+  e.trusted = report.at("trusted");
+  return e;
+}
+
+}  // namespace
+
+CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed) {
+  const auto farm = checked(cli::LocalFarm::open({1, false}));
+  cli::LocalScene local;
+  local.name = scene.name;
+  local.text = scene.xml;
+  JobSpec spec;
+  spec.size = FrameSize{64, 64};
+  spec.seed = seed;
+  spec.target_error = scene.target;
+  spec.spp = scene.spp;
+  spec.float_output = true;
+  const auto id = farm->submit(local, spec);
+  if (!id) throw std::runtime_error(id.error().error.message);
+  if (const auto started = farm->start({}); !started) throw std::runtime_error(started.error().message);
+  (void)farm->coordinator().wait(*id);
+  farm->stop();
+  const json report = json::parse(checked(farm->coordinator().report_json(*id)));
+  const auto picture = checked(read_exr_rgb(checked(farm->coordinator().image_exr(*id)), scene.name));
+  return {
+      {picture.rgb.begin(), picture.rgb.end()}, error_of(report), report.at("verdict_kind") == "heavy_tail"};
+}
+
+}  // namespace ls::test

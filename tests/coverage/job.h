@@ -1,0 +1,26 @@
+// One job of a coverage scene.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/image/error_estimate.h"
+#include "common/scene/scene.h"
+#include "tests/coverage/scenes.h"
+
+namespace ls::test {
+
+struct CoverageJob {
+  std::vector<double> image;  // interleaved R, G, B
+  ImageError error;           // as the job says it
+  bool heavy_tail = false;
+};
+
+// 32 x 32 pixels, rendered and folded round by round as the coordinator does.
+CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t seed);
+
+// 64 x 64 pixels with a target error: a whole `lightshaft render`, whose tiles stop when they are good
+// enough.
+CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed);
+
+}  // namespace ls::test

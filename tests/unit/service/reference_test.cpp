@@ -1,0 +1,110 @@
+// A job with a reference: its true error is known at every checkpoint, whatever happens on the way.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "common/image/exr_file.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+std::vector<std::byte> grey_exr(FrameSize size, float level) {
+  ExrPicture p{size, {}, {}};
+  for (const char* c : {"R", "G", "B"})
+    p.channels[c] = ExrFloat{std::vector<float>(
+        static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), level)};
+  return write_exr(p).value();
+}
+
+JobSpec against(Coordinator& coordinator, FrameSize size = {40, 24}) {
+  const auto exr = grey_exr(size, .5F);
+  JobSpec spec;
+  spec.spp = 16;
+  spec.reference = sha256(std::span<const std::byte>(exr));
+  EXPECT_TRUE(coordinator.blobs().put(*spec.reference, exr));
+  return spec;
+}
+
+std::vector<std::optional<TrueFigures>> truths(Coordinator& coordinator, const JobId& job) {
+  std::vector<std::optional<TrueFigures>> out;
+  const auto points = coordinator.convergence(job);
+  if (!points) return out;
+  for (const ConvergencePoint& p : *points) out.push_back(p.truth);
+  return out;
+}
+
+std::vector<std::optional<TrueFigures>> rendered(const std::filesystem::path& data, unsigned seed) {
+  auto coordinator = open_at(data);
+  const JobId job = submit(*coordinator, against(*coordinator));
+  FakeFarm farm(*coordinator, 2);
+  std::mt19937 random(seed);
+  farm.reorder = [&](auto& units) { std::shuffle(units.begin(), units.end(), random); };
+  EXPECT_TRUE(farm.finish(job));
+  const auto told = report(*coordinator, job);
+  EXPECT_EQ(told["true_relmse"], truths(*coordinator, job).back()->relmse);
+  EXPECT_EQ(told["reference"]["noise_relmse"], nullptr);
+  return truths(*coordinator, job);
+}
+
+TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
+  TempFolder dir;
+  const auto first = rendered(dir.path() / "a", 1);
+  ASSERT_EQ(first.size(), 4u);  // 2, 4, 8, 16 samples
+  for (const auto& truth : first) {
+    ASSERT_TRUE(truth);
+    EXPECT_GT(truth->rmse, 0);
+    ASSERT_TRUE(truth->flip);
+    EXPECT_GT(*truth->flip, 0);
+  }
+  EXPECT_EQ(rendered(dir.path() / "b", 2), first);
+  EXPECT_EQ(rendered({}, 3), first);  // in memory
+}
+
+TEST(ServiceReference, SurvivesARestart) {
+  TempFolder dir;
+  const auto expected = rendered(dir.path() / "whole", 1);
+  for (int k = 1; k < 8; ++k) {
+    JobId job;
+    {
+      auto coordinator = open_at(dir.path() / std::to_string(k));
+      job = submit(*coordinator, against(*coordinator));
+      FakeFarm farm(*coordinator, 1);
+      farm.stop_after = k;
+      farm.finish(job);
+    }
+    auto coordinator = open_at(dir.path() / std::to_string(k));
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(job));
+    EXPECT_EQ(truths(*coordinator, job), expected) << k;
+  }
+}
+
+TEST(ServiceReference, IsReadWhenTheJobIsSubmitted) {
+  auto coordinator = open_at({});
+  SubmitRequest request{"s.xml", kSceneText, {}, against(*coordinator, {40, 25})};
+  EXPECT_THAT(coordinator->submit(request).error().error.message, HasSubstr("40 x 25"));
+  request.spec.reference = sha256("nothing");
+  EXPECT_THAT(coordinator->submit(request).error().error.message, HasSubstr("PUT /api/v1/blobs/"));
+}
+
+TEST(ServiceReference, IsNotNeededForMaps) {
+  auto coordinator = open_at({});
+  JobSpec spec;
+  spec.spp = 4;
+  const JobId job = submit(*coordinator, spec);
+  EXPECT_TRUE(coordinator->error_png(job));  // nothing is rendered yet
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_TRUE(coordinator->error_png(job));
+  EXPECT_TRUE(coordinator->samples_png(job));
+  EXPECT_FALSE(coordinator->samples_png({"j-none"}));
+  EXPECT_EQ(report(*coordinator, job)["reference"], nullptr);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
