@@ -133,7 +133,11 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
 void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
   initialize_once();
   openvdb::io::File file(path);
-  file.open(false);  // no delayed loading: errors must show here
+  file.open(false);                                        // no delayed loading: errors must show here
+  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)  // OpenVDB would go on, with a warning
+    throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
+                         " of the OpenVDB format; versions up to " +
+                         std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};
   const openvdb::GridBase::Ptr base = file.readGrid(choose(file, wanted));
   if (!base) throw Refused{1, "the grid cannot be read"};
   if (base->getGridClass() == openvdb::GRID_LEVEL_SET) {
