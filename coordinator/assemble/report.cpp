@@ -3,8 +3,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "coordinator/views.h"
-
 namespace ls::coordinator {
 namespace {
 
@@ -54,6 +52,11 @@ void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, dou
   }
 }
 
+json split_json(const TimeSplit& t) {
+  return {{"load", number(t.load)},         {"build", number(t.build)}, {"render", number(t.render)},
+          {"transfer", number(t.transfer)}, {"merge", number(t.merge)}, {"idle", number(t.idle)}};
+}
+
 json point(const ConvergencePoint& p) {
   json j{{"seconds", number(p.seconds)},
          {"core_seconds", number(p.core_seconds)},
@@ -65,7 +68,8 @@ json point(const ConvergencePoint& p) {
   return j;
 }
 
-// What it costs to come down to the job's target or, where there is none to come down to, to half of the error.
+// What it costs to come down to the job's target or, where there is none to come down to, to half of the
+// error.
 json forecast(const ReportFacts& facts) {
   if (facts.convergence.empty()) return {};
   const double now = facts.convergence.back().error.relmse;
@@ -126,7 +130,7 @@ std::string report_json(const ReportFacts& facts) {
          {"load_seconds", number(totals.load_seconds)},
          {"render_seconds", number(totals.render_seconds)},
          {"core_seconds", number(totals.core_seconds)},
-         {"time", json::parse(time_json(split_of(totals)))},
+         {"time", split_json(split_of(totals))},
          {"peak_rss_bytes", totals.peak_rss_bytes},
          {"nonfinite_samples", totals.health.nonfinite},
          {"negative_samples", totals.health.negative},

@@ -108,7 +108,7 @@ void Farm::State::on(const Tick&) {
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit)
       freeze(*job, StopReason::time);
-    else if (limit && seconds(*limit - now) <= kTimePlanned)
+    else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)  // well before leases reach up to the limit
       plan_end(*job, *limit);
   }
   work_appeared = true;
