@@ -1,10 +1,8 @@
-#include <cstdlib>
 #include <utility>
 
 #include "cli/cases/case.h"
 
 namespace ls::cases {
-void add_scratch(Table& t);
 
 void Table::mean(std::string id, std::string rows, std::string about, Maker scene, const Channels& expected,
                  MeanOptions options) {
@@ -49,7 +47,6 @@ Table all_cases() {
   add_places(t);
   add_bodies(t);
   add_bugs(t);
-  if (getenv("SCRATCH")) add_scratch(t);
   return t;
 }
 

@@ -114,7 +114,9 @@ void from_afar(Table& t) {
              return kit;
            },
            // Its rim is .1 rad off: the way down is longer by at most .005, times .01.
-           grey(lit_cube_answer(.01, 1)), {.slack = 5e-5, .slow = way.grid && !way.distant});
+           // Flights through a grid this thin seldom end in it.
+           grey(lit_cube_answer(.01, 1)),
+           {.band = way.grid && !way.distant ? .01 : .003, .slack = 5e-5, .slow = way.grid && !way.distant});
   }
 }
 

@@ -3,6 +3,8 @@
 
     lightshaft validate --json TABLE.json
     scenes/validate/stability_page.py TABLE.json docs
+
+Of several tables (parts of one, run with --case) each case counts once, as the last of them has it.
 """
 import json
 import math
@@ -151,13 +153,13 @@ def number(value):
 
 def page(table):
     cases = table["cases"]
-    seconds = sum(case["seconds"] for case in cases)
     bands = sorted(case["band"] for case in cases if case["kind"] == "statistical")
+    how = "lightshaft validate --quick --json TABLE.json` (without `--quick`: narrower bands and the longest cases, too)" if table["left_out"] else "lightshaft validate --json TABLE.json`"
     lines = ["# Stiff and extreme cases", "",
-             "Made by `lightshaft validate --quick --json TABLE.json` (without `--quick`: narrower bands and the longest cases, too) and `scenes/validate/stability_page.py TABLE.json docs`; what the verdicts mean "
+             f"Made by `{how} and `scenes/validate/stability_page.py TABLE.json docs`; what the verdicts mean "
              "stands in [validate.md](validate.md).", "",
              f"**{table['passed']} of {table['passed'] + table['failed']} figures pass**, {sum(c['nonfinite'] for c in cases)} samples went wrong, "
-             f"{sum(c['paths'] for c in cases):.3g} paths, {seconds:.0f} s. "
+             f"{sum(c['paths'] for c in cases):.3g} paths. "
              f"Half of the intervals had to lie within {100 * bands[len(bands) // 2]:.2g} % of the answer, the widest within {100 * bands[-1]:.2g} %.", "",
              "![Error by depth](images/stability-depth.svg)", "![Error by scale](images/stability-scale.svg)",
              "![Fluence](images/stability-fluence.svg)", "![z](images/stability-z.svg)", ""]
@@ -173,14 +175,84 @@ def page(table):
     return "\n".join(lines) + "\n"
 
 
+# What a constant of docs/constants.md does where it does most, by the case that asks for it.
+MEASURED = (
+    ("forced roulette: `kForcedRouletteDepth`, `kForcedSurvival`", "N17-white-slab-256/homogeneous/volpath"),
+    ("", "N17-white-slab-64/grid/volpath"),
+    ("", "7.1-normal-to-normal-a1/homogeneous/volpath"),
+    ("rays of a path: `kMaxSegments`; none is cut off by a thousand interfaces", "N42-500-plates-of-glass"),
+    ("rays leave surfaces by `0x1p-20`", "N39-closed-box-0.0001"),
+    ("", "N39-closed-box-1e+06"),
+    ("", "N39-closed-box-shifted"),
+    ("", "N42-null-interfaces"),
+    ("the same, a quarter of a mean free path and more of the medium", "N03-semi-infinite-a.9-1e+06/homogeneous/volpath"),
+    ("", "N03-semi-infinite-a.9-1e+06/grid/distant-mis"),
+    ("rays leave shapes met in double by `0x1p-28` of a size", "N39-closed-sphere-1"),
+    ("points kept from edges by `0x1p-22`; leaks of 12 million rays", "N39-leaks"),
+    ("the world's middle: `kFewBits`", "N24-sphere-of-1e5-at-1e7/homogeneous/volpath"),
+    ("", "N24-square-of-1e5-at-1e7/grid/distant-mis"),
+    ("bounds of grids: `kInflate`", "N09-equal-values-0.1/grid/volpath"),
+    ("", "N08-bound-1e+06-times-too-high/grid/volpath"),
+    ("dense cells: `kExactDepth`", "N10-hot-voxel-1e+06/grid/volpath"),
+    ("", "N10-hot-voxel-1e+06/grid/shadow"),
+    ("dark shadow rays: `kRouletteDepth`, `kRouletteTransmittance`", "N05-shadow-ramp-8/grid/volpath"),
+    ("directions along voxels: `kParallel`", "N12-axis-along-edges/grid/volpath"),
+    ("", "N12-all-but-an-axis/grid/shadow"),
+    ("thin stretches: `kThinDepth`", "N02-sunlit-1e-12/homogeneous/distant-mis"),
+    ("thin glow: `1e-14`", "N02-emission-1e-12/grid/volpath"),
+    ("least distance of lamps: `1e-7`, `1e-6` of the way", "N22-passing-a-lamp-at-0.0001/homogeneous/distant-mis"),
+    ("", "N22-lamp-at-0.01-beside-0.5-of-1/homogeneous/distant-equiangular"),
+    ("", "N22-lamp-at-1e+06-beside-0.5-of-1/homogeneous/distant-equiangular"),
+    ("ratios of densities: `kMaxRatio`", "N32-densities-of-1e+15"),
+    ("smallest sun drawn as a disk: `kSmallestSun`", "N18-cone-g-0.9999/homogeneous/volpath"),
+    ("trees of lights: `kTreeFrom`, `kTableShare`", "N30-1000-lamps-of-1e-20-to-1e20"),
+    ("roughness: `kSpecularAlpha` (twice of it)", "N34-ggx-alpha-0.002-peak"),
+    ("", "N34-beckmann-alpha-0.002-tail"),
+    ("", "N38-furnace-0.001-ggx"),
+)
+
+
+def measured(cases):
+    """Rows of the table of docs/constants.md; of what the table of cases leaves out, none."""
+    found = {case["name"]: case for case in cases}
+    rows, what = [], ""
+    for constant, name in MEASURED:
+        what = constant or what
+        case = found.get(name)
+        if case is None:
+            continue
+        off, unit = case["got"] - case["expected"], abs(case["expected"]) or 1
+        error = case["stderr"] / unit
+        effect = f"{off / unit:+.1e} +- {error:.1e}" if error > 1e-9 else f"{off / unit:+.1e}" if off else "0"
+        rows.append(f"| {what} | {name} | {number(case['expected'])} | {number(case['got'])} | {effect} |")
+        what = ""
+    return rows
+
+
+def update_constants(cases, file):
+    begin, end = "| constant | case | answer | got | effect, relative |\n|---|---|---|---|---|\n", "\n<!-- end of what was measured -->"
+    text = file.read_text()
+    head, rest = text.split(begin, 1)
+    file.write_text(head + begin + "\n".join(measured(cases)) + end + rest.split(end, 1)[1])
+
+
+def whole(tables):
+    table = tables[-1]
+    cases = {case["name"]: case for part in tables for case in part["cases"]}
+    failed = sum(case["verdict"] != "pass" for case in cases.values())
+    return {**table, "cases": list(cases.values()), "passed": len(cases) - failed, "failed": failed}
+
+
 def main():
-    if len(sys.argv) != 3:
+    if len(sys.argv) < 3:
         sys.exit(__doc__)
-    table, docs = json.loads(pathlib.Path(sys.argv[1]).read_text()), pathlib.Path(sys.argv[2])
+    table, docs = whole([json.loads(pathlib.Path(file).read_text()) for file in sys.argv[1:-1]]), pathlib.Path(sys.argv[-1])
     (docs / "images").mkdir(parents=True, exist_ok=True)
     for draw, name in ((error_by_depth, "depth"), (error_by_scale, "scale"), (fluence, "fluence"), (all_z, "z")):
         draw(table["cases"], docs / "images" / f"stability-{name}.svg")
     (docs / "stability.md").write_text(page(table))
+    if (docs / "constants.md").exists():
+        update_constants(table["cases"], docs / "constants.md")
 
 
 if __name__ == "__main__":

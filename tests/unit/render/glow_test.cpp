@@ -182,6 +182,7 @@ TEST(Glow, OfTwoGridsAgreesWithQuadrature) {
   for (const Glow glow : {Glow::per_length, Glow::per_absorption, Glow::black_body}) {
     Medium m = of_grid(density, sigma, glow);
     m.sigma_s = sigma * .4f;
+    m.absorbing = C3(.6f);
     m.kelvin_scale = 3000;
     m.kelvin_offset = 500;
     emit(m, fire);
