@@ -43,7 +43,7 @@ Result<void> take_numbers(const Flags& flags, CompareOptions& options) {
   options.conditions.time = *time;
   options.conditions.clock = flags.clock == "cpu" ? race::RaceClock::cpu : race::RaceClock::wall;
   auto cores = static_cast<std::uint64_t>(worker::usable_cpus());
-  std::uint64_t spp = kMaxSpp, seeds = options.seeds;
+  std::uint64_t spp = options.conditions.most_spp, seeds = options.seeds;
   for (const auto& ok :
        {take("--spp", flags.spp, 2, kMaxSpp, spp), take("--seeds", flags.seeds, 1, kMostSeeds, seeds),
         take("--seed", flags.first_seed, 0, UINT64_MAX - kMostSeeds, options.first_seed),

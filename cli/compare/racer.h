@@ -15,12 +15,14 @@
 
 namespace ls::race {
 
+inline constexpr std::uint64_t kNoLimit = UINT64_C(1) << 31;  // samples a pixel that no race comes to
+
 // The conditions, the same for everybody.
 struct Conditions {
   double time = 10;  // seconds, on the race's clock
   RaceClock clock = RaceClock::wall;
   int threads = 1;
-  std::uint64_t most_spp = UINT64_C(1) << 31;
+  std::uint64_t most_spp = kNoLimit;
   FrameSize size;
   double seconds(const Cost& cost) const { return cost.seconds(clock, threads); }
 };

@@ -50,7 +50,7 @@ std::vector<std::string> paragraphs_before(const Results& results) {
   std::vector<std::string> out;
   if (results.races.empty()) return out;
   const Conditions& c = results.races.front().conditions;
-  std::string limit = c.most_spp < UINT64_C(1) << 31 ? fmt::format(" or {} samples a pixel", c.most_spp) : "";
+  std::string limit = c.most_spp < kNoLimit ? fmt::format(" or {} samples a pixel", c.most_spp) : "";
   out.push_back(
       fmt::format("Each entrant has {} s{} ({}) for each of {}, after loading the scene; those of one seed "
                   "take turns on the same "

@@ -171,6 +171,26 @@ double end_of_round(double spp) {
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
+// How much the cost of a sample varies from doubling to doubling: relative standard deviation about that of
+// all samples so far, of the last few doublings. 0: there is none to tell by.
+double cost_spread(std::span<const ErrorPoint> points) {
+  constexpr int kDoublings = 4;
+  const ErrorPoint& now = points.back();
+  const ErrorPoint* later = &now;
+  double squares = 0;
+  int count = 0;
+  for (std::size_t i = points.size() - 1; i-- > 0 && count < kDoublings;) {
+    const ErrorPoint& p = points[i];
+    if (2 * p.spp > later->spp || !(p.spp > 0) || !(p.core_seconds > 0)) continue;
+    const double cost = (later->core_seconds - p.core_seconds) / (later->spp - p.spp);
+    const double off = cost * now.spp / now.core_seconds - 1;
+    squares += off * off;
+    ++count;
+    later = &p;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
 }  // namespace
 
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
@@ -236,8 +256,9 @@ std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double t
   };
   const auto spp = [&](double times) { return end_of_round(now.spp * times); };
   const auto left = [&](double samples) { return now.core_seconds * (samples / now.spp - 1); };
-  const double best = spp(reached(0));
-  return Forecast{best, left(best), left(now.spp * reached(-kNormal95)), left(spp(reached(kNormal95)))};
+  const double best = spp(reached(0)), costs = 1 + kNormal95 * cost_spread(points);
+  return Forecast{best, left(best), left(now.spp * reached(-kNormal95)) / costs,
+                  left(spp(reached(kNormal95))) * costs};
 }
 
 }  // namespace ls

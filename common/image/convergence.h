@@ -45,14 +45,14 @@ struct Judgement {
   bool operator==(const Judgement&) const = default;
 };
 const char* to_string(Judgement::Kind kind);
-// `doubt`: ImageError::verdict, empty when the image's own figures are trusted. In order of weight: doubt, a bias
-// floor, the slope.
+// `doubt`: ImageError::verdict, empty when the image's own figures are trusted. In order of weight: doubt, a
+// bias floor, the slope.
 //
-// Bias floor: of the true error that part which the estimated one lacks is a squared bias, if it is there, and
-// does not fall with samples; what chance puts between the two falls as they do. It is told where the last true
-// error is above the estimated one by four standard deviations of the interval's logarithm (chance: once in
-// 30,000), and has kept more of its excess since half the samples or fewer than the root of their ratio, which is
-// half way between staying and falling like 1/N.
+// Bias floor: of the true error that part which the estimated one lacks is a squared bias, if it is there,
+// and does not fall with samples; what chance puts between the two falls as they do. It is told where the
+// last true error is above the estimated one by four standard deviations of the interval's logarithm (chance:
+// once in 30,000), and has kept more of its excess since half the samples or fewer than the root of their
+// ratio, which is half way between staying and falling like 1/N.
 Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {

@@ -147,11 +147,17 @@ def test_a_set_of_scenes_has_one_table(tmp_path):
     (tmp_path / "b").mkdir()
     first = write_fog(tmp_path)
     shutil.copy(write_fog(tmp_path / "b"), tmp_path / "b" / "scene.xml")
+    refs = tmp_path / "refs"
+    refs.mkdir()
+    for k in (0, 1):
+        lightshaft("render", first, "-o", refs / f"fog.{k}.exr", "--quiet", "--spp", "4", "--size", "32x16", "--seed", 90 + k)
     lightshaft("compare", first, tmp_path / "b" / "scene.xml", "--size", "32x16", "--threads", "1", "--clock", "cpu", "--time", "60", "--spp", "4", "--seeds", "2",
-               "--report", tmp_path / "out", "--quiet")
+               "--references", refs, "--report", tmp_path / "out", "--quiet")
 
     assert [row["scene"] for row in rows(tmp_path / "out" / "summary.csv")] == ["fog", "b"]
     assert (tmp_path / "out" / "b.svg").exists()
+    fog, b = (tmp_path / "out" / "report.md").read_text().split("## b\n")
+    assert "fog.0.exr and fog.1.exr, two independent references" in fog and "pictures of all other seeds" in b
 
 
 def test_interrupting_keeps_what_was_done(tmp_path):

@@ -212,6 +212,28 @@ double share_within(double slope, int jobs, int pixels) {
   return within / double(all);
 }
 
+// What a sample costs drifts; an interval that knew only of rounds would end exactly at one and be missed by
+// a hair.
+TEST(Forecast, AllowsForCostsThatVary) {
+  std::vector<ErrorPoint> even, uneven;
+  double spent = 0, before = 0;
+  for (const double spp : {8., 16., 32., 64., 128.}) {
+    const double error = 1 / spp;
+    even.push_back({spp, spp, error, error / 1.05, error * 1.05});
+    spent += (spp - before) * (even.size() % 2 == 1 ? 1.03 : .97);
+    before = spp;
+    uneven.push_back({spp, spent, error, error / 1.05, error * 1.05});
+  }
+
+  const auto exact = forecast_of(even, .002), wide = forecast_of(uneven, .002);
+
+  // 1.96 standard deviations of about 3 %, to both sides; the line through the points sees the same change a
+  // little.
+  EXPECT_GT(wide->core_seconds_hi, 1.03 * exact->core_seconds_hi);
+  EXPECT_LT(wide->core_seconds_lo, exact->core_seconds_lo / 1.03);
+  EXPECT_LT(wide->core_seconds_hi, 1.15 * exact->core_seconds_hi);
+}
+
 TEST(Forecast, HoldsInNineOfTenCases) {
   // Forecasts of one job are not independent, so this is a bound and no test of .95: fewer than .9 is what
   // the user was promised not to see.
