@@ -101,6 +101,22 @@ double AdaptiveStop::predicted() const {
   return sum / pixels;
 }
 
+double AdaptiveStop::measured() const {
+  double sum = 0, pixels = 0;
+  for (const Group& g : groups_) {
+    sum += g.sums[g.stop];
+    pixels += g.pixels;
+  }
+  return sum / (3 * pixels);
+}
+
+AdaptiveStop::Verdict AdaptiveStop::judge(double target) const {
+  if (!settled()) return Verdict::unknown;
+  if (!(predicted() <= target)) return Verdict::no;
+  if (!std::all_of(groups_.begin(), groups_.end(), whole)) return Verdict::unknown;
+  return measured() <= target ? Verdict::yes : Verdict::no;
+}
+
 bool AdaptiveStop::exhausted() const {
   return std::all_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.stop == last_; });
 }

@@ -17,8 +17,10 @@
 //
 // The decision to stop after round k uses the errors after the rounds before k and predicts that at k (the
 // variance falls as 1/n; samplers that do better make the image better than asked): a group's own last round
-// would bias it low. Nothing stops before kMinSppBeforeStop. Cost per sample counts as equal everywhere:
-// measured times would make pixels depend on the machine. An error that is not known (NaN) stops nothing.
+// would bias it low. So does the judgement of the image; only when it says that the target is met are the
+// last rounds asked, too, and may make the image go on. Nothing stops before kMinSppBeforeStop. Cost per
+// sample counts as equal everywhere: measured times would make pixels depend on the machine. An error that is
+// not known (NaN) stops nothing.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +55,11 @@ class AdaptiveStop {
 
   // All groups have come to a stop at this level.
   bool settled() const { return settled_ == groups_.size(); }
-  // relMSE of the image as it is predicted to be then; only when settled.
+  // Whether the image is good enough at this level.
+  enum class Verdict { unknown, no, yes };
+  Verdict judge(double target) const;
+  // relMSE of the image at this level, predicted from the rounds before the last of each tile; only when
+  // settled.
   double predicted() const;
   // Every group has all the samples there are: nothing can go on.
   bool exhausted() const;
@@ -94,6 +100,8 @@ class AdaptiveStop {
   };
   double variance(const Group& g, RoundIndex round) const;  // per sample, as told by rounds 0..round
   double gain(const Group& g) const;                        // of one more round after `stop`
+  double measured() const;  // relMSE with the last rounds, which must be known
+  static bool whole(const Group& g) { return g.sums.size() > g.stop; }
   void advance(Group& g);
 
   TileGrid grid_;

@@ -93,7 +93,8 @@ void Farm::State::on(const JobExtended& event) {
   const std::uint64_t new_spp = even_spp(event.spp);
   if (cut_range(last, job->spp) != cut_range(last, new_spp)) reopen(*job, last);
   const auto limit = job->time_limit(now);
-  if (job->stopping == StopReason::time || (limit && now >= *limit)) job->plan.time.reset();
+  const bool by_time = job->stopping == StopReason::time && (job->frozen || job->ended());
+  if (by_time || (limit && now >= *limit)) job->plan.time.reset();
   if (job->stopping) job->plan.target_error.reset();
   job->plan.spp = new_spp;
   job->spp = new_spp;

@@ -26,11 +26,12 @@ void Farm::State::judge(Job& job) {
   AdaptiveStop& rule = *job.adaptive;
   bool lower = false;
   while (job.steered() && rule.settled() && rule.level() != job.level_seen) {
+    const auto verdict = rule.exhausted() ? AdaptiveStop::Verdict::no : rule.judge(*job.plan.target_error);
+    if (verdict == AdaptiveStop::Verdict::unknown) break;
     job.level_seen = rule.level();
-    const bool good = rule.predicted() <= *job.plan.target_error;
-    mark_level(job, good || rule.exhausted());
+    mark_level(job, verdict == AdaptiveStop::Verdict::yes || rule.exhausted());
     if (rule.exhausted()) break;
-    if (good) return stop_at_level(job);
+    if (verdict == AdaptiveStop::Verdict::yes) return stop_at_level(job);
     rule.lower();
     lower = true;
   }

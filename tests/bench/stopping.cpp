@@ -91,7 +91,7 @@ void table(int jobs) {
   for (const SyntheticScene& scene : synthetic_scenes()) {
     const SyntheticFilm film(kGrid, scene.pixel);
     const double variance = film.relative_variance();
-    for (const double samples : {128., 512., 2048.}) {
+    for (const double samples : {150., 600., 2400.}) {
       const double target = variance / samples;
       const Row r = measure(film, target, jobs);
       fmt::print("| {} | {:.2g} | {:.0f} | {:.3f} | {:.3f} | {:.0f} % | {:.2f} | {:.2f} |\n", scene.name,

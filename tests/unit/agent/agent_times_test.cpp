@@ -6,8 +6,8 @@
 namespace ls::worker {
 namespace {
 
-// The fake, on a clock that only moves when it prepares a job (2 s) and begins a unit (1/4 s of standing still,
-// 1/2 s of rendering).
+// The fake, on a clock that only moves when it prepares a job (2 s) and begins a unit (1/4 s of standing
+// still, 1/2 s of rendering).
 class TimedBackend final : public RenderBackend {
  public:
   TimedBackend(std::unique_ptr<RenderBackend> fake, AtomicClock& clock)

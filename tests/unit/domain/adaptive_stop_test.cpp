@@ -108,14 +108,25 @@ TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
   }
 }
 
-// Its own last round would bias the decision low: whatever it says, the tile ends with it.
+// Its own last round would bias the decision low: however good it is, the tile does not end before it.
 TEST(AdaptiveStop, ATilesLastRoundHasNoSayInItsStop) {
   const auto honest = exact({2, 3});
   const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
   const ErrorOf other = [&](TileIndex t, RoundIndex k) {
-    return honest(t, k) * (k == out.ends[t] - 1 ? 1e6 : 1);
+    return honest(t, k) * (k == out.ends[t] - 1 ? 1e-6 : 1);
   };
   EXPECT_EQ(stop_at_once(tiles_in_a_row(2), kMany, 5e-3, other).ends, out.ends);
+}
+
+TEST(AdaptiveStop, AnImageThatTurnsOutWorseThanPredictedGoesOn) {
+  const auto honest = exact({2, 3});
+  const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
+  const ErrorOf late = [&](TileIndex t, RoundIndex k) {  // a firefly comes with the last round
+    return honest(t, k) * (t == 1 && k >= out.ends[t] - 1 ? 2 : 1);
+  };
+  const auto further = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, late);
+  EXPECT_TRUE(further.by_error);
+  EXPECT_GT(further.ends[1], out.ends[1]);
 }
 
 // Errors with a scatter of their own for each round.
@@ -137,8 +148,8 @@ TEST(AdaptiveStop, TheOrderOfArrivalDoesNotMatter) {
   for (int i = 0; i < 50; ++i) {
     AdaptiveStop rule(grid, kMany);
     std::vector<RoundIndex> seen(grid.count());
-    while (!rule.settled() || rule.predicted() > .004) {
-      if (rule.settled()) rule.lower();
+    while (rule.judge(.004) != AdaptiveStop::Verdict::yes) {
+      if (rule.judge(.004) == AdaptiveStop::Verdict::no) rule.lower();
       const TileIndex t = static_cast<TileIndex>(random() % grid.count());
       if (seen[t] <= rule.wanted(t)) rule.folded(t, seen[t], error(t, seen[t])), ++seen[t];
     }

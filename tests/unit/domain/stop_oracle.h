@@ -26,8 +26,8 @@ inline void feed_wanted(AdaptiveStop& rule, std::vector<RoundIndex>& seen, const
 inline StopOutcome stop_at(AdaptiveStop& rule, std::vector<RoundIndex>& seen, double target,
                            const ErrorOf& error) {
   while (true) {
-    while (!rule.settled()) feed_wanted(rule, seen, error);
-    const bool good = rule.predicted() <= target && !rule.exhausted();
+    while (rule.judge(target) == AdaptiveStop::Verdict::unknown) feed_wanted(rule, seen, error);
+    const bool good = rule.judge(target) == AdaptiveStop::Verdict::yes && !rule.exhausted();
     if (good || rule.exhausted()) return {rule.ends(), good, rule.predicted(), rule.mean_spp()};
     rule.lower();
   }
