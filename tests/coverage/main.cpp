@@ -7,6 +7,7 @@
 #include <exception>
 #include <string>
 
+#include "common/base/log.h"
 #include "tests/coverage/coverage.h"
 #include "tests/coverage/denominators.h"
 
@@ -17,6 +18,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: error_coverage [JOBS] [THREADS] [NAME]\n");
     return 2;
   }
+  ls::log_level(ls::LogLevel::off);
   fmt::print(
       "| scene | spp | jobs | true relMSE | RMSE covered | relMSE covered | estimated / true MSE | relMSE | "
       "\"don't trust yet\" |\n|---|---|---|---|---|---|---|---|---|\n");

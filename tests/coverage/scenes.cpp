@@ -82,7 +82,7 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"media, smooth", scene(fog(.5, .9, .9) + sky(.7))},
       {"media, noisy", scene(room(lamp(60)) + fog(.6, .9, .995))},
       {"media, dark", scene(fog(2, .95, .9) + lamp(2))},
-      {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 5e-5},
+      {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
       {"media, to a target", scene(fog(2, .95, .9) + lamp(2)), 4096, false, 1.5e-5},
       {"fireflies", scene(caustic()), 64, true},
   };
