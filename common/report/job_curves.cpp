@@ -114,8 +114,9 @@ std::string outlook(const Json& report) {
   const Json& forecast = member(report, "forecast");
   const double target = number(forecast, "target"), more = number(forecast, "core_seconds");
   if (!(target > 0) || !(more > 0)) return "";
-  std::string out = fmt::format("relMSE {} {} {} more of core time", given(target),
-                                flag(forecast, "asked", false) ? "needs" : "would need", duration(more));
+  const bool asked = flag(forecast, "asked", false);
+  std::string out = fmt::format("relMSE {} {} {} more of core time", asked ? given(target) : figure(target),
+                                asked ? "needs" : "would need", duration(more));
   if (const std::string ci = range(interval(forecast, "core_seconds_ci95"), duration); !ci.empty())
     out += fmt::format(" ({})", ci);
   if (const double spp = number(forecast, "spp"); spp > 0)

@@ -85,7 +85,7 @@ TEST(JobPage, WithoutATargetSaysWhatHalfOfTheErrorWouldCost) {
   report["forecast"]["target"] = 0.011;
   const std::string page = page_of(report);
 
-  expect(page, "relMSE 0.011 would need 5 min more");
+  expect(page, "relMSE 0.0110 would need 5 min more");
   EXPECT_EQ(times(page, "class=\"target\""), 0u);
   EXPECT_EQ(times(page_of(some_report()), "class=\"target\""), 2u) << "one in each plot";
 }
