@@ -229,7 +229,7 @@ Asset random_serialized(Dice& dice, RandomAssets& assets, double wild) {
 }
 
 Asset random_vol(Dice& dice, RandomAssets& assets, double wild, GridKind kind) {
-  const int channels = kind == GridKind::share && dice.chance(.4) ? 3 : 1;
+  const int channels = kind != GridKind::temperature && dice.chance(.4) ? 3 : 1;
   const int n[3] = {side(dice), side(dice), side(dice)};
   std::string s = "VOL\3";
   for (const std::int32_t v : {1, n[0], n[1], n[2], channels}) put(s, v);

@@ -28,6 +28,16 @@ SceneKit cloud() {
   kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}});
   return kit;
 }
+SceneKit coloured_cloud() {
+  SceneKit kit = lit_room();
+  std::vector<float> values(6 * 5 * 4 * 3);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 11) / 4;
+  const MediumIndex m = kit.heterogeneous(kit.grid({6, 5, 4}, values, kBox, 3), {.9, .8, .5}, .75, .5);
+  kit.container(CubeShape{}, {}, kit.null(), m);
+  kit.scene.emitters.push_back(PointEmitter{{1.5, -2, 2}, {8, 6, 4}});
+  kit.environment(.125);
+  return kit;
+}
 SceneKit coloured_fog() {
   SceneKit kit = lit_room();
   kit.container(SphereShape{}, {}, kit.null(), kit.homogeneous({.25, 1, 2}, {.9, .7, .5}, -.25));
@@ -82,6 +92,7 @@ std::vector<NamedScene> different_scenes() {
   SceneKit distant = cloud();
   distant.scene.integrator.name = "volpath_distant_mis";
   all.push_back({"a cloud, distances by light", distant});
+  all.push_back({"a cloud of three channels", coloured_cloud()});
   return all;
 }
 
