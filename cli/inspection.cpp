@@ -85,6 +85,17 @@ std::string parts(const ordered_json& j, bool used) {
   return table.text();
 }
 
+// What the files decided, too: structures of the BVH and of the lights, ways of sampling.
+std::string made_ready(const ordered_json& j) {
+  const auto listed = [&](const char* key) {
+    std::vector<std::string> all;
+    for (const auto& x : j.at(key)) all.push_back(plain_text(x.get<std::string>()));
+    return all.empty() ? std::string("nothing") : fmt::format("{}", fmt::join(all, "; "));
+  };
+  return fmt::format("\nmade ready to trace, it has: {}\nand does without: {}\n", listed("features_used"),
+                     listed("features_left_out"));
+}
+
 std::string pruned(const ordered_json& j) {
   Table table("taken out of the scene, as no pixel depends on it");
   for (const auto& x : j.at("pruned")) {
@@ -205,8 +216,8 @@ ordered_json inspection(const LocalScene& scene, const LocalWorld& built, const 
 }
 
 std::string inspection_text(const ordered_json& j) {
-  std::string out =
-      head(j) + parts(j, true) + parts(j, false) + pruned(j) + files(j) + memory(j) + variants(j);
+  std::string out = head(j) + parts(j, true) + parts(j, false) + made_ready(j) + pruned(j) + files(j) +
+                    memory(j) + variants(j);
   if (const auto work = j.find("work"); work != j.end()) {
     Table table("work of a small image");
     for (const auto& [name, count] : work->items()) table.add({name, count.dump()});

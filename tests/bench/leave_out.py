@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a scene does not need, measured: writes docs/leave-out.md.
 
-usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone]
+usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone]    N = 0: with what was built before
 
 For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
 - instructions per path (callgrind, within render_tile, one thread) of the release build, against a build of the same sources
@@ -74,7 +74,10 @@ def write(folder):
 
 
 def build(name, *options, jobs):
+    """Nothing is built with jobs = 0: the binaries that lie there are taken."""
     folder = ROOT / "build" / f"leave-out-{name}"
+    if jobs == 0:
+        return folder / "bin" / "lightshaft"
     subprocess.run(["cmake", "--preset", "release", "-B", folder, "-DLIGHTSHAFT_TESTS=OFF", *options], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     subprocess.run(["cmake", "--build", folder, "-j", str(jobs), "--target", "lightshaft"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     return folder / "bin" / "lightshaft"
@@ -91,23 +94,41 @@ def instructions(binary, scene, folder):
     return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
 
 
+# By name: the flags of worker/render/features.h, in their order, without those that are not set at the end.
+INSTANTIATIONS = {"surfaces": (), "homogeneous grey media": (1,), "homogeneous chromatic media": (1, 0, 1), "grey grids": (1, 1),
+                  "chromatic grids": (1, 1, 1), "everything": (1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1)}
+
+
+def inclusive(callgrind):
+    """Instructions in calls of each function, what it called included."""
+    names, costs, callee = {}, {}, None
+    for line in callgrind.read_text().splitlines():
+        if (m := re.match(r"c?fn=\((\d+)\)(?: (.*))?", line)):
+            if m[2]:
+                names[m[1]] = m[2]
+            if line[0] == "c":
+                callee = names[m[1]]
+        elif callee and not line.startswith(("calls=", "cob=", "cfi=", "cfl=")):
+            costs[callee] = costs.get(callee, 0) + int(line.split()[1])
+            callee = None
+    return costs
+
+
 def by_instantiation(binary, scene, folder):
-    """(name, instructions per path) of every instantiation that covers the scene, in a small image: callgrind begins anew with each."""
+    """(name, instructions per path) of every instantiation that covers the scene, in a small image."""
     out = folder / "variants.out"
-    said = subprocess.run(["valgrind", "--tool=callgrind", "--toggle-collect=ls::render::render_tile_as(*", "--dump-before=ls::render::render_tile_as(*",
-                           f"--callgrind-out-file={out}", binary, "inspect", scene, "--json", "--variants"], check=True, capture_output=True, text=True)
+    said = subprocess.run(["valgrind", "--tool=callgrind", "--toggle-collect=ls::render::render_tile_as(*", f"--callgrind-out-file={out}",
+                           binary, "inspect", scene, "--json", "--variants"], check=True, capture_output=True, text=True)
     told = json.loads(said.stdout)
     assert told["variants_agree"], told["variant_bits"]
     longer = max(told["size"])
     paths = 4 * (told["size"][0] * 32 // longer) * (told["size"][1] * 32 // longer)  # as cli/inspect_command.cpp has it
-    names = [v["variant"] for v in told["variant_bits"]]
-    # The first dump is of what came before; the last of all is written at the end.
-    dumps = sorted(folder.glob("variants.out*"), key=lambda p: int((re.search(r"(\d+)$", p.name) or [0, 10 ** 6])[1]))
-    totals = [int(re.search(r"^(?:totals|summary): (\d+)", p.read_text(), re.M)[1]) for p in dumps]
-    for dump in dumps:
-        dump.unlink()
-    totals = totals[-len(names):]
-    return [(name, total / paths) for name, total in zip(names, totals)]
+    costs = {}
+    for function, cost in inclusive(out).items():
+        if (m := re.search(r"sample_with<ls::render::Features\{([^}]*)\}", function)):
+            flags = tuple(int(flag == "true") for flag in m[1].split(", ")) if m[1] else ()
+            costs[flags] = cost / paths
+    return [(v["variant"], costs[INSTANTIATIONS[v["variant"]]]) for v in told["variant_bits"]]
 
 
 def on_a_farm(scene, folder):

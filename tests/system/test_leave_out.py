@@ -65,6 +65,11 @@ def agree(scene, at_least):
     assert told["variants_agree"], told["variant_bits"]
     assert len({v["variant"] for v in told["variant_bits"]}) == len(told["variant_bits"]) >= at_least, told["variant_bits"]
     assert told["variant_bits"][0]["variant"] == told["variant"]
+    counted = [v["instructions_per_path"] for v in told["variant_bits"]]
+    if "uncounted" in told:  # most virtual machines have no counter
+        assert told["uncounted"] and counted == [None] * len(counted)
+    else:
+        assert counted[0] > 500 and max(counted) >= counted[0]
     return told
 
 
@@ -135,6 +140,7 @@ def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
     assert {f["name"] for f in told["files_left_out"]} == {"unused.vol", "nothing.png"}
     assert told["structures"] == inspect(lean)["structures"]
     assert told["scene_bytes"] == inspect(lean)["scene_bytes"]
+    assert sum(part["bytes"] for part in told["parts"]) == (tmp_path / "fog.vol").stat().st_size
 
     pixels = {}
     (tmp_path / "farm").mkdir()
@@ -149,7 +155,8 @@ def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
             report = farm.report(job)
             assert report["needs"]["grids"] and "volume grids" in report["features_used"]
         analysis = report["analysis"]
-        assert any(part["part"] == "volume grids" and part["why"] == "grid of fog.vol" for part in analysis["parts"])
+        assert {"part": "volume grids", "used": True, "why": "grid of fog.vol", "bytes": (tmp_path / "fog.vol").stat().st_size} in analysis["parts"]
+        assert all(part["bytes"] == 0 for part in analysis["parts"] if part["part"] != "volume grids")
         assert bytes_under(farm.data) < UNUSED_BYTES and bytes_under(tmp_path / "farm" / "cache") < UNUSED_BYTES
     assert pixels[fat] == pixels[lean]
 

@@ -195,8 +195,13 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
 V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-  return !kBuilt.instances || id.instance == kNone ? complete_local(id, V3d(o), V3d(d), hit)
-                                                   : complete_instanced(id, o, d, hit);
+  if (kBuilt.instances && id.instance != kNone) [[unlikely]]
+    return complete_instanced(id, o, d, hit);
+  if (!kBuilt.user_geometries || id.kind == PrimitiveId::Kind::triangle) {
+    hit.primitive = id;
+    return complete_triangle(*this, id.index, V3d(o), V3d(d), hit);
+  }
+  return complete_local(id, V3d(o), V3d(d), hit);
 }
 
 bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const {

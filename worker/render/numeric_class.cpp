@@ -13,6 +13,7 @@
 #include "worker/render/accel.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/build_id.h"
+#include "worker/render/built.h"
 #include "worker/render/geometry.h"
 #include "worker/render/hash.h"
 #include "worker/render/medium.h"
@@ -182,7 +183,7 @@ Digest compute() {
   add_math_in_double(h);
   add_reciprocals(h);
   add_hits(h);
-  add_sphere_hits(h);
+  if (kBuilt.user_geometries) add_sphere_hits(h);
   add_bsdf_samples(h);
   return h.finish();
 }
