@@ -257,7 +257,7 @@ def page(rows, bytes_alone):
     for name, r in rows.items():
         more = sorted(set(r["farm"]["libraries"]) - common)
         out.append(f"- {name}: {'nothing else' if not more else ', '.join(more)}.")
-    out += ["", "OpenVDB is mapped by none of them: only once a scene names a `.vdb` or `.nvdb` file (`tests/system/test_leave_out.py`).", ""]
+    out += ["", "OpenVDB is mapped by none of them, and by no worker: a program of its own, `lightshaft-vdb`, reads a `.vdb` or `.nvdb` file that a scene names, and ends (`tests/system/test_leave_out.py`).", ""]
     return "\n".join(out)
 
 

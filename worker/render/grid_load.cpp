@@ -1,17 +1,14 @@
 #include "worker/render/grid_load.h"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <memory>
 #include <span>
 
 #include "common/assets/raw_grid.h"
 #include "common/assets/vol.h"
 #include "common/base/overloaded.h"
-#include "worker/render/vdb_module.h"
+#include "worker/render/vdb_process.h"
 
 namespace ls::render {
 namespace {
@@ -90,47 +87,14 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
   return out;
 }
 
-struct VdbModule {
-  decltype(&ls_vdb_read) read = nullptr;
-  decltype(&ls_vdb_free) free = nullptr;
-  std::string error;
-};
-
-// Beside the executable, in ../lib of it, or where the loader looks.
-VdbModule open_vdb_module() {
-  constexpr char kName[] = "liblightshaft_vdb.so";
-  std::error_code ec;
-  const auto exe = std::filesystem::read_symlink("/proc/self/exe", ec);
-  VdbModule m;
-  for (const auto& candidate : {exe.parent_path() / kName, exe.parent_path().parent_path() / "lib" / kName,
-                                std::filesystem::path(kName)}) {
-    void* lib = dlopen(candidate.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (!lib) {
-      m.error = dlerror();
-      continue;
-    }
-    m.read = reinterpret_cast<decltype(m.read)>(dlsym(lib, "ls_vdb_read"));
-    m.free = reinterpret_cast<decltype(m.free)>(dlsym(lib, "ls_vdb_free"));
-    if (m.read && m.free) return m;
-  }
-  return m;
-}
-
 Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
-  static const VdbModule module = open_vdb_module();
-  if (!module.read)
-    return fail(Errc::internal, fmt::format("the OpenVDB module is missing: {}", module.error));
   auto path = files.path(v.file);
   if (!path) return tl::unexpected(path.error());
   const std::string& name = files.name(v.file);
-  LsVdbGrid raw{};
-  char error[512] = {};
-  const int rc = module.read(path->c_str(), v.grid_name.c_str(), kMaxGridValues, &raw, error, sizeof error);
-  if (rc != 0)
-    return fail(rc == 2 ? Errc::resource_exhausted : Errc::invalid_argument,
-                fmt::format("{}: {}", name, error));
-  const std::unique_ptr<LsVdbGrid, decltype(module.free)> guard(&raw, module.free);
+  const auto file = VdbFile::read(*path, v.grid_name, kMaxGridValues);
+  if (!file) return fail(file.error().code, fmt::format("{}: {}", name, file.error().message));
+  const LsVdbGrid& raw = file->grid();
   Transform t;
   std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
   const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);

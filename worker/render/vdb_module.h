@@ -1,6 +1,5 @@
-// The interface of the OpenVDB module, a shared library that is opened only when a scene names a .vdb or
-// .nvdb file (which of them it is, the file says): mapping OpenVDB costs 30 ms and 29 MB that other scenes
-// need not pay. Plain C types: nothing of OpenVDB crosses it.
+// The interface of what reads .vdb and .nvdb files (which of them it is, the file says): only lightshaft-vdb
+// links it (vdb_process.h). Plain types: nothing of OpenVDB crosses it.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +10,7 @@ struct LsVdbGrid {
   std::int32_t size[3];       // nodes, one background node around the active voxels included
   double index_to_scene[16];  // row-major, for column vectors: node (i, j, k) -> scene
   std::int32_t channels;      // 1 or 3
-  float* values;              // channels interleaved, x fastest; owned by the module, freed by ls_vdb_free
+  float* values;              // channels interleaved, x fastest; freed by ls_vdb_free
   std::uint64_t negatives;    // values below 0, made 0
 };
 

@@ -53,8 +53,8 @@ EVERYWHERE = r"^(common|worker|coordinator|cli)/"
 
 DOORS = [
     Door("Embree", r"^embree\d?/", r"^worker/render/accel\.(h|cpp)$", "one file pair of the renderer"),
-    Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a module that is loaded on demand"),
-    Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same module"),
+    Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
+    Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
     Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr\w*\.(h|cpp)$", "common/image/exr*"),
     Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
@@ -277,7 +277,7 @@ def exceptions_are_files(tree):
 # Numbers that decide pixels: named constants of the renderer, and literals with an exponent that have no name. (A literal
 # without one, such as .5, is nearly always arithmetic.) Grids' file formats are not pixels.
 CONSTANTS_PAGE = "docs/constants.md"
-DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb/)")
+DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb[/_])")
 NAMED_NUMBER = re.compile(r"\bconstexpr\s+(?:static\s+)?(?:float|double|int|std::\w+)\s+(k[A-Z]\w*)\s*(?:\[|=)")
 BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+)f?\b")
 

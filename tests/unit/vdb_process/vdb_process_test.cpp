@@ -1,0 +1,140 @@
+// lightshaft-vdb's reply, and replies of programs that stand in for one that a file made to harm has taken
+// over.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "tests/unit/nvdb/nvdb_kit.h"
+#include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb_process.h"
+#include "worker/render/vdb_reply.h"
+
+namespace ls::render {
+namespace {
+
+using testing::HasSubstr;
+
+class VdbProcess : public testing::Test {
+ protected:
+  VdbProcess() {
+    char name[] = "/tmp/lightshaft-vdb-XXXXXX";
+    folder_ = ::mkdtemp(name);
+  }
+  ~VdbProcess() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path file(const std::string& name, const std::string& content) {
+    std::ofstream(folder_ / name, std::ios::binary) << content;
+    return folder_ / name;
+  }
+  // A program that answers with these words of a shell.
+  std::filesystem::path program(const std::string& words) {
+    const auto path = file("program", "#!/bin/sh\n" + words + "\n");
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    return path;
+  }
+  Result<VdbFile> read_by(const std::string& words) {
+    return VdbFile::read(folder_ / "none.vdb", "", 1 << 20, program(words));
+  }
+  // ... that answers with a reply and values.
+  Result<VdbFile> answered(const VdbReply& reply, const std::vector<float>& values) {
+    std::string bytes(kVdbValuesAt, '\0');
+    std::memcpy(bytes.data(), &reply, sizeof reply);
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+    return read_by("cat '" + file("reply", bytes).string() + "' >&3");
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+VdbReply reply_of(int x, int y, int z) {
+  VdbReply reply{};
+  reply.magic = kVdbMagic;
+  reply.grid.channels = 1;
+  reply.grid.size[0] = x, reply.grid.size[1] = y, reply.grid.size[2] = z;
+  return reply;
+}
+
+TEST_F(VdbProcess, AGridOfAnotherProcessIsTheGridOfThisOne) {
+  const std::string bytes = test::NvdbKit().file();
+  LsVdbGrid here{};
+  decode_nvdb(std::as_bytes(std::span(bytes)), "", 1 << 20, here);
+
+  const auto there = VdbFile::read(file("a.nvdb", bytes), "density", 1 << 20);
+
+  ASSERT_TRUE(there) << there.error().message;
+  const std::uint64_t count = values_of(here);
+  ASSERT_EQ(values_of(there->grid()), count);
+  EXPECT_TRUE(std::equal(here.values, here.values + count, there->grid().values));
+  EXPECT_TRUE(std::equal(here.index_to_scene, here.index_to_scene + 16, there->grid().index_to_scene));
+  delete[] here.values;
+}
+
+TEST_F(VdbProcess, WhatIsRefusedIsToldWhy) {
+  const auto garbage = VdbFile::read(file("a.vdb", "no grid at all"), "", 1 << 20);
+  const auto large = VdbFile::read(file("a.nvdb", test::NvdbKit().file()), "", 100);
+
+  ASSERT_FALSE(garbage);
+  EXPECT_EQ(garbage.error().code, Errc::invalid_argument);
+  EXPECT_THAT(garbage.error().message, HasSubstr("not a readable OpenVDB"));
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, Errc::resource_exhausted);
+  EXPECT_THAT(large.error().message, HasSubstr("the limit is 100"));
+}
+
+TEST_F(VdbProcess, AFileThatCrashesItsReaderIsAnError) {
+  const auto crashed = read_by("kill -SEGV $$");
+  ASSERT_FALSE(crashed);
+  EXPECT_EQ(crashed.error().code, Errc::invalid_argument);
+  EXPECT_THAT(crashed.error().message, HasSubstr("crashes the library that reads it (Segmentation fault)"));
+
+  const auto endless = read_by("kill -XCPU $$");
+  ASSERT_FALSE(endless);
+  EXPECT_EQ(endless.error().code, Errc::resource_exhausted);
+  const auto eaten = read_by("kill -KILL $$");
+  ASSERT_FALSE(eaten);
+  EXPECT_THAT(eaten.error().message, HasSubstr("not enough memory"));
+  EXPECT_FALSE(read_by("exit 3"));
+}
+
+TEST_F(VdbProcess, AReplyIsBelievedOnlyWhereItHolds) {
+  VdbReply sound = reply_of(2, 1, 1), endless = sound, three = reply_of(1, 1, 1), two = three,
+           refused = reply_of(0, 0, 0);
+  endless.grid.index_to_scene[3] = std::numeric_limits<double>::infinity();
+  three.grid.channels = 3, two.grid.channels = 2;
+  refused.code = 1;
+  std::fill(std::begin(refused.error), std::end(refused.error), 'x');  // without an end
+
+  EXPECT_TRUE(answered(sound, {1, 2}));
+  EXPECT_TRUE(answered(three, {1, 2, 3}));
+  EXPECT_FALSE(answered(three, {1, 2}));
+  EXPECT_FALSE(answered(two, {1, 2}));
+  EXPECT_FALSE(answered(sound, {1}));
+  EXPECT_FALSE(answered(sound, {1, -1}));
+  EXPECT_FALSE(answered(sound, {1, std::nanf("")}));
+  EXPECT_FALSE(answered(endless, {1, 2}));
+  EXPECT_FALSE(answered(reply_of(-2, -1, 1), {1, 2}));
+  EXPECT_FALSE(answered(reply_of(0, 1, 1), {1, 2}));
+  EXPECT_FALSE(answered(reply_of(1 << 30, 1 << 30, 1 << 30), {1, 2}));
+  EXPECT_FALSE(answered(VdbReply{}, {1, 2}));
+  EXPECT_FALSE(read_by("printf abc >&3"));
+  EXPECT_FALSE(read_by("true"));
+  const auto told = answered(refused, {});
+  ASSERT_FALSE(told);
+  EXPECT_EQ(told.error().message.size(), sizeof refused.error - 1);
+}
+
+TEST_F(VdbProcess, AProgramThatIsMissingIsNoFaultOfTheFile) {
+  const auto missing = VdbFile::read("a.vdb", "", 1 << 20, "/nowhere/lightshaft-vdb");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, Errc::internal);
+  EXPECT_THAT(missing.error().message, HasSubstr("/nowhere/lightshaft-vdb"));
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,159 @@
+#include "worker/render/vdb_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "worker/render/vdb_reply.h"
+
+extern char** environ;
+
+namespace ls::render {
+namespace {
+
+tl::unexpected<Error> no_program(const std::string& what, int error) {
+  return fail(Errc::internal, fmt::format("cannot read OpenVDB files: {}: {}", what, std::strerror(error)));
+}
+
+// An open file, closed with its owner.
+struct Descriptor {
+  explicit Descriptor(int opened) : fd(opened) {}
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  const int fd;
+};
+
+// What the loader and sanitizers may want to know; secrets of the environment are none of a file's business.
+std::vector<char*> environment() {
+  std::vector<char*> kept;
+  for (char** e = environ; *e; ++e) {
+    const std::string_view variable(*e), name = variable.substr(0, variable.find('='));
+    if (name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS"))
+      kept.push_back(*e);
+  }
+  kept.push_back(nullptr);
+  return kept;
+}
+
+// The status of the program's end; `reply` becomes its kVdbReplyFd.
+Result<int> run(const std::filesystem::path& program, std::vector<std::string> arguments, int reply) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  int error = posix_spawn_file_actions_adddup2(&actions, reply, kVdbReplyFd);
+  for (const int standard : {0, 1})
+    if (error == 0) error = posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
+  if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions, kVdbReplyFd + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, all;
+  sigemptyset(&none), sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  pid_t pid = -1;
+  if (error == 0)
+    error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, argv.data(), environment().data());
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (error != 0) return no_program(program.string(), error);
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0)
+    if (errno != EINTR) return no_program("waitpid", errno);
+  return status;
+}
+
+tl::unexpected<Error> how_it_ended(int status) {
+  if (!WIFSIGNALED(status))
+    return fail(Errc::internal,
+                fmt::format("the program that reads OpenVDB files ended with code {}", WEXITSTATUS(status)));
+  switch (WTERMSIG(status)) {
+    case SIGXCPU:
+      return fail(Errc::resource_exhausted, "reading it takes too long: is it a damaged OpenVDB file?");
+    case SIGKILL:
+      return fail(Errc::resource_exhausted,
+                  "the process that read it was killed: there was not enough memory");
+    default:
+      return fail(
+          Errc::invalid_argument,
+          fmt::format("not a readable OpenVDB or NanoVDB file: it crashes the library that reads it ({})",
+                      ::strsignal(WTERMSIG(status))));
+  }
+}
+
+bool sound(const LsVdbGrid& grid, std::uint64_t count) {
+  const auto usable = [](float v) { return std::isfinite(v) && v >= 0; };
+  const auto finite = [](double v) { return std::isfinite(v); };
+  return std::all_of(grid.index_to_scene, grid.index_to_scene + 16, finite) &&
+         std::all_of(grid.values, grid.values + count, usable);
+}
+
+}  // namespace
+
+VdbFile::VdbFile(VdbFile&& from) noexcept
+    : grid_(std::exchange(from.grid_, {})),
+      mapped_(std::exchange(from.mapped_, nullptr)),
+      mapped_bytes_(from.mapped_bytes_) {}
+
+VdbFile::~VdbFile() {
+  if (mapped_) ::munmap(mapped_, mapped_bytes_);
+}
+
+std::filesystem::path VdbFile::program_beside_us() {
+  std::error_code unknown;
+  return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path() / "lightshaft-vdb";
+}
+
+Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::string& grid_name,
+                              std::uint64_t max_values, const std::filesystem::path& program) {
+  const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC));
+  if (reply.fd < 0) return no_program("memfd_create", errno);
+  const auto status =
+      run(program, {program.string(), path.string(), grid_name, std::to_string(max_values)}, reply.fd);
+  if (!status) return tl::unexpected(status.error());
+  if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
+
+  constexpr std::string_view kNonsense = "not a readable OpenVDB or NanoVDB file: reading it gave nonsense";
+  struct stat written {};
+  if (::fstat(reply.fd, &written) != 0) return no_program("fstat", errno);
+  const auto bytes = static_cast<std::uint64_t>(written.st_size);
+  if (bytes < kVdbValuesAt) return fail(Errc::invalid_argument, std::string(kNonsense));
+  VdbFile file;
+  file.mapped_bytes_ = bytes;
+  void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, reply.fd, 0);
+  if (mapped == MAP_FAILED) return no_program("mmap", errno);
+  file.mapped_ = mapped;
+  VdbReply said;
+  std::memcpy(&said, mapped, sizeof said);
+  said.error[sizeof said.error - 1] = 0;
+  if (said.magic != kVdbMagic) return fail(Errc::invalid_argument, std::string(kNonsense));
+  if (said.code != 0)
+    return fail(said.code == 2 ? Errc::resource_exhausted : Errc::invalid_argument, std::string(said.error));
+  file.grid_ = said.grid;
+  file.grid_.values = reinterpret_cast<float*>(static_cast<char*>(mapped) + kVdbValuesAt);
+  const std::uint64_t count = values_of(said.grid);
+  if (count == 0 || count > max_values || count > (bytes - kVdbValuesAt) / sizeof(float) ||
+      !sound(file.grid_, count))
+    return fail(Errc::invalid_argument, std::string(kNonsense));
+  return file;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,34 @@
+// What lightshaft-vdb writes to the file that it inherits as kVdbReplyFd: this, and from kVdbValuesAt on the
+// grid's values. Whoever reads it takes it for a stranger's: a file made to harm may have written it.
+#pragma once
+
+#include <cstdint>
+
+#include "worker/render/vdb_module.h"
+
+namespace ls::render {
+
+inline constexpr int kVdbReplyFd = 3;
+inline constexpr std::uint64_t kVdbValuesAt = 4096;  // bytes
+inline constexpr std::uint64_t kVdbMagic = 0x3162'6476'736c;
+
+struct VdbReply {
+  std::uint64_t magic;
+  std::int32_t code;  // what ls_vdb_read returned
+  char error[512];    // ends with 0
+  LsVdbGrid grid;     // without the values' address
+};
+static_assert(sizeof(VdbReply) <= kVdbValuesAt);
+
+// Values of a grid with 1 or 3 channels and sizes of at least 0; of any other, or of more than can be
+// counted, the largest number.
+inline std::uint64_t values_of(const LsVdbGrid& grid) {
+  if (grid.channels != 1 && grid.channels != 3) return ~std::uint64_t{0};
+  auto count = static_cast<std::uint64_t>(grid.channels);
+  for (const std::int32_t n : grid.size)
+    if (n < 0 || __builtin_mul_overflow(count, static_cast<std::uint64_t>(n), &count))
+      return ~std::uint64_t{0};
+  return count;
+}
+
+}  // namespace ls::render
