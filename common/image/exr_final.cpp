@@ -7,6 +7,8 @@
 #include <ImfStringAttribute.h>
 #include <half.h>
 
+#include <algorithm>
+
 #include "common/image/exr_headers.h"
 #include "common/image/exr_memory.h"
 #include "common/image/final_image.h"
@@ -34,19 +36,24 @@ Result<void> check_layers(const Imf::Header& header, const std::string& name, Fi
   return {};
 }
 
+// Some rows at a time: a small file that only claims to be large costs little memory.
 void read_pixels(Imf::InputFile& file, FinalPicture& image) {
-  const auto width = static_cast<std::size_t>(image.size.width),
-             pixels = width * static_cast<std::size_t>(image.size.height);
-  image.rgb.resize(3 * pixels);
-  image.spp.resize(pixels);
-  Imf::FrameBuffer buffer;
-  for (std::size_t c = 0; c < 3; ++c)
-    buffer.insert(kColours[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&image.rgb[c]),
-                                          3 * sizeof(float), 3 * sizeof(float) * width));
-  buffer.insert("spp", Imf::Slice(Imf::UINT, reinterpret_cast<char*>(image.spp.data()), sizeof(std::uint32_t),
-                                  sizeof(std::uint32_t) * width));
-  file.setFrameBuffer(buffer);
-  file.readPixels(0, image.size.height - 1);
+  constexpr int kBand = 64;
+  const auto width = static_cast<std::size_t>(image.size.width);
+  for (int y0 = 0; y0 < image.size.height; y0 += kBand) {
+    const int rows = std::min(kBand, image.size.height - y0);
+    const std::size_t first = image.spp.size(), pixels = width * static_cast<std::size_t>(rows);
+    image.rgb.resize(3 * (first + pixels));
+    image.spp.resize(first + pixels);
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < 3; ++c)
+      buffer.insert(kColours[c],
+                    Imf::Slice::Make(Imf::FLOAT, &image.rgb[3 * first + c], {0, y0}, image.size.width, rows,
+                                     3 * sizeof(float), 3 * sizeof(float) * width));
+    buffer.insert("spp", Imf::Slice::Make(Imf::UINT, &image.spp[first], {0, y0}, image.size.width, rows));
+    file.setFrameBuffer(buffer);
+    file.readPixels(y0, y0 + rows - 1);
+  }
 }
 
 Result<FinalPicture> read(std::span<const std::byte> exr, const std::string& name) {

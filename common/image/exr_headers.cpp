@@ -4,13 +4,19 @@
 
 #include <optional>
 
+#include "common/base/plain_text.h"
 #include "common/image/byte_cursor.h"
+#include "common/image/exr_attribute.h"
 
 namespace ls::exr {
 namespace {
 
 constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
+// The library takes a chunk's buffers before it has read a byte of it. Above a size that nobody minds a file
+// must be long enough: the best that a code of the format does is some thousands to one (deflate: 1032).
+constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
+constexpr double kMostPacking = 4096;
 constexpr std::size_t kLeastChannelBytes = 18;  // a name of one letter, its zero, four int32
 
 struct Part {
@@ -48,7 +54,7 @@ void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
 class Scan {
  public:
   Scan(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits)
-      : in_(file), name_(name), limits_(limits) {}
+      : in_(file), file_bytes_(file.size()), name_(name), limits_(limits) {}
 
   Result<void> run() {
     const auto magic = in_.value<std::uint32_t>(), version = in_.value<std::uint32_t>();
@@ -84,6 +90,8 @@ class Scan {
       if (!type || !size || *size < 0) return refuse("its header is cut off or damaged");
       const auto raw = in_.take(static_cast<std::size_t>(*size));
       if (!raw) return refuse(fmt::format("the header claims {} bytes, more than the file has", *size));
+      if (!fills_its_size(*type, *raw))
+        return refuse(fmt::format("its attribute '{}' is not as long as the header says", plain_text(*name)));
       note(*name, *raw, part);
     }
   }
@@ -110,14 +118,21 @@ class Scan {
       return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));
     const double chunk_pixels = tiles ? static_cast<double>(part.tile_width) * part.tile_height
                                       : static_cast<double>(w) * static_cast<double>(part.lines_per_chunk);
-    if (chunk_pixels * 4 * static_cast<double>(part.channels) > static_cast<double>(kMaxChunkBytes))
+    const double bytes = chunk_pixels * 4 * static_cast<double>(part.channels);
+    if (bytes > static_cast<double>(kMaxChunkBytes))
       return refuse(
           fmt::format("one of its tiles or blocks of lines needs more than {} bytes", kMaxChunkBytes),
           Errc::resource_exhausted);
+    if (bytes > static_cast<double>(kFreeChunkBytes) &&
+        bytes > kMostPacking * static_cast<double>(file_bytes_))
+      return refuse(
+          fmt::format("one of its tiles or blocks of lines needs {:.0f} bytes, more than {} can hold packed",
+                      bytes, file_bytes_));
     return {};
   }
 
   ByteCursor in_;
+  const std::size_t file_bytes_;
   const std::string& name_;
   const ExrLimits& limits_;
   bool tiled_ = false;

@@ -11,9 +11,9 @@
 
 namespace ls::exr {
 
-// Every part's size within `limits`, every attribute inside the file, every chunk table no longer than the
-// file, and the buffer of one chunk at most kMaxChunkBytes. Whether the file makes sense otherwise is left to
-// the library.
+// Every part's size within `limits`, every attribute inside the file and as long as its type says, every
+// chunk table no longer than the file, and the buffer of one chunk at most kMaxChunkBytes. Whether the file
+// makes sense otherwise is left to the library.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 inline constexpr int kMaxParts = 256;
 Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);

@@ -41,13 +41,15 @@ Result<std::vector<std::byte>> write_exr(const ExrPicture& picture) {
       header.channels().insert(name, Imf::Channel(type));
       buffer.insert(name, Imf::Slice::Make(type, data, {0, 0}, size.width, size.height));
     };
-    for (const auto& [name, channel] : picture.channels)
+    for (const auto& entry : picture.channels) {
+      const std::string& name = entry.first;
       std::visit(overloaded{[&](const ExrHalf& c) {
                               add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data());
                             },
                             [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); },
                             [&](const ExrUint& c) { add(name, Imf::UINT, c.values.data()); }},
-                 channel);
+                 entry.second);
+    }
     exr::MemoryWriter out;
     {
       Imf::OutputFile file(out, header, /*numThreads=*/0);

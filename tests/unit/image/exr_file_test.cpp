@@ -166,6 +166,40 @@ TEST(ExrRead, DoesNotBelieveLargeClaims) {
   EXPECT_THAT(claim({.tiled = true}, "tiles", 1 + 9 + 4, {1 << 30, 1 << 30}), HasSubstr("needs more than"));
   EXPECT_THAT(claim({}, "channels", 1 + 7, {2147483647}), HasSubstr("more than the file has"));
   EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 99'999'999, 15}), HasSubstr("needs more than"));
+  EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 1'999'999, 15}), HasSubstr("can hold packed"));
+}
+
+// The library would read the first bytes as the value and go on in its middle: there stands what claims 2 GB.
+TEST(ExrRead, RefusesAttributesThatHideOthers) {
+  const std::string size("\x00\x00\x00\x7e", 4), hidden = std::string("\0\0\0\0hidden\0opaque\0", 18) + size;
+  const auto file_with = [](const std::string& type, const std::string& value) {
+    std::vector<std::byte> file = write({});
+    std::string attribute = std::string("note\0", 5) + type + '\0';
+    const auto length = static_cast<std::int32_t>(value.size());
+    attribute.append(reinterpret_cast<const char*>(&length), 4).append(value);
+    const auto* bytes = reinterpret_cast<const std::byte*>(attribute.data());
+    file.insert(file.begin() + 8, bytes, bytes + attribute.size());
+    return file;
+  };
+  for (const char* type : {"int", "float", "v2f", "m44f", "box2i", "timecode", "chlist", "preview"}) {
+    const auto read = read_exr_rgb(file_with(type, hidden), "a.exr");
+    ASSERT_FALSE(read) << type;
+    EXPECT_THAT(read.error().message, HasSubstr("attribute 'note' is not as long")) << type;
+  }
+  EXPECT_FALSE(read_exr_rgb(file_with("stringvector", size + "abc"), "a.exr"));
+  EXPECT_FALSE(read_exr_rgb(file_with("floatvector", "abc"), "a.exr"));
+
+  // An attribute more moves what lies behind it, which tables of chunks don't know; all else is as before.
+  for (const auto& [type, value] :
+       std::vector<std::pair<std::string, std::string>>{{"int", "abcd"},
+                                                        {"stringvector", std::string("\1\0\0\0x", 5)},
+                                                        {"preview", std::string("\1\0\0\0\1\0\0\0abcd", 12)},
+                                                        {"unheard_of", "abc"}}) {
+    const auto read = read_exr_rgb(file_with(type, value), "a.exr");
+    if (!read) {
+      EXPECT_THAT(read.error().message, testing::Not(HasSubstr("not as long"))) << type;
+    }
+  }
 }
 
 TEST(ExrRead, SurvivesEveryTruncation) {
