@@ -9,9 +9,6 @@
 
 namespace ls::http {
 
-namespace bhttp = beast::http;
-using boost::system::error_code;
-
 net::awaitable<Connection::Body> Connection::read_whole(Parser& parser, Request& request,
                                                         std::uint64_t limit) {
   if (!co_await send_continue(request)) co_return Body{Read::closed, {}};
@@ -80,22 +77,12 @@ net::awaitable<Connection::Read> Connection::read_portion(Parser& parser, std::s
                                                           std::uint64_t& received) {
   while (!parser.is_done()) {
     if (buffer_.size() > 0) {
-      const std::size_t old = into.size(), room = buffer_.size();
-      into.resize(old + room);
-      auto& body = parser.get().body();
-      body.data = into.data() + old;
-      body.size = room;
-      body.more = true;
-      error_code ec;
-      const std::size_t consumed = parser.put(buffer_.data(), ec);
-      const std::size_t got = room - body.size;
-      buffer_.consume(consumed);
-      into.resize(old + got);
-      received += got;
-      shared_.api.counters().body_bytes += got;
-      if (ec && ec != bhttp::error::need_more && ec != bhttp::error::need_buffer) co_return Read::malformed;
-      if (got > 0) co_return Read::ok;
-      if (consumed > 0) continue;  // a chunk's header
+      const Portion portion = take_body(parser, buffer_, into);
+      received += portion.got;
+      shared_.api.counters().body_bytes += portion.got;
+      if (portion.malformed) co_return Read::malformed;
+      if (portion.got > 0) co_return Read::ok;
+      if (portion.consumed > 0) continue;  // a chunk's header
     }
     arm(pace(began, received));
     if (const Read read = co_await fill(); read != Read::ok) co_return read;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <exception>
@@ -11,70 +10,10 @@
 #include "coordinator/http/head_text.h"
 #include "coordinator/http/problem.h"
 #include "coordinator/http/run_on.h"
-#include "coordinator/http/uri.h"
 
 namespace ls::http {
-namespace {
 
-namespace bhttp = beast::http;
 using boost::system::error_code;
-using Header = bhttp::request_header<bhttp::fields>;
-
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return out;
-}
-
-// Of these a second one would let two readers of a request disagree.
-constexpr std::string_view kOnce[] = {
-    "host", "authorization", "content-type", "content-length", "transfer-encoding", "origin", "expect"};
-
-std::optional<Response> refuse_header(const Header& header) {
-  for (const std::string_view name : kOnce)
-    if (header.count(name) > 1)
-      return problem(400, fmt::format("the request has more than one '{}' header", name));
-  if (header.version() != 10 && header.version() != 11) return problem(505, "speak HTTP/1.1 or HTTP/1.0");
-  if (header.version() == 11 && header.count(bhttp::field::host) == 0)
-    return problem(400, "the request has no 'Host' header");
-  if (const auto coding = header[bhttp::field::transfer_encoding];
-      !coding.empty() && lower_case(coding) != "chunked")
-    return problem(501, "of the transfer codings only 'chunked' is understood");
-  if (const auto expect = header[bhttp::field::expect];
-      !expect.empty() && lower_case(expect) != "100-continue")
-    return problem(400, "of the expectations only '100-continue' is understood");
-  if (header.target().size() > kMaxTarget)
-    return problem(414, fmt::format("the request target has more than {} characters", kMaxTarget));
-  return std::nullopt;
-}
-
-// What Beast has parsed as our own value, or the answer to a request that can't be one.
-std::variant<Response, Request> to_request(const Parser& parser) {
-  const Header& header = parser.get();
-  if (auto refused = refuse_header(header)) return *refused;
-  Request request;
-  const auto method = parse_method(std::string_view(header.method_string()));
-  if (!method) return problem(501, "this method is not known here");
-  request.method = *method;
-  if (*method == Method::options && header.target() == "*") {
-    Response response;
-    response.status = 204;
-    return response;
-  }
-  auto target = parse_target(std::string_view(header.target()));
-  if (!target) return problem(target.error());
-  request.segments = std::move(target->segments);
-  request.query = std::move(target->query);
-  for (const auto& field : header)
-    request.headers.emplace_back(lower_case(std::string_view(field.name_string())),
-                                 std::string(field.value()));
-  if (const auto length = parser.content_length()) request.content_length = *length;
-  request.has_body = parser.chunked() || request.content_length.value_or(0) > 0;
-  return request;
-}
-
-}  // namespace
 
 Connection::Connection(Tcp::socket socket, Shared& shared)
     : socket_(std::move(socket)),
@@ -115,8 +54,7 @@ net::awaitable<void> Connection::serve() {
 net::awaitable<bool> Connection::serve_one() {
   charge(0);
   Parser parser;
-  parser.header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
-  parser.body_limit(boost::none);  // bounded per route, while it is read
+  prepare(parser, limits_);
   const Read read = co_await read_header(parser);
   if (read != Read::ok) {
     co_await answer_failed_read(read);
@@ -179,11 +117,10 @@ net::awaitable<Connection::Read> Connection::read_header(Parser& parser) {
   }
   arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));
   while (true) {
-    error_code ec;
-    buffer_.consume(parser.put(buffer_.data(), ec));
-    if (ec == bhttp::error::header_limit) co_return Read::header_too_large;
-    if (ec && ec != bhttp::error::need_more && ec != bhttp::error::need_buffer) co_return Read::malformed;
-    if (parser.is_header_done()) co_return Read::ok;
+    const Parsed parsed = take_header(parser, buffer_);
+    if (parsed == Parsed::too_large) co_return Read::header_too_large;
+    if (parsed == Parsed::malformed) co_return Read::malformed;
+    if (parsed == Parsed::done) co_return Read::ok;
     if (const Read read = co_await fill(); read != Read::ok) co_return read;
   }
 }

@@ -9,8 +9,6 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/buffer_body.hpp>
-#include <boost/beast/http/parser.hpp>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -19,14 +17,13 @@
 
 #include "coordinator/http/api.h"
 #include "coordinator/http/event_queue.h"
+#include "coordinator/http/request_head.h"
 
 namespace ls::http {
 
 namespace net = boost::asio;
-namespace beast = boost::beast;
 using Tcp = net::ip::tcp;
 using SteadyClock = std::chrono::steady_clock;
-using Parser = beast::http::request_parser<beast::http::buffer_body>;
 
 inline SteadyClock::duration steady_seconds(double seconds) {
   return std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));

@@ -25,9 +25,11 @@ Seeds volume_seeds();
 // partial.cpp: partial EXRs, one by one and merged into a final EXR
 void partial(Bytes input);
 Seeds partial_seeds();
-// http.cpp: requests to a coordinator; bundle.cpp: zip and tar
+// http.cpp: requests to a coordinator; wire.cpp: bytes of a client's connection; bundle.cpp: zip and tar
 void http(Bytes input);
 Seeds http_seeds();
+void wire(Bytes input);
+Seeds wire_seeds();
 void bundle(Bytes input);
 Seeds bundle_seeds();
 // protocol.cpp: messages of workers to a coordinator, and of a coordinator to workers

@@ -27,4 +27,25 @@ std::string with_length(std::string_view part) {
   return out.append(part);
 }
 
+std::string packed(const std::vector<std::string>& inputs) {
+  std::string pack;
+  for (const std::string& input : inputs) {
+    for (int shift = 0; shift < 32; shift += 8) pack += static_cast<char>(input.size() >> shift & 255);
+    pack += input;
+  }
+  return pack;
+}
+
+std::vector<std::string> unpacked(std::string_view pack) {
+  std::vector<std::string> inputs;
+  while (pack.size() >= 4) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length |= std::size_t{static_cast<unsigned char>(pack[i])} << 8 * i;
+    if (pack.size() - 4 < length) break;
+    inputs.emplace_back(pack.substr(4, length));
+    pack.remove_prefix(4 + length);
+  }
+  return inputs;
+}
+
 }  // namespace ls::fuzz

@@ -1,19 +1,13 @@
 // Requests to a coordinator in memory, as text: "METHOD target", header lines, an empty line, the body. What
 // the HTTP library makes of bytes is not ours; what we make of its requests is.
-#include <nlohmann/json.hpp>
-
-#include "coordinator/http/api.h"
-#include "coordinator/http/head_text.h"
 #include "coordinator/http/uri.h"
 #include "tests/fuzz/all_targets.h"
+#include "tests/fuzz/http_door.h"
 
 namespace ls::fuzz {
 namespace {
 
 using namespace ls::http;
-
-constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
-constexpr std::int64_t kMostPixels = 1 << 16;  // of an image that is made whole
 
 std::string_view line_of(std::string_view& text) {
   const auto end = std::min(text.find('\n'), text.size());
@@ -46,68 +40,18 @@ std::optional<Request> request_of(std::string_view text) {
   return r;
 }
 
-void check(const Response& response, Method method) {
-  must(response.status >= 200 && response.status <= 599, "a response has a status");
-  const std::string head = head_text(response, {.method = method}, 0);
-  must(head.find("\r\n\r\n") == head.size() - 4, "a header ends where its empty line is");
-  for (std::size_t i = 0; i < head.size(); ++i)
-    must(head[i] != '\n' || (i > 0 && head[i - 1] == '\r'), "no header is cut in two");
-  if (media_type(response.content_type).find("json") == std::string::npos || response.events) return;
-  const auto bytes = response.bytes();
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  must(nlohmann::json::accept(text, text + bytes.size()), "a body that is called JSON is JSON");
-}
-
-// As the server's loop does: admit, then the handler or the upload.
-Response ask(Api& api, const Request& r) {
-  auto admitted = api.admit(r);
-  if (auto* response = std::get_if<Response>(&admitted)) return std::move(*response);
-  const auto& match = std::get<Match>(admitted);
-  if (r.body.size() > api.body_limit(*match.route, r)) return text_response(413, "text/plain", "");
-  const BodyKind kind = api.body_kind(*match.route, r);
-  if (kind != BodyKind::blob && kind != BodyKind::archive) return api.handle(match, r);
-  auto opened = api.open_upload(match, r);
-  if (auto* response = std::get_if<Response>(&opened)) return std::move(*response);
-  auto& sink = std::get<std::unique_ptr<BodySink>>(opened);
-  if (auto refused = sink->append(std::as_bytes(std::span(r.body)))) return std::move(*refused);
-  return sink->finish();
-}
-
-bool small(const coordinator::Coordinator& coordinator) {
-  for (const auto& job : coordinator.jobs())
-    if (std::int64_t{job.size.width} * job.size.height > kMostPixels) return false;
-  return true;
-}
-
 }  // namespace
 
 void http(Bytes input) {
-  auto coordinator = coordinator::Coordinator::open({});
-  must(coordinator.has_value(), "a coordinator opens");
-  http::Limits limits;
-  limits.blob_bytes = limits.bundle_bytes = 1 << 20;
-  limits.unpacked_bytes = 4 << 20;
-  Api api(**coordinator, kToken, limits, StaticFiles(embedded_files()));
-  std::string job;  // of the last submission, for addresses that say JOB
+  HttpDoor door;
   for (const Bytes part : parts_of(input, 6)) {
-    std::string text(text_of(part));
-    for (std::size_t at = text.find("JOB"); !job.empty() && at != std::string::npos;
-         at = text.find("JOB", at + job.size()))
-      text.replace(at, 3, job);
-    const auto request = request_of(text);
-    if (!request || !small(**coordinator)) continue;
-    const Response response = ask(api, *request);
-    check(response, request->method);
-    if (response.status != 201) continue;
-    const auto bytes = response.bytes();
-    const auto said = nlohmann::json::parse(
-        std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), nullptr, false);
-    if (said.is_object() && said.contains("id")) job = said["id"];
+    const auto request = request_of(door.with_job(text_of(part)));
+    if (request && door.small()) door.ask(*request);
   }
 }
 
 Seeds http_seeds() {
-  const std::string token = std::string("authorization: Bearer ") + kToken + "\n";
+  const std::string token = std::string("authorization: Bearer ") + HttpDoor::kToken + "\n";
   const std::string scene =
       R"(<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="4"/></film></sensor><shape type="sphere"/><emitter type="constant"/></scene>)";
   const std::string submit = "POST /api/v1/jobs?spp=4&size=8x4&define=a=b&tags=x,y&name=s.xml HTTP\n" +
@@ -131,7 +75,7 @@ Seeds http_seeds() {
                   "content-type: application/json\n\n{\"sha256\":[\"" + digest + "\"]}");
   seeds.push_back(std::string("POST /api/v1/session\ncontent-type: application/json\norigin: http://a\nhost: "
                               "a\n\n{\"token\":\"") +
-                  kToken + "\"}");
+                  HttpDoor::kToken + "\"}");
   for (const char* address :
        {"/healthz", "/readyz", "/metrics", "/", "/js/main.js", "/api/v1/openapi.json", "/api/v1/workers",
         "/api/v1/jobs", "/api/v1/events?last_event_id=3", "/%2e%2e/x?a=%00+b"})

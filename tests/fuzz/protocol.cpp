@@ -43,7 +43,7 @@ class Sink final : public WorkerSink {
   // Every result and failure over an open stream is answered.
   bool answered(int acks) {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::seconds(20), [&] { return closed_ || acks_ > acks; });
+    return changed_.wait_for(lock, std::chrono::seconds(100), [&] { return closed_ || acks_ > acks; });
   }
   Lease lease() {
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
-// Every seed, what becomes of seeds that are cut or have a bit turned, and every input that was ever a
-// finding (tests/fuzz/corpus/TARGET/*), through its target; each must come back.
+// Every seed, what becomes of seeds that are cut or have a bit turned, every input that was ever a finding
+// (tests/fuzz/corpus/TARGET/*), and what coverage-guided fuzzing kept (tests/fuzz/corpus/TARGET.pack),
+// through its target; each must come back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +14,11 @@
 
 namespace ls::fuzz {
 namespace {
+
+std::string content(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 class Replay : public testing::TestWithParam<Target> {
  protected:
@@ -47,11 +53,25 @@ TEST_P(Replay, FindingsOfThePastComeBack) {
   std::sort(files.begin(), files.end());
   for (const auto& path : files) {
     SCOPED_TRACE(path);
-    std::ifstream file(path, std::ios::binary);
-    const std::string input{std::istreambuf_iterator<char>(file), {}};
+    const std::string input = content(path);
     ASSERT_FALSE(input.empty());
     GetParam().run(input_of(input));
   }
+}
+
+TEST_P(Replay, CorpusOfTheFuzzersComesBack) {
+  const auto pack = std::filesystem::path(FUZZ_CORPUS) / (std::string(GetParam().name) + ".pack");
+  const auto inputs = unpacked(content(pack));
+  ASSERT_EQ(inputs.empty(), !std::filesystem::exists(pack)) << pack;
+  for (const std::string& input : inputs) GetParam().run(input_of(input));
+}
+
+TEST(Pack, HoldsWhatWasPackedAndNothingThatIsCutShort) {
+  const std::vector<std::string> inputs{"", "a", std::string(70000, 'b')};
+  const std::string pack = packed(inputs);
+
+  EXPECT_EQ(unpacked(pack), inputs);
+  EXPECT_EQ(unpacked(pack.substr(0, pack.size() - 1)), (std::vector<std::string>{"", "a"}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Fuzz, Replay, testing::ValuesIn(targets().begin(), targets().end()),

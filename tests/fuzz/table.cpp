@@ -12,6 +12,7 @@ std::span<const Target> targets() {
       {"volume", volume, volume_seeds},
       {"partial", partial, partial_seeds},
       {"http", http, http_seeds},
+      {"wire", wire, wire_seeds},
       {"bundle", bundle, bundle_seeds},
       {"protocol", protocol, protocol_seeds},
   };

@@ -1,0 +1,37 @@
+// A coordinator in memory behind its HTTP door, which the targets `http` (requests as text) and `wire` (bytes
+// of a connection) knock at.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "coordinator/http/api.h"
+
+namespace ls::fuzz {
+
+class HttpDoor {
+ public:
+  static constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
+
+  HttpDoor();
+
+  // The text with the id of the last submission wherever it says JOB.
+  std::string with_job(std::string_view text) const;
+  // No job has an image so large that making it would cost the fuzzer's time.
+  bool small() const;
+  // As the server's loop does: admits, then runs the handler or fills the upload. The response is checked.
+  void ask(const http::Request& request);
+  void check(const http::Response& response, http::Method method) const;
+
+  http::Api& api() { return *api_; }
+
+ private:
+  http::Response answer(const http::Request& request);
+
+  std::unique_ptr<coordinator::Coordinator> coordinator_;
+  std::unique_ptr<http::Api> api_;
+  std::string job_;
+};
+
+}  // namespace ls::fuzz
