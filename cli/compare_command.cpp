@@ -142,21 +142,26 @@ void print_rows(const race::Race& race) {
   }
 }
 
+void warn_if_busy(const CompareOptions& options) {
+  constexpr double kIdleLoad = .5;
+  const double load = race::load_average();
+  if (load > kIdleLoad && options.conditions.clock == race::RaceClock::wall)
+    say(fmt::format(
+        "lightshaft: warning: the machine is busy or just was (load average {:.1f}): wall seconds of "
+        "a busy one say little; --clock cpu counts CPU seconds",
+        load));
+}
+
 int run(const Flags& flags) {
   std::atomic<bool> stop{false};  // outlives the thread that sets it
   Interrupt interrupt;
   auto options = options_of(flags);
   if (!options) return say_error(options.error());
   race::Results results;
-  results.machine = {race::machine_words(options->conditions.threads), race::load_average(), -1,
-                     version_text()};
+  const race::Others others;
+  results.machine = {race::machine_words(options->conditions.threads), -1, version_text()};
   if (const auto ok = race::use_cores(options->conditions.threads); !ok) return say_error(ok.error());
-  if (race::busy(results.machine) && options->conditions.clock == race::RaceClock::wall)
-    say(
-        fmt::format("lightshaft: warning: the machine is busy (load average {:.1f}): wall seconds will say "
-                    "little; --clock "
-                    "cpu counts CPU seconds",
-                    results.machine.load_before));
+  warn_if_busy(*options);
   const auto limit = render::limit_threads(options->conditions.threads);
   interrupt.on_signal([&] { stop = true; });
   results.seeds = options->seeds;
@@ -169,7 +174,7 @@ int run(const Flags& flags) {
       complain(fmt::format("{}: {}", race->scene, f.why)), failed = true;
     print_rows(*race);
     results.races.push_back(std::move(*race));
-    results.machine.load_after = race::load_average();
+    results.machine.others = others.share();
     if (const auto ok = write(options->report, results); !ok) return say_error(ok.error());
   }
   if (!options->quiet) say(fmt::format("lightshaft: written: {}", (options->report / "index.html").string()));

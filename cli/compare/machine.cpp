@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <sched.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -21,6 +23,15 @@ std::string processor() {
     if (line.starts_with("model name"))
       if (const auto at = line.find(": "); at != std::string::npos) return plain_text(line.substr(at + 2));
   return "a processor that does not tell its name";
+}
+
+double seconds_of(const timeval& t) {
+  return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+}
+
+double cpu_seconds(int whose) {
+  rusage usage{};
+  return ::getrusage(whose, &usage) == 0 ? seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime) : 0;
 }
 
 }  // namespace
@@ -50,6 +61,32 @@ std::string machine_words(int cores) {
 double load_average() {
   double load = 0;
   return ::getloadavg(&load, 1) == 1 ? load : -1;
+}
+
+// proc(5): "cpu user nice system idle iowait irq softirq steal ...", in ticks, of all cores.
+Others::Times Others::now() {
+  constexpr int kFields = 8, kIdle = 3, kWaiting = 4;
+  std::ifstream file("/proc/stat");
+  std::string name;
+  file >> name;
+  Times times;
+  const auto tick = static_cast<double>(::sysconf(_SC_CLK_TCK));
+  for (int i = 0; i < kFields; ++i) {
+    double ticks = 0;
+    file >> ticks;
+    times.total += ticks / tick;
+    if (i != kIdle && i != kWaiting) times.busy += ticks / tick;
+  }
+  if (!file || name != "cpu") return {};
+  times.own = cpu_seconds(RUSAGE_SELF) + cpu_seconds(RUSAGE_CHILDREN);
+  return times;
+}
+
+double Others::share() const {
+  const Times end = now();
+  const double total = end.total - start_.total;
+  if (!(start_.total > 0) || !(total > 0)) return -1;
+  return std::clamp((end.busy - start_.busy - (end.own - start_.own)) / total, 0., 1.);
 }
 
 }  // namespace ls::race

@@ -10,8 +10,24 @@ namespace ls::race {
 // before any thread is made. resource_exhausted: there are fewer.
 Result<void> use_cores(int count);
 
-// "AMD EPYC 7B13, 2 of 8 cores". Loads are the kernel's average of a minute; negative: not known.
+// "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
-double load_average();
+double load_average();  // the kernel's, of a minute; negative: not known
+
+// How busy others are: counts from when it is made.
+class Others {
+ public:
+  Others() : start_(now()) {}
+  // Of the time of all cores: what neither this process nor the programs that it waited for had. Negative:
+  // not known.
+  double share() const;
+
+ private:
+  struct Times {
+    double total = 0, busy = 0, own = 0;  // seconds; total 0: not known
+  };
+  static Times now();
+  Times start_;
+};
 
 }  // namespace ls::race

@@ -14,8 +14,8 @@ namespace {
 
 using report::figure;
 
-// A share of one core that somebody else had is lost in the noise of seeds; more is not.
-constexpr double kIdleLoad = .5;
+// The system itself, and what wakes up now and then, is below it.
+constexpr double kIdleShare = .05;
 constexpr double kHeavySpread = 4;
 
 std::string plural(std::size_t n, const std::string& what) {
@@ -31,7 +31,7 @@ report::CurvePoint point_of(const CurveAt& at) {
 
 }  // namespace
 
-bool busy(const Machine& machine) { return std::max(machine.load_before, 0.) > kIdleLoad; }
+bool busy(const Machine& machine) { return machine.others > kIdleShare; }
 
 std::string clock_words(const Conditions& conditions) {
   if (conditions.clock == RaceClock::wall)
@@ -58,13 +58,12 @@ std::vector<std::string> paragraphs_before(const Results& results) {
                   report::given(c.time), limit, clock_words(c), plural(results.seeds, "seed"),
                   results.machine.words, results.machine.build));
   const Machine& m = results.machine;
-  if (m.load_before < 0)
-    out.push_back("How busy the machine was is not known.");
+  if (m.others < 0)
+    out.push_back("How busy the machine was with other things is not known.");
   else
     out.push_back(fmt::format(
-        "{} load average {:.2f} before and {:.2f} after, this comparison's own threads among the latter.",
-        busy(m) ? "The machine was busy with other things, too:" : "Nothing else ran:", m.load_before,
-        m.load_after));
+        "{} other programs and the system had {:.1f} % of its cores' time meanwhile.",
+        busy(m) ? "The machine was busy with other things, too:" : "Nothing else ran:", 100 * m.others));
   if (busy(m))
     out.push_back(
         c.clock == RaceClock::cpu

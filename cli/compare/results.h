@@ -14,9 +14,10 @@
 namespace ls::race {
 
 struct Machine {
-  std::string words;                       // "AMD EPYC, 2 of 8 cores"
-  double load_before = 0, load_after = 0;  // how many others wanted to run; see busy()
-  std::string build;                       // of ours
+  std::string words;  // "AMD EPYC, 2 of 8 cores"
+  double others =
+      -1;  // share of the machine's time on all cores that others had meanwhile; negative: not known
+  std::string build;  // of ours
 };
 // Whether others took so much of the machine that wall times say little.
 bool busy(const Machine& machine);

@@ -10,7 +10,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
 ADAPTERS=tests/bench/adapters
-clock=wall time=5 seeds=3 only= out=docs/benchmarks
+clock=wall time=4 seeds=3 only= out=docs/benchmarks
 [ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
 scenes=$1; shift
 while [ $# -ge 2 ]; do
@@ -22,6 +22,7 @@ while [ $# -ge 2 ]; do
 done
 [ $# -eq 0 ] || { echo "benchmarks.sh: $1 needs a value" >&2; exit 2; }
 
+status=0
 programs=()
 add_programs() {  # PACKAGE ADAPTER...
   local package=$1; shift
@@ -33,11 +34,12 @@ if [ "$only" != curves ]; then
   add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
   add_programs bpy cycles
   "$BIN/lightshaft" compare "$scenes"/*.xml --references "$scenes/refs" --integrators volpath "${programs[@]}" \
-    --time "$time" --seeds "$seeds" --clock "$clock" --report "$out/races"
+    --time "$time" --seeds "$seeds" --clock "$clock" --report "$out/races" || status=$?
 fi
 if [ "$only" != races ]; then
   bath=build/benchmarks/bath
   [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" >&2
-  "$BIN/lightshaft" compare "$scenes"/*.xml "$bath/bath.xml" --integrators volpath --size 96x64 \
-    --time 600 --spp 1024 --seeds "$seeds" --clock cpu --report "$out/curves"
+  "$BIN/lightshaft" compare "$scenes"/*.xml "$bath/bath.xml" --integrators volpath --size 72x48 \
+    --time 600 --spp 1024 --seeds "$seeds" --clock cpu --report "$out/curves" || status=$?
 fi
+exit $status
