@@ -64,7 +64,7 @@ double load_average() {
 }
 
 // proc(5): "cpu user nice system idle iowait irq softirq steal ...", in ticks, of all cores.
-Others::Times Others::now() {
+Others::Times Others::taken() {
   constexpr int kFields = 8, kIdle = 3, kWaiting = 4;
   std::ifstream file("/proc/stat");
   std::string name;
@@ -83,7 +83,7 @@ Others::Times Others::now() {
 }
 
 double Others::share() const {
-  const Times end = now();
+  const Times end = taken();
   const double total = end.total - start_.total;
   if (!(start_.total > 0) || !(total > 0)) return -1;
   return std::clamp((end.busy - start_.busy - (end.own - start_.own)) / total, 0., 1.);

@@ -17,7 +17,7 @@ double load_average();  // the kernel's, of a minute; negative: not known
 // How busy others are: counts from when it is made.
 class Others {
  public:
-  Others() : start_(now()) {}
+  Others() : start_(taken()) {}
   // Of the time of all cores: what neither this process nor the programs that it waited for had. Negative:
   // not known.
   double share() const;
@@ -26,7 +26,7 @@ class Others {
   struct Times {
     double total = 0, busy = 0, own = 0;  // seconds; total 0: not known
   };
-  static Times now();
+  static Times taken();
   Times start_;
 };
 
