@@ -5,7 +5,7 @@
 //
 // Each record has a revision, one more with every change. At open() both sides are compared, and the higher
 // revision wins: a machine that lost its disk gets its jobs back from Redis, a Redis that lost its memory
-// gets them from the disk. Rules of what is kept where: docs/decisions/0014-redis.md.
+// gets them from the disk. Rules of what is kept where: docs/decisions/0023-redis.md.
 //
 // Keys: lightshaft:jobs (set of ids), lightshaft:job:ID (hash: revision, record, points, log),
 // lightshaft:counters (hash), lightshaft:memory (a random word, to notice that Redis forgot).
