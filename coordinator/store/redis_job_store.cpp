@@ -145,12 +145,14 @@ class RedisJobStore final : public JobStore {
     tell_the_rest();
   }
 
-  // At the end; what stays untold is on the disk.
+  // At the end; what stays untold is on the disk. Tried twice: a connection that broke unnoticed fails the first.
   void tell_the_rest() {
-    for (bool more = true; more;) {
-      if (!tell_once()) return;
+    int failed = 0;
+    for (bool more = true; more && failed < 2;) {
+      const bool told = tell_once().has_value();
+      if (!told) ++failed;
       const std::lock_guard lock(mutex_);
-      more = !idle();
+      more = !told || !idle();
     }
   }
 

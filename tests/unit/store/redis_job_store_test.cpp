@@ -150,6 +150,19 @@ TEST_F(RedisStores, NoticeThatAnIdleRedisForgot) {
   EXPECT_TRUE(in_redis({"j-1"}));
 }
 
+TEST_F(RedisStores, TellAtTheEndThoughTheConnectionBrokeUnnoticed) {
+  for (int i = 0; i < 20; ++i) {
+    const JobId id{fmt::format("j-{}", i)};
+    auto store = open();
+    ASSERT_TRUE(store->put_job(sample_job(id.value)));
+    ASSERT_TRUE(eventually([&] { return in_redis(id).has_value(); }));
+    redis_.kill();
+    redis_.start();
+    store.reset();
+    EXPECT_TRUE(in_redis(id)) << i;
+  }
+}
+
 TEST_F(RedisStores, GoOnWithoutRedisAndTellItWhatItMissed) {
   const auto store = open();
   ASSERT_TRUE(store->put_job(sample_job("j-1")));
