@@ -26,6 +26,10 @@ class Mesh:
     def write(self, path):
         vertices = np.round(np.concatenate(self.vertices), 5) + 0.0  # + 0: no negative zeros
         triangles = np.concatenate(self.triangles)
+        # Where a surface closes to a point, half of its last quads have no area: as the file has them, in float32.
+        corners = vertices[:, :3].astype(np.float32).astype(np.float64)[triangles]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        triangles = triangles[areas > 0]
         properties = "".join(f"property float {p}\n" for p in ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
         head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{properties}"
                 f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n")

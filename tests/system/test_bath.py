@@ -52,6 +52,7 @@ def test_it_renders_without_a_sample_lost(bath, tmp_path):
     lightshaft("render", bath, "-o", tmp_path / "bath.exr", "--spp", 4, "--size", "24x18", "--strict", "--threads", 2, "--report", tmp_path / "r.json")
 
     assert load(tmp_path / "r.json")["nonfinite_samples"] == 0
+    assert load(tmp_path / "r.json")["health"]["clean"], "no triangle without area either"
     # Somewhere near the middle of the image; light comes from all sides, so that not all of 16 samples end in the dark.
     seen = [lightshaft("render", bath, "--size", "24x18", "--pixel", "12,9", "--sample", k).stdout for k in range(16)]
     assert any(float(v) > 0 for text in seen for v in text.split(":")[1].split()), seen
