@@ -25,8 +25,8 @@ AREAS = {
     "coordinator/limits.h": ["common"],
     "coordinator/service.h": ["common", "coordinator/domain"],
     "coordinator/store": COORDINATOR_BASE,
-    # It folds partials out of the store's log; a report tells of time in the same shape as a job's view.
-    "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store", "coordinator/views.h"],
+    # It folds partials out of the store's log.
+    "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store"],
     "coordinator/rpc": COORDINATOR_BASE + ["proto"],
     "coordinator/http": COORDINATOR_BASE + ["coordinator/views.h"],
     # What stands in coordinator/ itself wires domain, store and assembler into the service; it knows no network.
