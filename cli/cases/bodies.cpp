@@ -38,12 +38,7 @@ SceneKit cubes(const Way& way, double sigma_s, double g) {
           rotate_y(-turn) * rotate_z(-about) * scale(.5);
       const MediumIndex m = way.medium(kit, rgb(sigma_s), rgb(1), g, place * box({-1, -1, -1}, {1, 1, 1}));
       const double light = 16 * kGauss[i][1] * kGauss[j][1] * 4 / 1.5;
-      if (auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[m.value])) {
-        h->emission = rgb(light);
-      } else {
-        const VolumeIndex v = kit.constant(rgb(light));
-        std::get<HeterogeneousMedium>(kit.scene.media[m.value]).emission = v;
-      }
+      kit.glow(m, rgb(light));
       kit.container(CubeShape{}, place, kit.null(), m);
     }
   for (const double x : {-2., 0., 2.}) {

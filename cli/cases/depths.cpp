@@ -16,15 +16,6 @@ constexpr double kTenRoundings = 6e-7;
 
 constexpr Way kDistant{false, true}, kDistantGrid{true, true}, kVolpath{false, false};
 
-void glow(SceneKit& kit, MediumIndex m, double emission) {
-  if (auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[m.value])) {
-    h->emission = rgb(emission);
-  } else {
-    const VolumeIndex v = kit.constant(rgb(emission));
-    std::get<HeterogeneousMedium>(kit.scene.media[m.value]).emission = v;
-  }
-}
-
 // (1 - e^-x) / x.
 double phi(double x) { return x == 0 ? 1 : -std::expm1(-x) / x; }
 
@@ -48,7 +39,7 @@ void emission(Table& t) {
               "A unit of a medium that absorbs this little gives off eps (1 - e^-tau) / sigma.",
               [=](const Bench& b) {
                 SceneKit kit = unit_cube(way, rgb(tau));
-                glow(kit, {0}, 1);
+                kit.glow(MediumIndex{0}, rgb(1));
                 return every_value(b, kit, 64, grey(phi(tau)), kTenRoundings);
               });
     }
@@ -57,7 +48,7 @@ void emission(Table& t) {
              "Light given off without extinction is eps d; at depth it is eps / sigma.",
              [=] {
                SceneKit kit = unit_cube(way, rgb(tau));
-               glow(kit, {0}, 1);
+               kit.glow(MediumIndex{0}, rgb(1));
                return kit;
              },
              grey(phi(tau)), {.band = 1e-4});

@@ -215,12 +215,7 @@ void cut_in_pieces(Table& t) {
               "Light given off without extinction, summed up over pieces: the whole length.",
               [=](const Bench& b) {
                 SceneKit kit = unit_cube(way, rgb(0));
-                if (auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[0])) {
-                  h->emission = rgb(1);
-                } else {
-                  const VolumeIndex one = kit.constant(rgb(1));
-                  std::get<HeterogeneousMedium>(kit.scene.media[0]).emission = one;
-                }
+                kit.glow(MediumIndex{0}, rgb(1));
                 cut(kit, pieces);
                 return every_value(b, kit, 4, grey(1), tolerance);
               });

@@ -71,12 +71,7 @@ void cameras_at_a_boundary(Table& t) {
               "A camera just outside and just inside of a shining medium: the way that is left of it.",
               [=](const Bench& b) {
                 SceneKit kit = unit_cube(way, rgb(0));
-                if (auto* h = std::get_if<HomogeneousMedium>(&kit.scene.media[0])) {
-                  h->emission = rgb(1);
-                } else {
-                  const VolumeIndex one = kit.constant(rgb(1));
-                  std::get<HeterogeneousMedium>(kit.scene.media[0]).emission = one;
-                }
+                kit.glow(MediumIndex{0}, rgb(1));
                 if (x > 0) kit.scene.sensor.medium = MediumIndex{0};
                 kit.look({x, .5, .5}, {x + 1, .5, .5});
                 kit.scene.sensor.near_clip = 1e-9;

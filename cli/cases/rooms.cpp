@@ -65,11 +65,10 @@ SceneKit ball(bool grid, double sigma_s, double g) {
     m = kit.heterogeneous(
         kit.grid({7, 7, 7}, std::vector<float>(7 * 7 * 7, .5f), translate({-1, -1, -1}) * scale(2)), rgb(1),
         2 * sigma_s, g);
-    std::get<HeterogeneousMedium>(kit.scene.media[m.value]).emission = kit.constant(rgb(1));
   } else {
     m = kit.homogeneous(rgb(sigma_s), rgb(1), g);
-    std::get<HomogeneousMedium>(kit.scene.media[m.value]).emission = rgb(1);
   }
+  kit.glow(m, rgb(1));
   kit.container(SphereShape{}, {}, kit.null(), m);
   kit.look({0, -5, 0}, {0, 0, 0});
   kit.scene.sensor.projection = Projection::orthographic;

@@ -138,6 +138,14 @@ struct SceneKit {
     const VolumeIndex a = constant(albedo);
     return push<MediumTag>(scene.media, HeterogeneousMedium{sigma_t, a, scale, phase(g)});
   }
+  // Makes a medium, of either kind, give off this radiance per length.
+  void glow(MediumIndex medium, const Rgb& radiance) {
+    auto& made = scene.media[medium.value];
+    if (auto* grid = std::get_if<HeterogeneousMedium>(&made))
+      grid->emission = constant(radiance);
+    else
+      std::get<HomogeneousMedium>(made).emission = radiance;
+  }
   Shape& shape(const Geometry& g, const Transform& to_world, BsdfIndex bsdf) {
     Shape s;
     s.geometry = g;
