@@ -54,7 +54,7 @@ EventHub::~EventHub() {
   if (thread_.joinable()) thread_.join();
 }
 
-void EventHub::publish(std::string type, std::string data, std::string job) {
+void EventHub::publish(std::string type, std::string data, std::string job, std::string owner) {
   const std::lock_guard lock(state_->mutex);
   State& s = *state_;
   if (s.next_id >= s.reserved_end) {
@@ -63,7 +63,7 @@ void EventHub::publish(std::string type, std::string data, std::string job) {
       log_warn("", "cannot reserve event ids: " + first.error().message);
     s.reserved_end += limits::kEventIdBlock;
   }
-  s.kept.push_back({s.next_id++, std::move(type), std::move(data), std::move(job)});
+  s.kept.push_back({s.next_id++, std::move(type), std::move(data), std::move(job), std::move(owner)});
   if (s.kept.size() > limits::kEventsKept) s.kept.pop_front();
   s.changed.notify_all();
 }

@@ -23,7 +23,7 @@ class EventHub {
   explicit EventHub(Reserve reserve);
   ~EventHub();
 
-  void publish(std::string type, std::string data, std::string job);
+  void publish(std::string type, std::string data, std::string job, std::string owner = {});
   // Listeners are called after publish() returns, from the hub's thread. Once the handle is gone no call is
   // under way (unless it is destroyed by its own callback). The handle may outlive the hub.
   std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event);

@@ -133,6 +133,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   Intake intake;
   StoredJob& job = intake.job;
   job.name = request.scene_name.substr(0, limits::kMaxNameBytes);
+  job.owner = request.owner;
   for (const auto& d : read->warnings)
     if (job.warnings.size() < limits::kMaxWarnings) job.warnings.push_back(format_diagnostic(d));
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
@@ -196,6 +197,13 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
+// A world is not smaller than the files that it is made of; who knows better says so.
+std::uint64_t memory_need(const StoredJob& job) {
+  std::uint64_t files = 0;
+  for (const BlobRef& file : job.assets) files += file.bytes;
+  return std::max(files, job.spec.memory.value_or(0));
+}
+
 JobPlan plan_of(const StoredJob& job) {
   JobPlan plan;
   plan.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets, job.needs};
@@ -205,7 +213,12 @@ JobPlan plan_of(const StoredJob& job) {
   plan.time = job.spec.time;
   plan.priority = job.spec.priority;
   plan.tags = job.spec.tags;
+  plan.owner = job.owner;
   plan.replay = replay_of(job);
+  if (const auto frame = frame_of(job.id)) plan.group = frame->sequence.value;
+  plan.max_workers = job.spec.max_workers.value_or(0);
+  plan.max_units = job.spec.max_units.value_or(0);
+  plan.memory_bytes = memory_need(job);
   return plan;
 }
 

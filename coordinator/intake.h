@@ -36,6 +36,9 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
 
 std::string replay_of(const StoredJob& job);
 
+// Bytes of memory that a worker must have for it, at least.
+std::uint64_t memory_need(const StoredJob& job);
+
 // The farm's view of a stored job.
 JobPlan plan_of(const StoredJob& job);
 

@@ -12,6 +12,7 @@ namespace ls::coordinator::limits {
 // ---- blobs ----
 inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;   // one file of a scene: 64 GiB
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // in one read()
+inline constexpr std::size_t kMaxUnfinishedUploads = 1024;               // kept to be gone on with
 inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
 
 // ---- submission ----
@@ -19,7 +20,8 @@ inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
 inline constexpr std::size_t kMaxAssets = 100'000;  // named by one request
 inline constexpr std::size_t kMaxWarnings = 100;    // kept with a job
 inline constexpr std::size_t kMaxNameBytes = 256;   // of a job or worker
-inline constexpr std::size_t kMaxJobs = 100'000;
+inline constexpr std::size_t kMaxJobs = 100'000;        // frames count, each
+inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // of those
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;
@@ -37,10 +39,11 @@ inline constexpr std::size_t kFramesPerEvent = 2500;  // a sequence of more tell
 // ---- results ----
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg
 inline constexpr std::uint32_t kMaxSegments = 1u << 20;
-inline constexpr std::size_t kMaxResultsWaiting = std::size_t{256}
-                                                  << 20;  // bytes not yet durable; then receive() waits
-inline constexpr std::size_t kMaxPendingPartials = std::size_t{1}
-                                                   << 30;  // decoded, waiting for an earlier round; then
+// Of all jobs together. With them an UHD film of 8.3 million pixels, 48 bytes each, stays below 600 MB.
+inline constexpr std::size_t kMaxResultsWaiting = std::size_t{32}
+                                                  << 20;  // bytes not yet durable; then streams are not read
+inline constexpr std::size_t kMaxPendingPartials = std::size_t{32}
+                                                   << 20;  // decoded, waiting for an earlier round; then
                                                            // they are read again from the segments
 inline constexpr std::size_t kMaxCommitBatch = 256;        // results that share one fdatasync
 inline constexpr int kVerifyThreads = 2;

@@ -8,57 +8,39 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
+#include <variant>
 
 #include "common/base/clock.h"
+#include "common/base/digest.h"
 #include "common/base/log.h"
 #include "coordinator/http/api.h"
 #include "coordinator/http/server.h"
+#include "coordinator/http/throttle.h"
+#include "coordinator/http/tls_identity.h"
 #include "coordinator/http/token_file.h"
+#include "coordinator/options.h"
 #include "coordinator/rpc/server.h"
 #include "coordinator/service.h"
+#include "coordinator/tls/tls_files.h"
+#include "coordinator/webhooks/webhooks.h"
 
 namespace {
 
 using ls::Errc;
 using ls::fail;
 using ls::Result;
+using ls::coordinator::Flags;
 namespace fs = std::filesystem;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
-
-struct Flags {
-  std::string http = "127.0.0.1:8080";
-  std::string grpc = "127.0.0.1:50051";
-  std::string data = "lightshaft-data";
-  std::string store = "sqlite";
-  ls::http::Limits limits;
-};
-
-// How the HTTP door treats slow and greedy clients: for the config file, where an operator may need it and
-// tests do.
-void add_limits(CLI::App& app, ls::http::Limits& limits) {
-  const auto hidden = [&app](const char* name, auto& value, double least) {
-    app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
-  };
-  hidden("--http-header-seconds", limits.header_seconds, 0.01);
-  hidden("--http-idle-seconds", limits.idle_seconds, 0.01);
-  hidden("--http-body-grace-seconds", limits.body_grace_seconds, 0.01);
-  hidden("--http-min-rate", limits.min_rate, 1);
-  hidden("--http-heartbeat-seconds", limits.heartbeat_seconds, 0.01);
-  hidden("--http-linger-seconds", limits.linger_seconds, 0);
-  hidden("--http-stop-seconds", limits.stop_seconds, 0);
-  hidden("--http-connections", limits.connections, 1);
-  hidden("--http-event-streams", limits.event_streams, 1);
-  hidden("--http-event-queue", limits.event_queue, 1);
-  hidden("--http-blob-bytes", limits.blob_bytes, 1);
-  hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
-}
 
 // Held for the life of the process: two coordinators on one folder would destroy each other's work.
 Result<int> lock_folder(const fs::path& folder) {
@@ -107,6 +89,60 @@ void keep_freed_memory() {
   ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
 }
 
+fs::path secrets_of(const Flags& flags) { return flags.secrets.empty() ? flags.data : flags.secrets; }
+
+// Nothing: no TLS was asked for.
+Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
+  const bool brought = !flags.tls_ca.empty();
+  if (!brought && !flags.tls) return std::nullopt;
+  auto texts = brought ? ls::tls::read_files(flags.tls_ca, flags.tls_cert, flags.tls_key)
+                       : ls::tls::make_files(secrets_of(flags) / "tls", flags.tls_names,
+                                             ls::http::system_unix_clock()());
+  if (!texts) return tl::unexpected(texts.error());
+  return std::move(*texts);
+}
+
+// Off this machine, what is not encrypted can be read and changed on the way, tokens first.
+void warn_of_open_lines(const std::string& address, std::string_view what) {
+  const std::string host = address.substr(0, address.rfind(':'));
+  if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
+    ls::log_warn("", fmt::format("{} on {} is not encrypted: use --tls unless the network is yours alone",
+                                 what, address));
+}
+
+std::string with_port(const std::string& address, int port) {
+  return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
+}
+
+// The receivers are the operator's alone; what they are told is signed with DIR/webhook-secret.
+Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinator::Coordinator& coordinator,
+                                                                  const Flags& flags, const fs::path& data) {
+  if (flags.webhooks.empty()) return nullptr;
+  auto secret = ls::http::read_or_make_token(data / "webhook-secret");
+  if (!secret) return tl::unexpected(secret.error());
+  const auto unix_time = [] {
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  };
+  return ls::coordinator::Webhooks::start(coordinator, {flags.webhooks, *secret, data / "webhooks",
+                                                        std::make_shared<ls::SystemClock>(), unix_time});
+}
+
+// As many wrong join tokens of an address as HTTP takes of other ones.
+ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
+  const double a_minute = limits.wrong_tokens_per_minute;
+  const auto throttle =
+      std::make_shared<ls::http::Throttle>(ls::http::Pace{}, ls::http::Pace{a_minute / 60, std::max(1.0, a_minute)});
+  const auto name_of = [](std::string_view token) { return ls::sha256(token).hex(); };
+  const auto now = ls::http::system_unix_clock();
+  return {[=](const std::string& address, std::string_view token) {
+            return throttle->may_try(ls::http::Throttle::group_of(address), name_of(token), now());
+          },
+          [=](const std::string& address, std::string_view token, bool right) {
+            const std::string group = ls::http::Throttle::group_of(address);
+            right ? throttle->succeeded(group, name_of(token), now()) : throttle->failed(group, now());
+          }};
+}
+
 sigset_t block_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -126,39 +162,81 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   if (auto lock = lock_folder(data); !lock) return tl::unexpected(lock.error());
   std::error_code ignored;
   fs::remove(data / "ports.json", ignored);
-  auto token = ls::http::read_or_make_token(data / "token");
-  if (!token) return tl::unexpected(token.error());
-  auto join_token = ls::http::read_or_make_token(data / "join-token");
-  if (!join_token) return tl::unexpected(join_token.error());
+  const fs::path secrets = secrets_of(flags);
+  fs::create_directories(secrets, ignored);
+  std::optional<ls::http::FolderLock> others(secrets);  // that begin with the same folder at the same time
+  auto tokens = ls::http::TokenBook::open(secrets);
+  if (!tokens) return tl::unexpected(tokens.error());
+  const auto tls = tls_of(flags);
+  if (!tls) return tl::unexpected(tls.error());
+  others.reset();
+  if (flags.shared && flags.secrets.empty())
+    ls::log_warn("", "tokens that are made here are known to this coordinator alone: give all that share this store the "
+                     "same --secrets folder");
+  std::shared_ptr<const ls::http::TlsIdentity> identity;
+  if (*tls) {
+    auto made = ls::http::TlsIdentity::make((*tls)->cert, (*tls)->key);
+    if (!made) return tl::unexpected(made.error());
+    identity = std::move(*made);
+  } else {
+    warn_of_open_lines(flags.http, "HTTP");
+    warn_of_open_lines(flags.grpc, "the workers' port");
+  }
+  const auto may_join = [book = tokens->get()](std::string_view token) { return book->may_join(token); };
 
   ls::coordinator::Coordinator::Options options;
   options.data = data;
   options.store = flags.store;
-  options.join_token = *join_token;
+  options.may_join = may_join;
+  options.blobs_at = flags.blobs;
+  options.shared = flags.shared;
+  if (flags.keep_unused_hours)
+    options.keep_unused = ls::from_seconds(*flags.keep_unused_hours * 3600);
+  else if (!flags.blobs.empty())
+    options.keep_unused.reset();
+  options.limits = flags.shares;
+  options.audit_rate = flags.audit_percent / 100;
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
   auto coordinator = ls::coordinator::Coordinator::open(std::move(options));
   if (!coordinator) return tl::unexpected(coordinator.error());
 
-  ls::coordinator::GrpcServer grpc(**coordinator, *join_token);
-  const auto grpc_port = grpc.start(flags.grpc);
+  auto webhooks = start_webhooks(**coordinator, flags, data);
+  if (!webhooks) return tl::unexpected(webhooks.error());
+  ls::coordinator::GrpcServer grpc(**coordinator, may_join, guard_of(flags.limits));
+  std::optional<ls::coordinator::GrpcServer::Tls> grpc_tls;
+  if (*tls) grpc_tls = {(*tls)->ca, (*tls)->cert, (*tls)->key};
+  const auto grpc_port = grpc.start(flags.grpc, grpc_tls);
   if (!grpc_port) return tl::unexpected(grpc_port.error());
   ls::http::Limits limits = flags.limits;
   limits.spool = data / "spool";
-  ls::http::Api api(**coordinator, *token, limits, ls::http::StaticFiles(ls::http::embedded_files()));
-  (*http)->start(api);
+  ls::http::Api api(**coordinator, **tokens, limits, ls::http::StaticFiles(ls::http::embedded_files()),
+                    identity != nullptr);
+  if (*webhooks)
+    api.webhooks([&hooks = **webhooks] {
+      const auto f = hooks.figures();
+      return ls::http::WebhookFigures{f.delivered, f.failed_attempts, f.given_up, f.waiting};
+    });
+  (*coordinator)
+      ->announce(flags.public_http.empty()
+                     ? (identity ? "https://" : "http://") + with_port(flags.http, (*http)->port())
+                     : flags.public_http,
+                 flags.public_grpc.empty() ? with_port(flags.grpc, *grpc_port) : flags.public_grpc);
+  (*http)->start(api, identity);
   if (auto written = write_ports(data, (*http)->port(), *grpc_port); !written) return written;
 
   const std::string host = flags.http.substr(0, flags.http.rfind(':'));
-  ls::log_info("", fmt::format("dashboard: http://{}:{}/ (token: {}); workers: port {} (token: {})",
+  ls::log_info("", fmt::format("dashboard: {}://{}:{}/ (token: {}); workers: port {} (token: {})",
+                               identity ? "https" : "http",
                                host == "0.0.0.0" || host == "[::]" ? "localhost" : host, (*http)->port(),
-                               (data / "token").string(), *grpc_port, (data / "join-token").string()));
+                               (secrets / "token").string(), *grpc_port, (secrets / "join-token").string()));
   int signal = 0;
   sigwait(&signals, &signal);
   ls::log_info("", fmt::format("{}: stopping", signal == SIGINT ? "SIGINT" : "SIGTERM"));
   fs::remove(data / "ports.json", ignored);
   (*http)->stop();
   grpc.stop();
+  webhooks->reset();
   coordinator->reset();
   ls::log_info("", "stopped");
   return {};
@@ -167,28 +245,10 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Flags flags;
-  CLI::App app("Cuts jobs into units, hands them to workers, and folds what they send into one exact image.",
-               "lightshaft-coordinator");
-  app.add_option("--http", flags.http, "ADDR:PORT of the HTTP interface and the dashboard; port 0: any")
-      ->capture_default_str();
-  app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any")
-      ->capture_default_str();
-  app.add_option("--data", flags.data, "folder for jobs, blobs, images and tokens")->capture_default_str();
-  app.add_option("--store", flags.store, "where jobs are kept: sqlite, or redis://[USER:PASSWORD@]HOST[:PORT][/DB]")
-      ->capture_default_str();
-  app.set_config("--config", "", "file with these options, one 'name = value' a line");
-  app.allow_config_extras(false);
-  add_limits(app, flags.limits);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kOk : kUsage;
-  }
-  if (const auto known = ls::coordinator::check_store(flags.store); !known) {
-    fmt::print(stderr, "lightshaft-coordinator: error: {}\n", known.error().message);
-    return kUsage;
-  }
+  const auto parsed = ls::coordinator::parse_flags(argc, argv);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& flags = std::get<Flags>(parsed);
+  ls::log_format(flags.log_format);
   raise_file_limit();
   keep_freed_memory();
   const sigset_t signals = block_signals();  // before any thread starts

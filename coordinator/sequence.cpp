@@ -141,6 +141,9 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   JobView v;
   v.id = facts.id;
   v.name = first.name;
+  v.owner = first.owner;
+  v.max_workers = first.max_workers;
+  v.max_units = first.max_units;
   v.state = sequence_state(frames);
   if (v.state == JobState::done) {
     const auto same = [&](const JobView& f) { return f.stopped == first.stopped; };

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <random>
 
 #include "common/base/log.h"
+#include "common/base/secret.h"
 #include "coordinator/service_impl.h"
-#include "coordinator/store/disk_blobs.h"
 #include "coordinator/store/memory_blobs.h"
+#include "coordinator/store/open_blobs.h"
 #include "coordinator/store/redis_job_store.h"
 
 namespace ls::coordinator {
@@ -26,13 +28,25 @@ Result<void> check_store(const std::string& store) {
   return address ? Result<void>() : tl::unexpected(address.error());
 }
 
+JoinCheck join_check(std::string token) {
+  return [token = std::move(token)](std::string_view shown) { return token.empty() || equal_secret(shown, token); };
+}
+
 namespace {
 
-Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options) {
+Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options, const std::string& node) {
   if (auto known = check_store(options.store); !known) return tl::unexpected(known.error());
   auto local = open_sqlite_job_store(options.data / "jobs.sqlite");
   if (!local || options.store == "sqlite") return local;
-  return open_redis_job_store(std::move(*local), {.address = *parse_redis_url(options.store)});
+  RedisStoreOptions redis{.address = *parse_redis_url(options.store)};
+  if (options.shared) redis.node = node;
+  return open_redis_job_store(std::move(*local), std::move(redis));
+}
+
+// Which results are rendered again no worker may foresee.
+std::uint64_t random_number() {
+  std::random_device device;
+  return std::uint64_t{device()} << 32 | device();
 }
 
 }  // namespace
@@ -42,44 +56,51 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
 }
 
 Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
+  if (!options.may_join) options.may_join = join_check(options.join_token);
   if (!options.clock) options.clock = std::make_shared<SystemClock>();
   std::shared_ptr<BlobStore> blobs = options.blobs;
-  std::unique_ptr<JobStore> store;
+  std::shared_ptr<JobStore> store = options.jobs;
   File lock;
   if (options.data.empty()) {
     if (!blobs) blobs = std::make_shared<MemoryBlobs>();
-    store = make_memory_job_store();
+    if (!store) store = make_memory_job_store();
   } else {
     if (auto made = make_folder(options.data / "jobs"); !made) return tl::unexpected(made.error());
     auto locked = lock_folder(options.data);
     if (!locked) return tl::unexpected(locked.error());
     lock = std::move(*locked);
-    auto opened = open_store(options);
-    if (!opened) return tl::unexpected(opened.error());
-    store = std::move(*opened);
+    const auto node = node_id(options.data);
+    if (!node) return tl::unexpected(node.error());
+    if (!store) {
+      auto opened = open_store(options, *node);
+      if (!opened) return tl::unexpected(opened.error());
+      store = std::move(*opened);
+    }
     if (!blobs) {
-      auto disk = DiskBlobs::open(options.data / "blobs");
-      if (!disk) return tl::unexpected(disk.error());
-      blobs = std::move(*disk);
+      auto kept = open_blobs(options.blobs_at, options.data, *node);
+      if (!kept) return tl::unexpected(kept.error());
+      blobs = std::move(*kept);
     }
   }
   const auto start = store->reserve("starts", 1);
   if (!start) return tl::unexpected(start.error());
+  auto collected = std::make_shared<CollectedBlobs>(std::move(blobs), options.clock,
+                                                    options.keep_unused);
   std::unique_ptr<Service> service(
-      new Service(std::move(options), std::move(blobs), std::move(store), std::move(lock), *start + 1));
+      new Service(std::move(options), std::move(collected), std::move(store), std::move(lock), *start + 1));
   if (auto restored = service->restore(); !restored) return tl::unexpected(restored.error());
   service->start_threads();
   return service;
 }
 
-Service::Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store,
+Service::Service(Options options, std::shared_ptr<CollectedBlobs> blobs, std::shared_ptr<JobStore> store,
                  File lock, std::uint64_t start)
     : options_(std::move(options)),
       blobs_(std::move(blobs)),
       store_(std::move(store)),
       lock_(std::move(lock)),
       start_(start),
-      farm_(Farm::Options{lease_prefix()}),
+      farm_(Farm::Options{lease_prefix(), options_.limits, options_.audit_rate, random_number()}),
       last_epoch_(start << 32),
       hub_(std::make_unique<EventHub>([this](std::uint64_t n) { return store_->reserve("events", n); })) {}
 
@@ -96,6 +117,8 @@ void Service::start_threads() {
       for (auto& comparison : comparisons_.pop(1, token)) comparison();
   });
   if (!options_.tick) return;
+  if (on_disk())
+    threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
   threads_.emplace_back([this, every = *options_.tick](const std::stop_token& token) {
     std::mutex mutex;
     std::condition_variable_any woken;
@@ -123,7 +146,10 @@ Service::~Service() {
 }
 
 void Service::tick() {
+  look_for_moved_jobs();
   const std::lock_guard lock(mutex_);
+  for (const auto& [id, worker] : workers_)
+    if (worker.connection && worker.connection->open && worker.connection->held_back) run_locked(ResultsWait{id});
   run_locked(Tick{});
   for (const auto& [id, entry] : entries_)
     if (entry->progress_due) publish_progress_locked(*entry);

@@ -22,7 +22,10 @@
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
 #include "common/scene/read.h"
+#include "coordinator/domain/figures.h"
 #include "coordinator/domain/job_state.h"
+#include "coordinator/domain/farm_figures.h"
+#include "coordinator/domain/time_split.h"
 
 namespace ls::coordinator {
 
@@ -32,21 +35,6 @@ struct ErrorFigures {  // of the image as folded up to one complete round over a
   double rmse = 0;
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % interval for the realised error
-};
-// Where the time of a job went, in core seconds: of the workers, but for `merge`. What was counted since the
-// job was last stored is lost when the coordinator is killed; `render` never is.
-struct TimeSplit {
-  double load = 0;      // getting files
-  double build = 0;     // reading them, making worlds
-  double render = 0;    // CPU time of units: JobView::core_seconds
-  double transfer = 0;  // packing results
-  double merge = 0;     // of the coordinator: checking and folding results
-  double idle = 0;      // threads between two units of the job
-  void add(const TimeSplit& o) {
-    load += o.load, build += o.build, render += o.render;
-    transfer += o.transfer, merge += o.merge, idle += o.idle;
-  }
-  bool operator==(const TimeSplit&) const = default;
 };
 struct TrueFigures {  // against a reference, its own noise subtracted (common/image/reference.h)
   double rmse = 0, relmse = 0;
@@ -89,7 +77,8 @@ struct FramesView {
 
 struct JobView {
   JobId id;
-  std::string name;  // scene file name, for people
+  std::string name;   // scene file name, for people
+  std::string owner;  // user whose token handed it in; empty: the admin, or from before there were users
   JobState state = JobState::queued;
   std::string stopped;                 // "spp", "error", "time", "user" once done
   double progress = 0;                 // 0..1
@@ -108,6 +97,8 @@ struct JobView {
   FrameSize size;
   int tile = 32;
   int priority = 0;
+  std::optional<std::uint32_t> max_workers, max_units;  // asked
+  std::uint64_t memory_bytes = 0;                       // that a worker must have, at least
   std::uint64_t units_done = 0, units_total = 0;
   double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
   double elapsed_seconds = 0, core_seconds = 0;
@@ -134,6 +125,7 @@ struct TileView {
   PixelRect rect;
   RoundIndex rounds_folded = 0;
   std::uint64_t spp = 0;
+  std::optional<double> relmse;      // estimated; nothing: no sample yet
   std::vector<std::string> workers;  // names of those rendering it now
 };
 
@@ -150,6 +142,7 @@ struct WorkerView {
   std::uint64_t units_done = 0;
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
+  std::uint64_t memory_bytes = 0;  // that it may use; 0: not told
   double last_seen_seconds = 0;  // ago
 };
 
@@ -160,6 +153,7 @@ struct StreamEvent {
   std::string data;
   std::string
       job;  // id of the job that a `job` or `tile` event is about; empty: of no one job, told to every reader
+  std::string owner = {};  // of that job; of a `worker` event that of the job it works on
 };
 
 struct SubmitRequest {
@@ -167,6 +161,7 @@ struct SubmitRequest {
   std::string scene_text;                // Mitsuba or Nori XML
   std::map<std::string, Digest> assets;  // the files it may name; their blobs must be in the store
   JobSpec spec;
+  std::string owner = {};  // JobView::owner
 };
 struct Rejected {
   Error error;
@@ -200,6 +195,8 @@ class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
+  // The same, where it matters why not: an error says that it cannot be found out now.
+  virtual Result<bool> find(const Digest& digest) const { return has(digest); }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
@@ -212,6 +209,22 @@ class BlobStore {
     virtual Result<void> finish() = 0;
   };
   virtual Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) = 0;
+
+  // ---- uploads in parts ----
+  // How many bytes are kept of a blob that is not complete.
+  virtual std::uint64_t received(const Digest&) const { return 0; }
+  // Goes on behind those; failed_precondition: `offset` is not received(). What has been appended stays when the
+  // upload is destroyed before finish(), also over restarts. From now on an earlier upload in parts of the same
+  // blob is refused: its connection has broken, and only nobody noticed yet.
+  virtual Result<std::unique_ptr<Upload>> resume_upload(const Digest&, std::uint64_t) {
+    return fail(Errc::unavailable, "this store takes no uploads in parts");
+  }
+
+  // ---- collection of what nobody needs ----
+  // All there is: blobs, or (unfinished) what is kept of incomplete ones.
+  virtual Result<std::vector<Digest>> list(bool) const { return std::vector<Digest>{}; }
+  virtual Result<void> remove(const Digest&) { return {}; }
+  virtual void remove_unfinished(const Digest&) {}
 };
 
 // Of a store of jobs that tells another one (Redis) what it keeps.
@@ -221,16 +234,40 @@ struct StoreStatus {
   std::uint64_t behind = 0;  // jobs of which it has not been told all
 };
 
+// The coordinator that has a job, of those that share a store.
+struct Elsewhere {
+  std::string http;    // http://HOST:PORT; empty: not known
+  bool alive = false;  // false: the job will be taken over, or has ended there
+};
+
 // Whether --store can be taken: sqlite, or a redis:// address.
 Result<void> check_store(const std::string& store);
+// Whether --blobs can be taken: a folder, or an s3:// address with keys in the environment.
+Result<void> check_blobs(const std::string& where);
+
+// Whether a worker that shows this token may join. Any thread; must not block.
+using JoinCheck = std::function<bool(std::string_view token)>;
+// Of one token; an empty one lets every worker in.
+JoinCheck join_check(std::string token);
+
+class JobStore;  // store/job_store.h
 
 class Coordinator {
  public:
   struct Options {
     std::filesystem::path data;        // empty: everything in memory, nothing survives (`lightshaft render`)
     std::string store = "sqlite";      // where jobs are kept: sqlite, or a redis:// address (store/redis_link.h)
-    std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made under `data`
+    std::shared_ptr<JobStore> jobs;    // given for tests; otherwise made as `store` says
+    std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made as `blobs_at` says
+    std::string blobs_at;              // empty: under `data`; else a folder, or an s3:// address
+    // How long a blob stays that no job needs and nobody asks for, and an unfinished upload that does not grow;
+    // nothing: blobs for good, unfinished uploads for a day.
+    std::optional<Duration> keep_unused = std::chrono::hours(24);
+    bool shared = false;               // other coordinators have the same store and blobs
     std::string join_token;            // empty: any worker may join
+    JoinCheck may_join;                // given: asked instead
+    ShareLimits limits;
+    double audit_rate = 0.01;  // share of the results that another worker renders again
     std::shared_ptr<const Clock> clock;
     std::optional<Duration>
         tick;  // how often Tick events are raised by an own thread; nothing: the caller calls tick()
@@ -244,6 +281,11 @@ class Coordinator {
   virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
   virtual std::vector<JobView> jobs() const = 0;  // a sequence is one of them, its frames are not
   virtual Result<JobView> job(const JobId& id) const = 0;
+  virtual Result<std::string> owner(const JobId& id) const {  // JobView::owner, for less
+    const auto view = job(id);
+    if (!view) return tl::unexpected(view.error());
+    return view->owner;
+  }
   virtual Result<void> change(const JobId& id, const JobChange& change) = 0;
   // A job that has ended goes with all that was rendered of it; one that has not is cancelled, and stays.
   virtual Result<void> remove(const JobId& id) = 0;
@@ -259,6 +301,8 @@ class Coordinator {
   virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
   virtual Result<std::string> report_json(const JobId& id) const = 0;
   virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
+  // Where `name` (image.exr, report.json) of a job that is done lies on the disk; empty: it does not, ask for it.
+  virtual std::filesystem::path final_file(const JobId&, const std::string&) const { return {}; }
   virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
   virtual Result<std::string> job_log(const JobId& id) const = 0;
   virtual Result<void> wait(const JobId& id) const = 0;  // until it is done, failed or cancelled
@@ -278,7 +322,19 @@ class Coordinator {
   virtual BlobStore& blobs() = 0;
   virtual bool ready(std::string* why_not) const = 0;
   virtual StoreStatus store_status() const { return {}; }
+
+  // ---- other coordinators, with Options::shared ----
+  // Where they, workers and clients reach this one: http://HOST:PORT and HOST:PORT.
+  virtual void announce(const std::string&, const std::string&) {}
+  // Who has a job that this one does not know; may wait for a second. Nothing: nobody.
+  virtual Result<std::optional<Elsewhere>> elsewhere(const JobId&) { return std::nullopt; }
+  virtual AuditFigures audits() const { return {}; }
+  virtual FarmFigures figures() const { return {}; }
+  virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // to a worker: to be counted
   virtual void tick() = 0;
+  // Removes blobs that no job needs, and unfinished uploads, whose time is over (Options::keep_unused). With
+  // Options::tick the coordinator does it by itself.
+  virtual void collect() {}
 };
 
 }  // namespace ls::coordinator

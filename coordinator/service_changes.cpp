@@ -88,6 +88,7 @@ Result<void> Service::become_locked(const EntryPtr& entry, JobState asked) {
     chores_.push([this, entry, number = last_final_] { finish(entry, number); });
   } else if (state == JobState::paused) {
     if (auto saved = save_pin_locked(*entry); !saved) return saved;
+    if (auto saved = save_barred_locked(); !saved) return saved;
     entry->trouble.clear();
     run_locked(JobResumed{id});
   }
@@ -149,11 +150,7 @@ Result<void> Service::set_target_locked(JobEntry& entry, double target_error) {
 
 Result<void> Service::wake_locked(JobEntry& entry) {
   if (!entry.dormant) return {};
-  auto log = PartialLog::open(folder(entry.stored.id));
-  if (!log) return tl::unexpected(log.error());
-  entry.log = std::move(*log);
-  load_folded(entry);
-  if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
+  if (auto loaded = load_locked(entry); !loaded) return loaded;
   auto restored = restored_locked(entry, JobState::done);
   if (!restored) return tl::unexpected(restored.error());
   entry.dormant = false;
@@ -197,7 +194,7 @@ Result<void> Service::remove(const JobId& id) {
   if (auto removed = store_->remove_job(id); !removed) return removed;
   std::erase(order_, id);
   drop_locked(entry);
-  hub_->publish("job", job_removed_json(id), id.value);
+  hub_->publish("job", job_removed_json(id), id.value, entry->stored.owner);
   return {};
 }
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 
 #include "common/base/log.h"
+#include "common/base/step.h"
 #include "coordinator/service_impl.h"
+#include "coordinator/store/audit_file.h"
 #include "coordinator/views.h"
 
 namespace ls::coordinator {
@@ -20,6 +22,23 @@ void Service::run_locked(Event first) {
   // Not in the middle: what a snapshot holds must have its convergence points before it in the keeper's
   // queue.
   for (const EntryPtr& entry : std::exchange(folded_, {})) snapshot_if_due_locked(entry);
+  for (const JobId& id : farm_.take_changed_audits()) keep_audits_locked(id);
+}
+
+void Service::keep_audits_locked(const JobId& id) {
+  const auto entry = find_locked(id);
+  if (!on_disk() || !entry || entry->removed) return;
+  std::string text = audits_text(farm_.open_audits(id));
+  if (text == entry->audits) return;
+  entry->audits = text;
+  chores_.push([this, entry, text = std::move(text)] {
+    {
+      const std::lock_guard lock(mutex_);
+      if (entry->removed) return;
+    }
+    if (const auto written = write_audits(folder(entry->stored.id), text); !written)
+      log_warn(fmt::format("job={}", entry->stored.id.value), "audits: " + written.error().message);
+  });
 }
 
 void Service::carry_out(const Effect& effect, Todo& todo) {
@@ -29,6 +48,7 @@ void Service::carry_out(const Effect& effect, Todo& todo) {
 void Service::on(const UnitsFreed& e, Todo&) {
   const auto entry = find_locked(e.job);
   if (!entry) return;
+  figures_.units_freed[e.why] += e.units.size();
   for (const UnitKey& unit : e.units) {
     const auto held = entry->leased.find({unit.tile, unit.round});
     if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
@@ -36,7 +56,7 @@ void Service::on(const UnitsFreed& e, Todo&) {
     hub_->publish("tile",
                   tile_event_json(e.job, unit.tile, entry->grid.rect(unit.tile), "free",
                                   round_range(unit.round).s0, e.worker.value),
-                  e.job.value);
+                  e.job.value, entry->stored.owner);
   }
 }
 
@@ -95,21 +115,26 @@ void Service::on(const Fold& e, Todo& todo) {
   todo.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   entry->stored.totals.time.merge += seconds(now() - begin);
   if (restoring_) return;
+  step("result-folded");
+  ++figures_.folded;
+  if (waiting->arrived != TimePoint{}) figures_.fold_lag_seconds += seconds(now() - waiting->arrived);
   hub_->publish(
       "tile",
       tile_event_json(e.unit.job, e.unit.tile, entry->grid.rect(e.unit.tile), "folded", e.samples.s1, ""),
-      e.unit.job.value);
+      e.unit.job.value, entry->stored.owner);
   publish_progress_locked(*entry);
   if (folded_.empty() || folded_.back() != entry) folded_.push_back(entry);
 }
 
 void Service::on(const DropUnwanted& e, Todo&) {
+  ++figures_.unwanted;
   log_debug(fmt::format("job={} tile={} round={} worker={}", e.unit.job.value, e.unit.tile, e.unit.round,
                         e.worker.value),
             "result dropped: " + e.why);
 }
 
 void Service::on(const DigestMismatch& e, Todo&) {
+  ++figures_.differing;
   const std::string text = fmt::format(
       "tile {} round {}: {} rendered {}, {} rendered {}: one of them has bad memory or lies", e.unit.tile,
       e.unit.round, e.first_worker.value, e.first.hex(), e.second_worker.value, e.second.hex());
@@ -139,7 +164,7 @@ Result<void> Service::save_pin_locked(JobEntry& entry) {
 // `done` is shown and stored when the final image is written: see finish().
 void Service::on(const JobStateChanged& e, Todo&) {
   const auto entry = find_locked(e.job);
-  if (!entry || e.to == JobState::done) return;
+  if (!entry || entry->removed || e.to == JobState::done) return;  // removed: it goes on elsewhere, or nowhere
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
   log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
@@ -188,6 +213,7 @@ void Service::on(const Checkpoint& e, Todo&) {
   chores_.push([this, id = e.job, point] {
     if (const auto added = store_->add_point(id, point); !added)
       log_error(fmt::format("job={}", id.value), added.error().message);
+    step("checkpoint-stored");
   });
   compare_locked(entry, e.rounds, error.spp);
 }
@@ -206,6 +232,10 @@ void Service::on(const JobFinished& e, Todo&) {
   if (entry->assembly) entry->stored.totals.health = entry->assembly->health().total();
   entry->clock_zero.reset();
   compare_last_locked(entry);
+  if (e.unaudited > 0)
+    log_job(e.job, fmt::format("{} results were to be rendered again by another worker, but nobody else of their "
+                               "numeric class was there: who rendered them is believed",
+                               e.unaudited));
   entry->finishing = ++last_final_;
   entry->leased.clear();
   if (entry->assembly) entry->assembly->forget_waiting();
@@ -261,7 +291,7 @@ void Service::publish_job_locked(JobEntry& entry) {
   entry.last_progress = now();
   if (restoring_) return;
   const JobView view = view_locked(entry);
-  hub_->publish("job", job_json(view), entry.stored.id.value);
+  hub_->publish("job", job_json(view), entry.stored.id.value, entry.stored.owner);
   if (const auto frame = frame_of(entry.stored.id)) {
     const bool changed = std::exchange(entry.last_state, view.state) != view.state;
     publish_sequence_locked(frame->sequence, changed && !unsaved_);

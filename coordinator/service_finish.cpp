@@ -5,10 +5,12 @@
 #include <algorithm>
 
 #include "common/base/log.h"
+#include "common/base/step.h"
 #include "common/image/final_image.h"
 #include "common/scene/serialize.h"
 #include "coordinator/intake.h"
 #include "coordinator/mattes.h"
+#include "coordinator/assemble/snapshot.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -19,11 +21,25 @@ std::string snapshot_format() { return fmt::format("1-{}", sizeof(TileError)); }
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
+constexpr TileIndex kTilesAtOnce = 64;  // of a snapshot, copied under the lock
+
+class ImageFile final : public ByteSink {
+ public:
+  explicit ImageFile(AtomicFile& file) : file_(file) {}
+  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override { return file_.write_at(at, bytes); }
+
+ private:
+  AtomicFile& file_;
+};
+
 }  // namespace
 
 // Not under the lock: mattes need the scene's names.
 Provenance Service::provenance_of(const StoredJob& job) const {
   const Health& health = job.totals.health;
+  const std::string note = job.stopped ? note_on(*job.stopped) : "";
+  std::string stopped = job.stopped ? std::string(to_string(*job.stopped)) : "";
+  if (!note.empty()) stopped += "; " + note;
   return {job.scene,
           canonical_json(job.settings),
           job.build,
@@ -31,7 +47,9 @@ Provenance Service::provenance_of(const StoredJob& job) const {
           job.settings.seed,
           job.totals.render_seconds,
           health.clean() ? "clean" : canonical_json(health),
-          mattes_of(job)};
+          mattes_of(job),
+          job.totals.core_seconds,
+          std::move(stopped)};
 }
 
 MatteManifests Service::mattes_of(const StoredJob& job) const {
@@ -74,22 +92,73 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   entry->snapshot_running = true;
   entry->assembly->folds_since_snapshot = 0;
   entry->last_snapshot = now();
-  chores_.push([this, entry, folded = folded_of(*entry)] {
-    if (const auto written = write_snapshot(entry, folded); !written)
-      log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+  chores_.push([this, entry] { take_snapshot(entry); });
+}
+
+// While the film goes on. A tile that is folded on after it was copied is folded again after a restart. What the
+// snapshot holds must have its convergence points in the store before it: they are in the keeper's queue by now, so
+// that the snapshot takes its place behind them.
+void Service::take_snapshot(const EntryPtr& entry) {
+  const auto done = [this, entry](const Result<void>& written) {
+    if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
     const std::lock_guard lock(mutex_);
     entry->snapshot_running = false;
+  };
+  auto file = copy_folded(entry);
+  if (!file) return done(tl::unexpected(file.error()));
+  chores_.push([this, entry, done, before = entry->snapshots,
+                file = std::make_shared<SnapshotFile>(std::move(*file))] {
+    std::unique_lock lock(mutex_);
+    const bool wanted = entry->assembly && !entry->removed && entry->snapshots == before;  // no later one is there
+    lock.unlock();
+    if (!wanted) return done({});
+    ++entry->snapshots;
+    const auto written = file->commit();
+    step("snapshot-written");
+    done(written);
   });
+}
+
+Result<SnapshotFile> Service::copy_folded(const EntryPtr& entry) {
+  const auto where = folder(entry->stored.id);
+  if (auto made = make_folder(where); !made) return tl::unexpected(made.error());  // nothing may have come of it
+  auto file = SnapshotFile::create(where / "film.snap", ".new", entry->grid, aovs_of(entry->stored.settings),
+                                   snapshot_format());
+  if (!file) return file;
+  for (TileIndex first = 0; first < entry->grid.count(); first += kTilesAtOnce) {
+    std::vector<TileSnapshot> tiles;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!entry->assembly || entry->removed) return fail(Errc::failed_precondition, "it has ended: no snapshot is needed");
+      for (TileIndex t = first; t < std::min(first + kTilesAtOnce, entry->grid.count()); ++t)
+        tiles.push_back(
+            snapshot_of(entry->assembly->film(), entry->assembly->errors(), entry->assembly->health(), t));
+    }
+    for (const TileSnapshot& tile : tiles)
+      if (auto written = file->add(tile); !written) return tl::unexpected(written.error());
+  }
+  if (auto sealed = file->finish(); !sealed) return tl::unexpected(sealed.error());
+  return file;
 }
 
 Service::Folded Service::folded_of(const JobEntry& entry) {
   return {entry.assembly->film(), entry.assembly->errors(), entry.assembly->health()};
 }
 
+// Of a film that nothing is folded into any more.
 Result<void> Service::write_snapshot(const EntryPtr& entry, const Folded& folded) {
-  if (auto made = make_folder(folder(entry->stored.id)); !made) return made;  // nothing may have come of it
-  return write_atomically(folder(entry->stored.id) / "film.snap",
-                          save_snapshot(folded.film, folded.errors, folded.health, snapshot_format()));
+  const auto where = folder(entry->stored.id);
+  if (auto made = make_folder(where); !made) return made;
+  auto file =
+      SnapshotFile::create(where / "film.snap", ".tmp", entry->grid, folded.film.aovs(), snapshot_format());
+  if (!file) return tl::unexpected(file.error());
+  for (TileIndex t = 0; t < entry->grid.count(); ++t)
+    if (auto added = file->add(snapshot_of(folded.film, folded.errors, folded.health, t)); !added) return added;
+  if (auto sealed = file->finish(); !sealed) return sealed;
+  ++entry->snapshots;
+  const auto written = file->commit();
+  step("snapshot-written");
+  return written;
 }
 
 Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
@@ -100,11 +169,22 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   return write_snapshot(entry, folded);
 }
 
+// Returns how many values the image cannot hold.
+Result<std::uint64_t> Service::write_image(const Film& film, const StoredJob& job) {
+  auto file = AtomicFile::create(folder(job.id) / "image.exr");
+  if (!file) return tl::unexpected(file.error());
+  ImageFile sink(*file);
+  const auto clamped = write_final_exr(film, provenance_of(job), job.spec.float_output, sink);
+  if (!clamped) return clamped;
+  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  step("image-written");
+  return clamped;
+}
+
 void Service::load_folded(JobEntry& entry) const {
   const bool keep = entry.stored.spec.target_error.has_value();
-  const auto bytes = read_file(folder(entry.stored.id) / "film.snap", std::uint64_t{1} << 40);
   const AovSet aovs = aovs_of(entry.stored.settings);
-  if (bytes) entry.assembly = load_snapshot(*bytes, entry.grid, keep, snapshot_format(), aovs);
+  entry.assembly = load_snapshot(folder(entry.stored.id) / "film.snap", entry.grid, keep, snapshot_format(), aovs);
   if (!entry.assembly) entry.assembly.emplace(entry.grid, keep, aovs);
 }
 
@@ -123,11 +203,10 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   if (on_disk()) {
     const auto written = [&]() -> Result<void> {
       const auto where = folder(facts.job.id);
-      const auto image = final_exr(film, provenance_of(facts.job), facts.job.spec.float_output);
-      if (!image) return tl::unexpected(image.error());
-      facts.clamped_values = image->clamped;
+      const auto clamped = write_image(film, facts.job);
+      if (!clamped) return tl::unexpected(clamped.error());
+      facts.clamped_values = *clamped;
       facts.pixels = pixels_sha256(film);
-      if (auto done = write_atomically(where / "image.exr", image->exr); !done) return done;
       if (auto done = write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
           !done)
         return done;
@@ -153,6 +232,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   entry->stored.totals.units = facts.job.totals.units;
   entry->stored.totals.units_planned = facts.job.totals.units_planned;
   persist_locked(*entry);
+  step("job-done");
   forget_locked(*entry);
   log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
            facts.job.name);

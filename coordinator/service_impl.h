@@ -30,11 +30,14 @@
 #include "coordinator/event_hub.h"
 #include "coordinator/limits.h"
 #include "coordinator/service.h"
+#include "coordinator/store/collected_blobs.h"
 #include "coordinator/store/job_store.h"
 #include "coordinator/store/partial_log.h"
 #include "coordinator/work_queue.h"
 
 namespace ls::coordinator {
+
+class SnapshotFile;
 
 inline constexpr const char* kRemovedExtension = ".removed";  // of the folder of a job that goes
 inline constexpr std::size_t kMaxChores = 4096;     // that wait for the disk; then results wait, too
@@ -52,9 +55,11 @@ struct JobEntry {
   bool dormant = false;         // has ended and is on the disk: the farm does not know it
   bool removed = false;         // by its user; nothing of it is stored any more
   bool pin_unsaved = false;     // its numeric class is not stored yet: no result of it may be
+  std::string audits;           // under way, as last told to the disk (store/audit_file.h)
   std::string broken;           // why it could not be taken up at the start
   std::uint64_t finishing = 0;  // number of the final image being made; 0: none
   bool snapshot_running = false;
+  std::uint64_t snapshots = 0;  // that were put at their place; the keeper's alone
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
   JobState last_state = JobState::queued;  // as published
@@ -81,6 +86,7 @@ struct Connection {
   Digest numeric_class;
   std::shared_ptr<WorkerSink> sink;
   bool open = true;                                        // under the service's lock
+  std::atomic<bool> held_back{false};                      // a result of its waits for room; its stream is not read
   std::shared_ptr<const std::atomic<bool>> service_lives;  // a session may outlive the service
   std::optional<std::uint64_t> first_lease;                // number of the first one assigned over it
 };
@@ -103,6 +109,7 @@ class Service final : public Coordinator {
   tl::expected<JobId, Rejected> submit(SubmitRequest request) override;
   std::vector<JobView> jobs() const override;
   Result<JobView> job(const JobId& id) const override;
+  Result<std::string> owner(const JobId& id) const override;
   Result<void> change(const JobId& id, const JobChange& change) override;
   Result<void> remove(const JobId& id) override;
   Result<void> cancel(const JobId& id) override;
@@ -125,10 +132,17 @@ class Service final : public Coordinator {
   std::shared_ptr<void> subscribe(std::uint64_t after_id,
                                   std::function<void(const StreamEvent&)> on_event) override;
   std::uint64_t last_event_id() const override;
+  std::filesystem::path final_file(const JobId& id, const std::string& name) const override;
   BlobStore& blobs() override { return *blobs_; }
   bool ready(std::string* why_not) const override;
   StoreStatus store_status() const override { return store_->status(); }
+  void announce(const std::string& http, const std::string& grpc) override;
+  Result<std::optional<Elsewhere>> elsewhere(const JobId& id) override;
+  AuditFigures audits() const override;
+  FarmFigures figures() const override;
+  void blob_sent(std::uint64_t bytes) override { blob_bytes_ += bytes; }
   void tick() override;
+  void collect() override;
 
   // ---- from sessions (service_workers.cpp) ----
   void receive(const std::shared_ptr<Connection>& from, FromWorker message, std::function<void()> next);
@@ -143,7 +157,9 @@ class Service final : public Coordinator {
     EntryPtr job;
     UnitHeader expected;
     bool duplicate = false;
+    bool barred = false;    // its worker has turned out to render wrong pixels
     std::size_t bytes = 0;  // of the budget
+    TimePoint at{};         // when it came
   };
   struct Checked {
     Arrived arrived;
@@ -151,19 +167,39 @@ class Service final : public Coordinator {
     double seconds = 0;  // that it took
   };
 
-  Service(Options options, std::shared_ptr<BlobStore> blobs, std::unique_ptr<JobStore> store, File lock,
+  Service(Options options, std::shared_ptr<CollectedBlobs> blobs, std::shared_ptr<JobStore> store, File lock,
           std::uint64_t start);
   void start_threads();
   Result<void> restore();
 
   // ---- restart (service_restore.cpp) ----
   EntryPtr make_entry(StoredJob stored) const;
-  Result<void> take_up_locked(JobEntry& entry, JobState state);
+  // `files`: whether all that the job needs is among the blobs.
+  Result<void> take_up_locked(JobEntry& entry, JobState state, const Result<void>& files);
   void set_aside_locked(JobEntry& entry, const Error& why);
   bool image_is_lost(const StoredJob& job) const;
   static void begin_again(StoredJob& job);
+  bool has_barred_locked(const JobEntry& entry) const;
+  // Opens the log and loads what is folded, without what barred workers have rendered.
+  Result<void> load_locked(JobEntry& entry);
+  void remove_strangers(const std::vector<StoredJob>& jobs) const;
   Result<void> files_are_there(const StoredJob& job) const;
   void remove_leftovers() const;
+
+  // ---- collection (service_collect.cpp) ----
+  std::optional<std::set<Digest>> needed_blobs() const;
+  void collect_loop(const std::stop_token& token);
+
+  // ---- several coordinators (service_shared.cpp) ----
+  void look_for_moved_jobs();
+  void let_go(const JobId& id);
+  void leave_sequence_locked(const EntryPtr& entry);
+  struct Inheritance {
+    JobStore::Inherited job;
+    TimePoint again{};  // not before
+  };
+  void take_over(Inheritance inheritance);
+  void heed_barred_locked(const std::vector<BarredWorker>& workers);
 
   // ---- sequences (service_sequence.cpp, service_sequence_views.cpp) ----
   tl::expected<JobId, Rejected> submit_sequence(const SubmitRequest& request);
@@ -183,6 +219,7 @@ class Service final : public Coordinator {
 
   // ---- changes (service_jobs.cpp, service_changes.cpp) ----
   JobId unused_id_locked() const;
+  Result<void> room_for_locked(const std::string& owner, std::size_t jobs) const;
   void drop_locked(const EntryPtr& entry);
   Result<EntryPtr> usable_locked(const JobId& id) const;
   Result<void> may_become_locked(const JobEntry& entry, JobState asked, bool extended) const;
@@ -207,7 +244,7 @@ class Service final : public Coordinator {
   void on(const UnitsFreed& e, Todo& todo);
   void on(const RecordUnit& e, Todo& todo);
   void on(const Fold& e, Todo& todo);
-  void on(const DropDuplicate&, Todo&) {}
+  void on(const DropDuplicate&, Todo&) { ++figures_.equal; }
   void on(const DropUnwanted& e, Todo& todo);
   void on(const DigestMismatch& e, Todo& todo);
   void on(const JobPinned& e, Todo& todo);
@@ -218,10 +255,14 @@ class Service final : public Coordinator {
   void on(const JobFailed& e, Todo& todo);
   void on(const WorkerStateChanged& e, Todo& todo);
   void on(const WorkerBlocked& e, Todo& todo);
+  void on(const WorkerDistrusted& e, Todo& todo);
+  void on(const TileDiscarded& e, Todo& todo);
   void on(const WorkerForgotten& e, Todo& todo);
+  void keep_audits_locked(const JobId& id);
   Result<WaitingPartial> partial_for_locked(JobEntry& entry, const Fold& e);
   void snapshot_if_due_locked(const EntryPtr& entry);
   bool persist_locked(JobEntry& entry);
+  Result<void> save_barred_locked();
   Result<void> save_pin_locked(JobEntry& entry);
   void log_job(const JobId& id, std::string text);
   double elapsed_locked(const JobEntry& entry) const;
@@ -241,6 +282,9 @@ class Service final : public Coordinator {
   static Folded folded_of(const JobEntry& entry);
   Result<void> write_snapshot(const EntryPtr& entry, const Folded& folded);
   Result<void> write_snapshot_now(const EntryPtr& entry);
+  void take_snapshot(const EntryPtr& entry);
+  Result<SnapshotFile> copy_folded(const EntryPtr& entry);
+  Result<std::uint64_t> write_image(const Film& film, const StoredJob& job);
   ReportFacts facts_locked(const JobEntry& entry) const;
   Provenance provenance_of(const StoredJob& job) const;
   MatteManifests mattes_of(const StoredJob& job) const;
@@ -283,8 +327,8 @@ class Service final : public Coordinator {
   TimePoint now() const { return options_.clock->now(); }
 
   Options options_;
-  std::shared_ptr<BlobStore> blobs_;
-  std::unique_ptr<JobStore> store_;
+  std::shared_ptr<CollectedBlobs> blobs_;
+  std::shared_ptr<JobStore> store_;
   File lock_;
   std::uint64_t start_;  // number of this start of the coordinator
 
@@ -297,9 +341,13 @@ class Service final : public Coordinator {
   std::set<EntryPtr>* unsaved_ = nullptr;  // while jobs change together: those to be stored after it
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
+  std::vector<BarredWorker> barred_unsaved_;  // found, and not stored yet: no result may be
+  std::vector<Inheritance> inherited_;        // to be taken over again later; under mutex_
   std::string store_trouble_;     // the last result that could not be stored
   std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
   bool restoring_ = false;
+  FarmFigures figures_;  // what is as it is now is filled in by figures()
+  std::atomic<std::uint64_t> blob_bytes_{0};
   std::uint64_t log_lines_left_out_ = 0;
   std::shared_ptr<std::atomic<bool>> alive_ = std::make_shared<std::atomic<bool>>(true);
 

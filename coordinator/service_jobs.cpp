@@ -11,9 +11,10 @@
 namespace ls::coordinator {
 namespace {
 
-JobId random_job_id() {
+// `wide`: where other coordinators give names, too, and cannot be asked.
+JobId random_job_id(bool wide) {
   std::random_device device;
-  return {fmt::format("j-{:08x}", device())};
+  return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
 }
 
 Rejected rejected(Error error) { return {std::move(error), {}}; }
@@ -21,13 +22,28 @@ Rejected rejected(Error error) { return {std::move(error), {}}; }
 }  // namespace
 
 JobId Service::unused_id_locked() const {
-  JobId id = random_job_id();
-  while (entries_.contains(id) || sequences_.contains(id)) id = random_job_id();
+  JobId id = random_job_id(options_.shared);
+  while (entries_.contains(id) || sequences_.contains(id)) id = random_job_id(options_.shared);
   return id;
+}
+
+// One user cannot take the places of all others.
+Result<void> Service::room_for_locked(const std::string& owner, std::size_t jobs) const {
+  if (entries_.size() + jobs > limits::kMaxJobs)
+    return fail(Errc::resource_exhausted,
+                fmt::format("{} jobs are kept already, and {} more are more than {}", entries_.size(), jobs, limits::kMaxJobs));
+  if (owner.empty()) return {};
+  const auto own = static_cast<std::size_t>(std::count_if(
+      entries_.begin(), entries_.end(), [&](const auto& entry) { return entry.second->stored.owner == owner; }));
+  if (own + jobs <= limits::kMaxJobsOfUser) return {};
+  return fail(Errc::resource_exhausted,
+              fmt::format("{} jobs of user {} are kept already, and {} more are more than {}: remove some that are done",
+                          own, owner, jobs, limits::kMaxJobsOfUser));
 }
 
 tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
   if (request.spec.frames) return submit_sequence(request);
+  const auto in_use = blobs_->in_use();
   auto intake = take_in(request, *blobs_);
   if (!intake) return tl::unexpected(std::move(intake.error()));
   if (const auto put = blobs_->put(intake->job.scene, std::as_bytes(std::span(intake->scene_json))); !put)
@@ -36,9 +52,7 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
   job.submitted_unix = unix_now();
 
   const std::lock_guard lock(mutex_);
-  if (entries_.size() >= limits::kMaxJobs)
-    return tl::unexpected(
-        rejected({Errc::resource_exhausted, fmt::format("{} jobs are kept already", entries_.size())}));
+  if (auto room = room_for_locked(job.owner, 1); !room) return tl::unexpected(rejected(room.error()));
   job.id = unused_id_locked();
   const EntryPtr entry = make_entry(std::move(job));
   if (on_disk()) {
@@ -52,7 +66,7 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
   if (const auto put = store_->put_job(entry->stored); !put) return tl::unexpected(rejected(put.error()));
   const JobId id = entry->stored.id;
   register_locked(entry);
-  log_info(fmt::format("job={} name={}", id.value, entry->stored.name), "submitted");
+  log_info(fmt::format("job={} name={}", id.value, log_value(entry->stored.name)), "submitted");
   log_job(id, "submitted");
   publish_job_locked(*entry);
   run_locked(JobSubmitted{plan_of(entry->stored)});
@@ -72,7 +86,7 @@ Result<void> Service::wait(const JobId& id) const {
   ended_.wait(lock, [&] {
     return std::all_of(awaited.begin(), awaited.end(), [&](const EntryPtr& entry) {
       const JobState state = shown_state(*entry);
-      return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+      return entry->removed || state == JobState::done || state == JobState::failed || state == JobState::cancelled;
     });
   });
   return {};

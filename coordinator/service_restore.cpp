@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <set>
-#include <tuple>
+#include <unordered_set>
 
 #include "common/base/log.h"
+#include "coordinator/domain/unit_table.h"
 #include "coordinator/intake.h"
 #include "coordinator/service_impl.h"
+#include "coordinator/store/audit_file.h"
 
 namespace ls::coordinator {
 
@@ -25,9 +27,19 @@ Service::EntryPtr Service::make_entry(StoredJob stored) const {
 Result<void> Service::restore() {
   const std::lock_guard lock(mutex_);
   remove_leftovers();
+  const auto barred = store_->barred();
+  if (!barred) return tl::unexpected(barred.error());
+  heed_barred_locked(*barred);
   auto jobs = store_->jobs();
   if (!jobs) return tl::unexpected(jobs.error());
+  remove_strangers(*jobs);
   restoring_ = true;
+  for (const StoredJob& job : *jobs)
+    for (const WorkerId& worker : job.distrusted) {  // of an earlier version
+      const BarredWorker known{worker, fmt::format("it rendered wrong pixels of job {}", job.id.value)};
+      heed_barred_locked({known});
+      if (auto kept = store_->bar(known); !kept) return kept;
+    }
   for (StoredJob& job : *jobs) {
     if (image_is_lost(job)) begin_again(job);
     const JobState state = job.state;
@@ -37,27 +49,21 @@ Result<void> Service::restore() {
     register_locked(entry);
     if (entry->stored.damaged)
       set_aside_locked(*entry, {Errc::internal, entry->stored.error});
-    else if (auto taken = take_up_locked(*entry, state); !taken)
+    else if (auto taken = take_up_locked(*entry, state, ended ? Result<void>() : files_are_there(entry->stored)); !taken)
       set_aside_locked(*entry, taken.error());
   }
   restoring_ = false;
   return {};
 }
 
-Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
+Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Result<void>& files) {
   const JobId& id = entry.stored.id;
   auto points = store_->points(id);
   if (!points) return tl::unexpected(points.error());
   entry.points = std::move(*points);
   if (entry.dormant) return {};
-  if (auto there = files_are_there(entry.stored); !there) return there;
-  if (on_disk()) {
-    auto log = PartialLog::open(folder(id));
-    if (!log) return tl::unexpected(log.error());
-    entry.log = std::move(*log);
-  }
-  load_folded(entry);
-  if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
+  if (!files) return files;
+  if (auto loaded = load_locked(entry); !loaded) return loaded;
   auto event = restored_locked(entry, state);
   if (!event) return tl::unexpected(event.error());
   if (auto sound = check_plan(event->plan); !sound) return sound;
@@ -75,10 +81,32 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state) {
   return {};
 }
 
+Result<void> Service::load_locked(JobEntry& entry) {
+  if (on_disk()) {
+    auto log = PartialLog::open(folder(entry.stored.id));
+    if (!log) return tl::unexpected(log.error());
+    entry.log = std::move(*log);
+  }
+  load_folded(entry);
+  // The snapshot may be from before a worker turned out to lie: all is folded again from the others' results.
+  if (has_barred_locked(entry))
+    entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(), aovs_of(entry.stored.settings));
+  if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
+  return {};
+}
+
+bool Service::has_barred_locked(const JobEntry& entry) const {
+  if (!entry.log) return false;
+  const auto& found = entry.log->found();
+  return std::any_of(found.begin(), found.end(),
+                     [&](const PartialLog::Entry& e) { return farm_.barred(e.record.worker); });
+}
+
 // A record from Redis can outlive the disk that had the pixels.
 bool Service::image_is_lost(const StoredJob& job) const {
+  std::error_code unknown;  // a folder that cannot be looked into is not lost
   return on_disk() && !job.damaged && job.state == JobState::done &&
-         !std::filesystem::exists(folder(job.id) / "image.exr");
+         !std::filesystem::exists(folder(job.id) / "image.exr", unknown) && !unknown;
 }
 
 // The same samples give the same bits, so that nothing but time is lost.
@@ -92,12 +120,15 @@ void Service::begin_again(StoredJob& job) {
 Result<void> Service::files_are_there(const StoredJob& job) const {
   std::vector<BlobRef> files = job.assets;
   files.push_back({job.scene, 0, job.name});
-  for (const BlobRef& file : files)
-    if (!blobs_->has(file.digest))
+  for (const BlobRef& file : files) {
+    const auto there = blobs_->find(file.digest);
+    if (!there) return tl::unexpected(there.error());
+    if (!*there)
       return fail(Errc::not_found,
                   fmt::format("its file '{}' ({}) is not among the blobs in --data; send the job again, or bring "
                               "the folder back",
                               file.name, file.digest.hex()));
+  }
   return {};
 }
 
@@ -123,9 +154,24 @@ void Service::remove_leftovers() const {
   if (!on_disk()) return;
   std::error_code error;
   std::vector<std::filesystem::path> left;
-  for (const auto& found : std::filesystem::directory_iterator(options_.data / "jobs", error))
-    if (found.path().extension() == kRemovedExtension) left.push_back(found.path());
+  for (std::filesystem::directory_iterator at(options_.data / "jobs", error), end; !error && at != end;
+       at.increment(error))
+    if (at->path().extension() == kRemovedExtension) left.push_back(at->path());
   for (const auto& path : left) std::filesystem::remove_all(path, error);
+}
+
+// Where others share the store: what is left of jobs that they have taken over. An image of before stays.
+void Service::remove_strangers(const std::vector<StoredJob>& jobs) const {
+  if (!on_disk() || !options_.shared) return;
+  std::set<std::string> known;
+  for (const StoredJob& job : jobs) known.insert(job.id.value);
+  std::vector<std::filesystem::path> strangers;
+  std::error_code error, none;
+  for (std::filesystem::directory_iterator at(options_.data / "jobs", error), end; !error && at != end;
+       at.increment(error))
+    if (!known.contains(at->path().filename().string()) && !std::filesystem::exists(at->path() / "image.exr", none))
+      strangers.push_back(at->path());
+  for (const auto& path : strangers) std::filesystem::remove_all(path, error);
 }
 
 Result<JobRestored> Service::restored_locked(JobEntry& entry, JobState state) {
@@ -138,6 +184,8 @@ Result<JobRestored> Service::restored_locked(JobEntry& entry, JobState state) {
   event.folded = entry.assembly->rounds_for(spp);
   if (entry.stored.spec.target_error) event.rel_error = entry.assembly->errors().relative();
   take_up_records(entry, event);
+  if (on_disk()) event.audits = read_audits(folder(entry.stored.id));
+  entry.audits = audits_text(event.audits);
   return event;
 }
 
@@ -146,18 +194,29 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  std::set<std::tuple<TileIndex, RoundIndex, std::uint64_t>> seen;
+  // Full ranges by their code alone, of which there may be millions; cut ones with their end.
+  std::unordered_set<UnitCode> seen;
+  std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
+  seen.reserve(entry.log->found().size());
+  const auto first_of = [&](const PartialRecord& r) {
+    const UnitCode code = unit_code(r.round, r.tile);
+    return r.samples == round_range(r.round) ? seen.insert(code).second
+                                             : seen_cut.emplace(code, r.samples.s1).second;
+  };
+  const auto not_seen = [&](const PartialRecord& r) {
+    seen.erase(unit_code(r.round, r.tile));
+    seen_cut.erase({unit_code(r.round, r.tile), r.samples.s1});
+  };
   for (const auto& [record, place] : entry.log->found()) {
-    if (record.tile >= entry.grid.count() ||
-        !seen.emplace(record.tile, record.round, record.samples.s1).second)
-      continue;
+    if (farm_.barred(record.worker)) continue;
+    if (record.tile >= entry.grid.count() || !first_of(record)) continue;
     const bool folded = record.round < event.folded[record.tile];
     if (!folded && record.samples == cut_range(record.round, spp)) {
       // What cannot be read is not accepted: it is rendered again, to the same bits.
       if (const auto readable = entry.log->read(place); !readable) {
         log_warn(fmt::format("job={} tile={} round={}", entry.stored.id.value, record.tile, record.round),
                  readable.error().message);
-        seen.erase({record.tile, record.round, record.samples.s1});
+        not_seen(record);
         continue;
       }
       entry.assembly->hold(record.tile, record.round, {std::nullopt, place, record.samples, record.digest, record.health});
@@ -165,8 +224,9 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
     }
     event.accepted.push_back({record.tile, record.round, record.samples, record.digest, record.worker});
     event.elapsed_seconds = std::max(event.elapsed_seconds, record.at_seconds);
-    totals.core_seconds += record.cpu_seconds;
-    entry.replay.emplace_back(record.at_seconds, record.cpu_seconds);
+    const double cpu = believed_seconds(record.cpu_seconds);
+    totals.core_seconds += cpu;
+    entry.replay.emplace_back(record.at_seconds, cpu);
     if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
   }
   std::sort(entry.replay.begin(), entry.replay.end());

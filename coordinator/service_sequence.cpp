@@ -40,6 +40,7 @@ Result<void> may_wake(double pixels) {
 
 tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& request) {
   const auto refuse = [](Error error) { return tl::unexpected(Rejected{std::move(error), {}}); };
+  const auto in_use = blobs_->in_use();
   auto taken = take_in_sequence(request, *blobs_);
   if (!taken) return tl::unexpected(std::move(taken.error()));
   for (const Intake& intake : *taken)
@@ -55,10 +56,7 @@ tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& requ
   taken->clear();
 
   const std::lock_guard lock(mutex_);
-  if (entries_.size() + jobs.size() > limits::kMaxJobs)
-    return refuse({Errc::resource_exhausted,
-                   fmt::format("{} jobs are kept already, and {} frames are too many beside them: at most {}",
-                               entries_.size(), jobs.size(), limits::kMaxJobs)});
+  if (const auto room = room_for_locked(request.owner, jobs.size()); !room) return refuse(room.error());
   const JobId id = unused_id_locked();
   for (std::size_t i = 0; i < jobs.size(); ++i) jobs[i].id = frame_job(id, numbers[i]);
   std::vector<std::shared_ptr<PartialLog>> logs(jobs.size());
@@ -115,7 +113,8 @@ void Service::publish_sequence_locked(const JobId& id, bool at_once) {
   sequence.progress_due = !at_once && seconds(now() - sequence.last_progress) < period;
   if (sequence.progress_due) return;
   sequence.last_progress = now();
-  hub_->publish("job", job_json(sequence_view_locked(id, sequence, false)), id.value);
+  hub_->publish("job", job_json(sequence_view_locked(id, sequence, false)), id.value,
+                sequence.frames.front()->stored.owner);
 }
 
 // ---- changes ----
@@ -276,7 +275,7 @@ Result<void> Service::remove_sequence_locked(const JobId& id, const Sequence& se
   sequences_.erase(id);
   std::erase(order_, id);
   for (const EntryPtr& frame : frames) drop_locked(frame);
-  hub_->publish("job", job_removed_json(id), id.value);
+  hub_->publish("job", job_removed_json(id), id.value, frames.front()->stored.owner);
   return {};
 }
 

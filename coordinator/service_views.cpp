@@ -32,6 +32,18 @@ Result<Service::EntryPtr> Service::entry_locked(const JobId& id) const {
               fmt::format("job {} is a sequence: say which of its frames {} is meant", id.value, frames));
 }
 
+Result<std::string> Service::owner(const JobId& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto sequence = sequences_.find(id);
+  if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;
+  if (const auto entry = find_locked(id)) return entry->stored.owner;
+  // A frame that is not there is refused as one of its sequence, with the frames that are.
+  const auto frame = frame_of(id);
+  const auto of = frame ? sequences_.find(frame->sequence) : sequences_.end();
+  if (of != sequences_.end()) return of->second.frames.front()->stored.owner;
+  return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+}
+
 // One that was taken up at the start: of another only the reason why not is known, and it may be removed.
 Result<Service::EntryPtr> Service::usable_locked(const JobId& id) const {
   auto entry = entry_locked(id);
@@ -68,12 +80,16 @@ void look_at_target(const JobEntry& entry, double target, int threads, Outlook& 
   out.core_seconds = forecast->core_seconds;
 }
 
+// Of samples: units of late rounds hold many times those of the first.
+double done_of(const StoredJob& job, double spp_done) {
+  return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
+}
+
 // Whichever of samples, target and time comes first.
-Outlook outlook(const JobEntry& entry, const JobFigures& f, double elapsed, int threads) {
+Outlook outlook(const JobEntry& entry, const JobFigures& f, double spp_done, double elapsed, int threads) {
   Outlook out;
   const double core_left = f.core_seconds_left;
-  if (entry.stored.spp && f.units_total > 0)
-    out.progress = static_cast<double>(f.units_done) / static_cast<double>(f.units_total);
+  out.progress = done_of(entry.stored, spp_done);
   if (threads > 0 && core_left > 0) {
     out.eta_seconds = core_left / threads;
     out.core_seconds = core_left;
@@ -95,6 +111,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   JobView v;
   v.id = job.id;
   v.name = job.name;
+  v.owner = job.owner;
   v.state = shown_state(entry);
   v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
   v.target_error = job.spec.target_error;
@@ -103,6 +120,9 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.size = job.settings.size;
   v.tile = job.settings.tile;
   v.priority = job.spec.priority;
+  v.max_workers = job.spec.max_workers;
+  v.max_units = job.spec.max_units;
+  v.memory_bytes = memory_need(job);
   v.elapsed_seconds = elapsed_locked(entry);
   v.core_seconds = job.totals.core_seconds;
   v.time = split_of(job.totals);
@@ -113,20 +133,20 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.spp_done = job.totals.spp_done;
   v.units_done = job.totals.units;
   v.units_total = std::max(job.totals.units, job.totals.units_planned);
-  if (v.units_total > 0) v.progress = static_cast<double>(v.units_done) / static_cast<double>(v.units_total);
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
   v.truth = last_truth(entry.points);
   v.few_hits = job.totals.few_hits;
   if (v.few_hits) v.judgement = judge(error_points(entry.points), job.totals.doubt);
   if (entry.assembly)
     v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
+  v.progress = done_of(job, v.spp_done);
   const auto figures = entry.dormant ? std::nullopt : farm_.job(job.id);
   if (figures) {
     v.spp = figures->spp;
     v.units_done = figures->units_done;
     v.units_total = figures->units_total;
     v.queued_core_seconds = figures->core_seconds_queued;
-    const Outlook out = outlook(entry, *figures, v.elapsed_seconds, farm_.threads_connected());
+    const Outlook out = outlook(entry, *figures, v.spp_done, v.elapsed_seconds, farm_.threads_connected());
     v.progress = out.progress;
     if (v.state == JobState::running || v.state == JobState::queued) {
       v.eta_seconds = out.eta_seconds;
@@ -197,6 +217,13 @@ Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
   return std::move(image->exr);
 }
 
+std::filesystem::path Service::final_file(const JobId& id, const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry = usable_locked(id);
+  if (!entry || !on_disk() || (*entry)->stored.state != JobState::done) return {};
+  return folder(id) / name;
+}
+
 Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposure) const {
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
@@ -253,7 +280,9 @@ Result<std::vector<TileView>> Service::tiles(const JobId& id) const {
   std::vector<TileView> all;
   const TileGrid& grid = shown->film.grid();
   for (TileIndex t = 0; t < grid.count(); ++t) {
-    all.push_back({t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), {}});
+    const TileError error = shown->film.error(t);
+    const auto relmse = error.samples > 0 ? std::optional(image_error(error).relmse) : std::nullopt;
+    all.push_back({t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), relmse, {}});
   }
   const auto entry = find_locked(id);
   if (!entry) return all;
@@ -293,8 +322,14 @@ WorkerView Service::view_locked(const WorkerId& id, const WorkerEntry& worker) c
   v.units_done = figures.units_done;
   v.cpu_seconds = worker.cpu_seconds;
   v.rss_bytes = worker.rss_bytes;
+  v.memory_bytes = worker.hello.memory_bytes;
   v.last_seen_seconds = std::max(0.0, seconds(now() - worker.last_seen));
   return v;
+}
+
+AuditFigures Service::audits() const {
+  const std::lock_guard lock(mutex_);
+  return farm_.audits();
 }
 
 std::vector<WorkerView> Service::workers() const {

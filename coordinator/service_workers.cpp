@@ -7,8 +7,8 @@
 #include <random>
 
 #include "common/base/log.h"
+#include "common/base/step.h"
 #include "common/base/overloaded.h"
-#include "common/base/secret.h"
 #include "common/protocol/limits.h"
 #include "coordinator/service_impl.h"
 #include "coordinator/views.h"
@@ -40,8 +40,8 @@ class Session final : public WorkerSession {
   std::shared_ptr<Connection> connection_;
 };
 
-Result<void> check_hello(const WorkerHello& hello, const std::string& join_token) {
-  if (!join_token.empty() && !equal_secret(hello.join_token, join_token))
+Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join) {
+  if (!may_join(hello.join_token))
     return fail(Errc::unauthenticated,
                 "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of "
                 "its data folder");
@@ -67,6 +67,14 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
+// Whoever names an id gets the stream of the worker that has it, so that one who comes back after a broken connection
+// goes on: nobody else may guess it.
+std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
+  std::random_device device;
+  const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
+  return fmt::format("w-{:x}-{:x}-{:012x}", start, number, secret);
+}
+
 // n of "PREFIX-n"; nothing for one of another start, whatever its number.
 std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& prefix) {
   const std::size_t dash = prefix.size();
@@ -81,14 +89,14 @@ std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& 
 
 Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello,
                                                         std::shared_ptr<WorkerSink> sink) {
-  if (auto ok = check_hello(hello, options_.join_token); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_hello(hello, options_.may_join); !ok) return tl::unexpected(ok.error());
   const std::lock_guard lock(mutex_);
   WorkerId id = hello.previous_id;
   const auto known = workers_.find(id);
   // An id that came with a copied folder belongs to the worker that has it.
   const bool taken = known != workers_.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken)
-    id.value = fmt::format("w-{:x}-{:x}", start_, last_epoch_ & 0xffffffff);
+    id.value = new_worker_id(start_, last_epoch_ & 0xffffffff);
   if (workers_.size() >= limits::kMaxWorkers && !workers_.contains(id))
     return fail(Errc::resource_exhausted,
                 fmt::format("{} workers are known; more are not taken", workers_.size()));
@@ -106,11 +114,13 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   }
   worker.hello = hello;
   worker.hello.join_token.clear();
+  worker.hello.blobs_held.clear();  // the farm keeps what it wants of them
   worker.connection = connection;
   worker.last_seen = now();
   connection->sink->send(Welcome{id, connection->epoch});
-  log_info(fmt::format("worker={} name={} epoch={}", id.value, hello.name, connection->epoch), "joined");
-  run_locked(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads, hello.tags});
+  log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch), "joined");
+  run_locked(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads, hello.tags,
+                          hello.memory_bytes, hello.blobs_held});
   return std::make_unique<Session>(*this, std::move(connection));
 }
 
@@ -186,11 +196,14 @@ void Service::on(const Send& e, Todo&) {
   Connection& connection = *found->second.connection;
   if (const auto* assign = std::get_if<AssignLease>(&e.message)) {
     const Lease& lease = assign->lease;
+    ++figures_.leases_granted;
+    figures_.units_lent += lease.units.size();
     if (!connection.first_lease) connection.first_lease = lease_number(lease.id, lease_prefix());
     found->second.last_job = lease.job;
     if (const auto entry = find_locked(lease.job)) note_leased_locked(*entry, lease, e.worker);
   }
   connection.sink->send(e.message);
+  if (std::holds_alternative<AssignLease>(e.message)) step("lease-sent");
 }
 
 void Service::note_leased_locked(JobEntry& entry, const Lease& lease, const WorkerId& worker) {
@@ -199,7 +212,7 @@ void Service::note_leased_locked(JobEntry& entry, const Lease& lease, const Work
     if (std::find(holders.begin(), holders.end(), worker) == holders.end()) holders.push_back(worker);
     hub_->publish("tile",
                   tile_event_json(lease.job, unit.tile, unit.rect, "leased", unit.samples.s0, worker.value),
-                  lease.job.value);
+                  lease.job.value, entry.stored.owner);
   }
 }
 
@@ -217,6 +230,50 @@ void Service::on(const WorkerBlocked& e, Todo&) {
   log_job(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
+// Stored beside the jobs, and for longer: after a restart, and in jobs that are extended then, nothing of this worker's
+// is taken up again. Until it is stored every job waits, since a restart would believe what is in its log.
+void Service::on(const WorkerDistrusted& e, Todo& todo) {
+  log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
+                        e.unit.round),
+            "barred: " + e.evidence);
+  barred_unsaved_.push_back({e.worker, e.evidence});
+  if (const auto saved = save_barred_locked(); !saved)
+    for (const auto& [id, entry] : entries_) {
+      if (entry->dormant || !entry->assembly) continue;
+      entry->trouble = saved.error().message;
+      todo.push_back(JobPaused{id});
+    }
+  log_job(e.unit.job, fmt::format("worker {} is barred: {}", e.worker.value, e.evidence));
+}
+
+Result<void> Service::save_barred_locked() {
+  while (!barred_unsaved_.empty()) {
+    if (const auto kept = store_->bar(barred_unsaved_.back()); !kept) {
+      store_trouble_ = kept.error().message;
+      log_error(fmt::format("worker={}", barred_unsaved_.back().worker.value), kept.error().message);
+      return fail(Errc::unavailable, fmt::format("that a worker is barred cannot be stored: {}; then resume the job",
+                                                 store_trouble_));
+    }
+    barred_unsaved_.pop_back();
+  }
+  return {};
+}
+
+void Service::heed_barred_locked(const std::vector<BarredWorker>& workers) {
+  for (const BarredWorker& one : workers) run_locked(WorkerBarred{one.worker, one.evidence});
+}
+
+void Service::on(const TileDiscarded& e, Todo&) {
+  const auto entry = find_locked(e.job);
+  if (!entry || !entry->assembly) return;
+  entry->assembly->discard(e.tile);
+  if (entry->truths) entry->truths->discard(e.tile);
+  log_job(e.job, fmt::format("tile {} is rendered again from its first round", e.tile));
+  if (restoring_) return;
+  hub_->publish("tile", tile_event_json(e.job, e.tile, entry->grid.rect(e.tile), "free", 0, ""), e.job.value,
+                entry->stored.owner);
+}
+
 void Service::on(const WorkerForgotten& e, Todo&) {
   workers_.erase(e.worker);
   hub_->publish("worker", worker_gone_json(e.worker), "");
@@ -227,7 +284,9 @@ void Service::publish_worker_locked(const WorkerId& id, bool at_once) {
   if (found == workers_.end()) return;
   if (!at_once && seconds(now() - found->second.last_event) < 1) return;
   found->second.last_event = now();
-  hub_->publish("worker", worker_json(view_locked(id, found->second)), "");
+  const WorkerView view = view_locked(id, found->second);
+  const auto job = find_locked(JobId{view.job});
+  hub_->publish("worker", worker_json(view), "", job ? job->stored.owner : "");
 }
 
 }  // namespace ls::coordinator

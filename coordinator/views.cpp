@@ -33,13 +33,15 @@ json to_value(const FramesView& v) {
 }
 
 json to_value(const TimeSplit& t) {
-  return {{"load", number(t.load)},         {"build", number(t.build)}, {"render", number(t.render)},
-          {"transfer", number(t.transfer)}, {"merge", number(t.merge)}, {"idle", number(t.idle)}};
+  json j;
+  for (const TimePart& part : kTimeParts) j[part.name] = number(t.*part.seconds);
+  return j;
 }
 
 json to_value(const JobView& v) {
   json j{{"id", v.id.value},
          {"name", v.name},
+         {"owner", v.owner},
          {"state", to_string(v.state)},
          {"stopped", text_or_null(v.stopped)},
          {"progress", number(v.progress)},
@@ -61,6 +63,9 @@ json to_value(const JobView& v) {
          {"time", to_value(v.time)},
          {"submitted_unix", number(v.submitted_unix)},
          {"health", json::parse(health_json(v.health, v.notes))}};
+  j["max_workers"] = v.max_workers ? json(*v.max_workers) : json();
+  j["max_units"] = v.max_units ? json(*v.max_units) : json();
+  j["memory_bytes"] = v.memory_bytes;
   const auto frame = frame_of(v.id);
   j["sequence"] = frame ? json(frame->sequence.value) : json();
   j["frame"] = frame ? json(frame->frame) : json();
@@ -73,7 +78,8 @@ json to_value(const JobView& v) {
                                   {"relmse", number(v.truth->relmse)},
                                   {"flip", v.truth->flip ? number(*v.truth->flip) : json()}}
                            : json();
-  j["verdict"] = v.judgement ? json{{"kind", to_string(v.judgement->kind)}, {"words", v.judgement->words}} : json();
+  j["verdict"] =
+      v.judgement ? json{{"kind", to_string(v.judgement->kind)}, {"words", v.judgement->words}} : json();
   j["few_hits"] = v.few_hits ? json(*v.few_hits) : json();
   return j;
 }
@@ -91,6 +97,7 @@ json to_value(const WorkerView& v) {
           {"units_done", v.units_done},
           {"cpu_seconds", number(v.cpu_seconds)},
           {"rss_bytes", v.rss_bytes},
+          {"memory_bytes", v.memory_bytes},
           {"last_seen_seconds", number(v.last_seen_seconds)}};
 }
 
@@ -116,12 +123,14 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
                    {"rect", {t.rect.x0, t.rect.y0, t.rect.x1, t.rect.y1}},
                    {"rounds", t.rounds_folded},
                    {"spp", t.spp},
+                   {"relmse", t.relmse ? number(*t.relmse) : json()},
                    {"workers", t.workers}});
   return dump(json{{"tiles", std::move(all)}});
 }
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
-  std::string csv = "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n";
+  std::string csv =
+      "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n";
   const auto or_nothing = [](const auto& truth, auto figure) {
     return truth ? fmt::format("{}", figure(*truth)) : std::string();
   };
@@ -148,6 +157,7 @@ std::string worker_gone_json(const WorkerId& worker) {
   return dump(json{{"id", worker.value}, {"state", "gone"}});
 }
 
+std::string job_moved_json(const JobId& job) { return dump(json{{"id", job.value}, {"state", "moved"}}); }
 std::string job_removed_json(const JobId& job) { return dump(json{{"id", job.value}, {"state", "removed"}}); }
 
 }  // namespace ls::coordinator

@@ -21,5 +21,6 @@ std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& r
                             std::uint64_t spp, std::string_view worker);
 std::string worker_gone_json(const WorkerId& worker);
 std::string job_removed_json(const JobId& job);  // of a `job` event, the last of this job
+std::string job_moved_json(const JobId& job);    // the same: another coordinator goes on with it
 
 }  // namespace ls::coordinator

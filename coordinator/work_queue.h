@@ -18,9 +18,11 @@ template <class T>
 class WorkQueue {
  public:
   void push(T item) {
-    const std::lock_guard lock(mutex_);
-    items_.push_back(std::move(item));
-    changed_.notify_all();
+    {
+      const std::lock_guard lock(mutex_);
+      items_.push_back(std::move(item));
+    }
+    filled_.notify_one();  // one item, one of those that wait: the others would find nothing
   }
   std::size_t size() const {
     const std::lock_guard lock(mutex_);
@@ -29,25 +31,29 @@ class WorkQueue {
   // Holds the caller back while more than `most` items wait. False: a stop was asked for.
   bool wait_for_room(std::size_t most, const std::stop_token& token) {
     std::unique_lock lock(mutex_);
-    return changed_.wait(lock, token, [&] { return items_.size() <= most; }) && !token.stop_requested();
+    ++held_back_;
+    const bool room = drained_.wait(lock, token, [&] { return items_.size() <= most; });
+    --held_back_;
+    return room && !token.stop_requested();
   }
   // Waits for at least one item; none: a stop was asked for.
   std::vector<T> pop(std::size_t most, const std::stop_token& token) {
     std::unique_lock lock(mutex_);
     std::vector<T> taken;
-    if (!changed_.wait(lock, token, [&] { return !items_.empty(); }) || token.stop_requested()) return taken;
+    if (!filled_.wait(lock, token, [&] { return !items_.empty(); }) || token.stop_requested()) return taken;
     while (!items_.empty() && taken.size() < most) {
       taken.push_back(std::move(items_.front()));
       items_.pop_front();
     }
-    changed_.notify_all();
+    if (held_back_ > 0) drained_.notify_all();
     return taken;
   }
 
  private:
   mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
+  std::condition_variable_any filled_, drained_;
   std::deque<T> items_;
+  int held_back_ = 0;  // in wait_for_room()
 };
 
 // Holds back who hands in more than there is room for.
@@ -82,6 +88,10 @@ class ByteBudget {
     }
     for (const auto& go_on : granted) go_on();
   }
+  std::size_t used() const {
+    const std::lock_guard lock(mutex_);
+    return used_;
+  }
   void close() {
     std::deque<Waiting> dropped;
     const std::lock_guard lock(mutex_);
@@ -96,7 +106,7 @@ class ByteBudget {
   };
   bool fits(std::size_t bytes) const { return used_ == 0 || used_ + bytes <= room_; }
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::deque<Waiting> waiting_;
   std::size_t room_, used_ = 0;
   bool closed_ = false;

@@ -4,29 +4,26 @@
 #include <charconv>
 #include <cstring>
 #include <optional>
+#include <random>
 #include <unordered_map>
 
 #include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
+#include "common/assets/obj_corner.h"
 #include "common/assets/triangles.h"
 
 namespace ls {
 
 namespace {
 
-// One corner of a face as written, from 0; -1: none.
-struct Corner {
-  std::int64_t v = -1, vt = -1, vn = -1;
-  bool operator==(const Corner&) const = default;
-};
-struct CornerHash {
-  std::size_t operator()(const Corner& c) const {
-    std::uint64_t h = static_cast<std::uint64_t>(c.v) * 0x9e3779b97f4a7c15u;
-    h = (h ^ (h >> 29) ^ static_cast<std::uint64_t>(c.vt)) * 0xbf58476d1ce4e5b9u;
-    h = (h ^ (h >> 32) ^ static_cast<std::uint64_t>(c.vn)) * 0x94d049bb133111ebu;
-    return h ^ (h >> 31);
-  }
-};
+std::uint64_t secret_of_this_process() {
+  static const std::uint64_t secret = [] {
+    std::random_device word;
+    const std::uint64_t high = word();
+    return high << 32 | word();
+  }();
+  return secret;
+}
 
 class ObjReader {
  public:
@@ -156,7 +153,7 @@ class ObjReader {
   std::string problem_;
   std::vector<std::array<float, 3>> v_, vn_;
   std::vector<std::array<float, 2>> vt_;
-  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+  std::unordered_map<Corner, std::uint32_t, CornerHash> known_{0, CornerHash{secret_of_this_process()}};
   std::vector<std::uint32_t> polygon_;
   MeshData mesh_;
   bool any_uv_ = false, any_normal_ = false;

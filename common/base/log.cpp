@@ -3,25 +3,60 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <nlohmann/json.hpp>
+
 namespace ls {
 namespace {
+
+std::atomic<LogFormat> g_format{LogFormat::text};
+
+constexpr const char* kTextPattern = "%Y-%m-%dT%H:%M:%S.%e %l %v";
+constexpr const char* kJsonPattern = R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v)";
 
 spdlog::logger& logger() {
   static const auto instance = [] {
     auto l = spdlog::stderr_logger_mt("lightshaft");
-    l->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
+    l->set_pattern(kTextPattern);
     l->flush_on(spdlog::level::info);
     return l;
   }();
   return *instance;
 }
 
-void write(spdlog::level::level_enum level, std::string_view keys, std::string_view text) {
-  if (keys.empty()) {
-    logger().log(level, "{}", text);
-  } else {
-    logger().log(level, "{} {}", keys, text);
+bool control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
+
+// A name or a file's text in a message must not end the line and begin one of its own.
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  std::replace_if(line.begin(), line.end(), control, ' ');
+  return line;
+}
+
+// "a=1 b=two words c=3": a word without '=' belongs to the value before it. The first of two equal keys
+// stays.
+void add_keys(nlohmann::ordered_json& line, std::string_view keys) {
+  std::string key, value;
+  const auto flush = [&] {
+    if (!key.empty() && !line.contains(key)) line[key] = value;
+  };
+  while (!keys.empty()) {
+    const std::string_view word = keys.substr(0, keys.find(' '));
+    keys.remove_prefix(std::min(keys.size(), word.size() + 1));
+    if (const auto equals = word.find('='); equals != std::string_view::npos && equals > 0) {
+      flush();
+      key = word.substr(0, equals), value = word.substr(equals + 1);
+    } else if (!word.empty()) {
+      (value += ' ') += word;
+    }
   }
+  flush();
+}
+
+void write(spdlog::level::level_enum level, std::string_view keys, std::string_view text) {
+  if (logger().should_log(level)) logger().log(level, "{}", log_line(g_format, keys, text));
 }
 
 }  // namespace
@@ -31,9 +66,40 @@ void log_level(LogLevel level) {
       spdlog::level::debug, spdlog::level::info, spdlog::level::warn, spdlog::level::err, spdlog::level::off};
   logger().set_level(kLevels[static_cast<int>(level)]);
 }
+
+void log_format(LogFormat format) {
+  g_format = format;
+  const bool json = format == LogFormat::json;
+  logger().set_pattern(json ? kJsonPattern : kTextPattern,
+                       json ? spdlog::pattern_time_type::utc : spdlog::pattern_time_type::local);
+}
+
+std::optional<LogFormat> log_format_of(std::string_view name) {
+  if (name == "text") return LogFormat::text;
+  if (name == "json") return LogFormat::json;
+  return std::nullopt;
+}
+
 void log_debug(std::string_view keys, std::string_view text) { write(spdlog::level::debug, keys, text); }
 void log_info(std::string_view keys, std::string_view text) { write(spdlog::level::info, keys, text); }
 void log_warn(std::string_view keys, std::string_view text) { write(spdlog::level::warn, keys, text); }
 void log_error(std::string_view keys, std::string_view text) { write(spdlog::level::err, keys, text); }
+
+std::string log_value(std::string_view text) {
+  std::string value(text);
+  std::replace_if(
+      value.begin(), value.end(), [](char c) { return control(c) || c == ' ' || c == '='; }, '_');
+  return value;
+}
+
+std::string log_line(LogFormat format, std::string_view keys, std::string_view text) {
+  if (format == LogFormat::text)
+    return keys.empty() ? one_line(text) : fmt::format("{} {}", one_line(keys), one_line(text));
+  nlohmann::ordered_json line;
+  line["text"] = text;
+  add_keys(line, keys);
+  // Whatever bytes a name has, the line is JSON. The pattern has its beginning already.
+  return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);
+}
 
 }  // namespace ls

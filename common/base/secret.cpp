@@ -2,17 +2,31 @@
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
 
 #include <fstream>
 #include <iomanip>
 
-#include "common/base/digest.h"
-
 namespace ls {
 
 bool equal_secret(std::string_view a, std::string_view b) {
-  const Digest x = sha256(a), y = sha256(b);  // of one length, and unpredictable to who guesses
-  return CRYPTO_memcmp(x.bytes.data(), y.bytes.data(), x.bytes.size()) == 0;
+  return equal_secret(sha256(a), sha256(b));  // of one length, and unpredictable to who guesses
+}
+
+bool equal_secret(const Digest& a, const Digest& b) {
+  return CRYPTO_memcmp(a.bytes.data(), b.bytes.data(), a.bytes.size()) == 0;
+}
+
+std::string hmac_sha256(std::string_view key, std::string_view text) {
+  Digest mac;
+  unsigned int length = 0;
+  // Fails only when there is no memory; then no signature is better than a weak one.
+  if (!HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
+            reinterpret_cast<const unsigned char*>(text.data()), text.size(),
+            reinterpret_cast<unsigned char*>(mac.bytes.data()), &length))
+    return "";
+  return mac.hex();
 }
 
 Result<std::string> read_secret(const std::filesystem::path& file) {
@@ -22,6 +36,17 @@ Result<std::string> read_secret(const std::filesystem::path& file) {
   if (!(in >> std::setw(static_cast<int>(kSecretBytes)) >> secret))
     return fail(Errc::invalid_argument, fmt::format("{} has no token in it", file.string()));
   return secret;
+}
+
+Result<std::string> read_pem(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return fail(Errc::not_found, fmt::format("{} cannot be opened", file.string()));
+  std::string text(kPemBytes + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (text.size() > kPemBytes || text.find("-----BEGIN ") == std::string::npos)
+    return fail(Errc::invalid_argument, fmt::format("{} is no PEM file", file.string()));
+  return text;
 }
 
 }  // namespace ls

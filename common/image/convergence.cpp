@@ -15,6 +15,7 @@ namespace {
 constexpr double kNormal95 = 1.959964;
 constexpr double kLeastSpp = 8;  // below, halves of one or two samples say little of their variance
 constexpr double kPriorSpread = .15;
+constexpr double kBend = .06;               // of forecasts: how far the slope strays, see the header
 constexpr double kSlow = .85, kFast = 1.1;  // slopes within are called as expected
 constexpr std::size_t kMostPoints = 32;     // doublings
 
@@ -48,13 +49,23 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// The lower Cholesky factor of the covariance; empty if it is not positive definite.
+// Of what a slope that strays like a Brownian motion puts on the line at two times, counted from where the
+// line is drawn; on either side of it they are independent.
+double bend_covariance(double u, double v) {
+  if (u * v <= 0) return 0;
+  const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
+  return near * near * (3 * far - near) / 6;
+}
+
+// The lower Cholesky factor of the covariance, with a slope that strays by `bend`; empty if it is not
+// positive definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
-std::optional<Matrix> factor(const std::vector<Log>& y) {
+std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};
+  const auto from_last = [&](std::size_t i) { return y[i].time - y.back().time; };
   for (std::size_t i = 0; i < y.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      double sum = covariance(y[i], y[j]);
+      double sum = covariance(y[i], y[j]) + bend * bend * bend_covariance(from_last(i), from_last(j));
       for (std::size_t k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
       if (i == j && !(sum > 0)) return std::nullopt;
       l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
@@ -81,13 +92,15 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// The line error = a - slope time through the points, fitted with their covariance; with a prior of the slope
-// if asked for. Times are told from the last point's on: there a and slope are nearly independent.
+// The line error = a - slope time through the points, fitted with their covariance, of which `l` is the
+// factor; with a prior of the slope if asked for. Times are told from the last point's on: there a and slope
+// are nearly independent.
 class Line {
  public:
-  Line(const std::vector<Log>& points, const Matrix& l, double prior_weight)
+  Line(const std::vector<Log>& points, const Matrix& l, double prior_weight, double bend)
       : y_(points),
         l_(l),
+        bend_(bend),
         one_(whitened(l, y_, [](const Log&) { return 1.; })),
         time_(whitened(l, y_, [&](const Log& p) { return y_.back().time - p.time; })),
         error_(whitened(l, y_, [](const Log& p) { return p.error; })) {
@@ -116,13 +129,15 @@ class Line {
     const double mean = level_ - slope_ * later + product(shared, error_) - level_ * product(one_, shared) -
                         slope_ * product(time_, shared);
     const double variance = then.sigma * then.sigma - product(shared, shared) + f1 * f1 * v11_ +
-                            2 * f1 * f2 * v12_ + f2 * f2 * v22_;
+                            2 * f1 * f2 * v12_ + f2 * f2 * v22_ +
+                            bend_ * bend_ * bend_covariance(later, later);
     return {mean, std::sqrt(std::max(0., variance))};
   }
 
  private:
   const std::vector<Log>& y_;
   const Matrix& l_;
+  double bend_;
   std::vector<double> one_, time_, error_;
   double determinant_ = 0, v11_ = 0, v12_ = 0, v22_ = 0, level_ = 0, slope_ = 0;
 };
@@ -196,9 +211,9 @@ double cost_spread(std::span<const ErrorPoint> points) {
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
   const std::vector<Log> y = doublings(points);
   if (y.size() < 3) return std::nullopt;
-  const auto l = factor(y);
+  const auto l = factor(y, 0);
   if (!l) return std::nullopt;
-  const Line line(y, *l, 0);
+  const Line line(y, *l, 0, 0);
   if (!line.sound()) return std::nullopt;
   const double half = kNormal95 * line.slope_sigma(), lo = line.slope() - half, hi = line.slope() + half;
   return Trend{static_cast<int>(y.size()), line.slope(), lo, hi, words(lo, hi)};
@@ -242,9 +257,9 @@ std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double t
   const ErrorPoint& now = points.back();
   if (now.relmse <= target) return Forecast{now.spp, 0, 0, 0};
   const std::vector<Log> y = doublings(points);
-  const auto l = factor(y);
+  const auto l = factor(y, kBend);
   if (!l) return std::nullopt;
-  const Line line(y, *l, 1 / (kPriorSpread * kPriorSpread));
+  const Line line(y, *l, 1 / (kPriorSpread * kPriorSpread), kBend);
   if (!line.sound()) return std::nullopt;
   const auto reached = [&](double sigmas) {
     return std::exp(when(

@@ -62,6 +62,13 @@ struct Forecast {
 // Until the estimated relMSE is down to `target`, at the end of a round. Zeros: it is already. Nothing: there
 // is no point with a positive error and time. The slope is the fitted one, drawn to 1 as far as the points
 // leave it open (a Gaussian prior of standard deviation .15).
+//
+// Slopes change: what low-discrepancy points gain on smooth parts of an image is used up sooner or later, and
+// a slope of 1.2 at 4 samples has become 1.0 at 256 (the bench scene `tint`). A straight line through all
+// doublings would go on too steeply, and the more surely so the better the points are known. So the slope
+// strays like a Brownian motion of log time, by .05 a doubling (kBend = .05 / sqrt(log 2)): a local linear
+// trend (Harvey 1989, chapter 2.3). Counted from the last point, that adds b^2 u^2 (3 v - u) / 6 to the
+// covariance of the points at times u <= v before it, and b^2 u^3 / 3 to the variance u after it.
 std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target);
 
 }  // namespace ls

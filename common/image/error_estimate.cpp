@@ -54,26 +54,32 @@ struct Surroundings {
   double sum, squares, noise;  // of S, S^2 and D^2
 };
 
-// 1 / (m^2 + c), and the share g of the pixel's own value in m.
+// 1 / (m^2 + c), the share g of the pixel's own value in m, and how the weight changes with that value.
 struct Weight {
-  double weight, gain;
+  double weight, gain, lean;
 };
 
+double lean_of(double m, double g) {
+  const double f = 1 / (m * m + kDark);
+  return -2 * m * f * f * g;
+}
+
 Weight weight_of(const Surroundings& s) {
-  if (s.others == 0) return {weight_of(s.own, 0), 1};
+  if (s.others == 0) return {weight_of(s.own, 0), 1, lean_of(s.own, 1)};
   constexpr double kSignificant = 9;
   const double mean = s.sum / s.others, u = s.noise / s.others, apart = (s.own - mean) * (s.own - mean);
   double structure = std::max(0.0, s.squares / s.others - mean * mean - u * (1 - 1 / s.others));
   if (apart > kSignificant * std::max(u, s.own_noise)) structure = std::max(structure, apart);
   const double v = s.own_noise > structure + u ? s.own_noise : u;
   const double g = structure > 0 ? structure / (structure + v) : 0;
-  return {weight_of(mean + g * (s.own - mean), u * (g * g + (1 - g) * (1 - g) / s.others)), g};
+  const double m = mean + g * (s.own - mean);
+  return {weight_of(m, u * (g * g + (1 - g) * (1 - g) / s.others)), g, lean_of(m, g)};
 }
 
-// Of each pixel: the square root of the weight in each channel, planar, and the square of the mean of g over
-// channels.
+// Of each pixel: the square root of the weight in each channel and how it leans, planar, and the square of
+// the mean of g over channels.
 struct Weights {
-  std::vector<double> roots, edges;
+  std::vector<double> roots, leans, edges;
 };
 
 void add_channel(const HalfMeans& h, std::size_t plane, Weights& to) {
@@ -94,16 +100,34 @@ void add_channel(const HalfMeans& h, std::size_t plane, Weights& to) {
       const Weight w = weight_of({own[i], noise[i], static_cast<double>(others), sum[i] - own[i],
                                   squares[i] - square[i], std::max(0.0, noises[i] - noise[i])});
       to.roots[plane + i] = std::sqrt(w.weight);
+      to.leans[plane + i] = w.lean;
       to.edges[i] += w.gain / 3;
     }
 }
 
 Weights weights(const HalfMeans& h) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
-  Weights out{std::vector<double>(3 * n), std::vector<double>(n)};
+  Weights out{std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(n)};
   for (std::size_t c = 0; c < 3; ++c) add_channel(h, c * n, out);
   for (double& g : out.edges) g *= g;
   return out;
+}
+
+// What skewed noise takes off the sum of relative squares in the mean (the header has the derivation).
+double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier, const Weights& w) {
+  const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
+  double sum = 0;
+  for (std::size_t i = 0; i < now.a.size(); ++i) {
+    // Each half's part of the mean: a = last * a_n + before * a_o.
+    const double ao = before * earlier.halves.a[i], bo = before * earlier.halves.b[i];
+    const double an = now.a[i] - ao, bn = now.b[i] - bo;
+    const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
+    const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
+    const double most = 0.5 * w.roots[i] * w.roots[i], change = w.leans[i] * apart;
+    sum += of_last * std::clamp(last * change, -most, most) +
+           of_before * std::clamp(-before * change, -most, most);
+  }
+  return sum;
 }
 
 // Three planes of one tile, and what a pixel and its neighbour have in common.
@@ -248,11 +272,17 @@ void TileError::add(const TileError& o) {
   pixels += o.pixels;
   samples += o.samples;
   few_hits += o.few_hits;
+  skew += o.skew;
   plain.add(o.plain);
   relative.add(o.relative);
 }
 
-TileError estimate_error(const HalfMeans& h, std::uint64_t spp) {
+void TileError::subtract_skew(double part) {
+  relative.squares -= part;
+  skew += part;
+}
+
+TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
         h.b.size(), h.width, h.height);
@@ -265,6 +295,15 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp) {
   out.plain = noise_sums(d, w.edges, h.width, h.height);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);
+  if (!earlier) return out;
+  CHECK(earlier->halves.a.size() == 3 * n && earlier->halves.b.size() == 3 * n && earlier->spp >= 2 &&
+            earlier->spp < spp,
+        "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
+        earlier->spp, 3 * n, spp);
+  // Points of low discrepancy make the whole better than its parts: a correction made of those is not to
+  // rule.
+  const double all = out.relative.squares;
+  out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
   return out;
 }
 

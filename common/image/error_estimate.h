@@ -21,6 +21,19 @@
 // by f" s^2 / 2: that is subtracted, within [f/2, 2 f]. What remains is of second order: in the dark 3 s^4 /
 // c^2 of the value.
 //
+// Where g is near 1 the pixel's value is in its own weight, and the noise of rendered pixels is skewed: a
+// bright sample raises D^2 and S alike, and the sum of f D^2 comes out too low, to first order by f'(m) g
+// cov(D^2, S), which falls like 1/N as a share (2 % at 64 samples, docs/error.md). The samples of the last
+// round, independent of those before, tell it: with n of N samples in the last round, o before it, and D, S
+// of the parts so named,
+//   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
+// k the third cumulant of a sample; the pixel's right value drops out of the difference. cov(D^2, S) is k /
+// N^2, so
+//   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o)
+// has it as its expectation, and f'(m) g t is subtracted. (To first order the square of the last samples'
+// difference is weighted as the earlier ones would have it, and the reverse.) Neither weight is changed by
+// more than half of itself. The first round has nothing before it and is taken as it is.
+//
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b; over channels, 4 tr(V^2) with V the covariance of the channels of D.
 // Two ways lead to tr(V^2), and each pixel takes its share g^2 of the first and 1 - g^2 of the second:
@@ -72,7 +85,9 @@ struct TileError {
   std::uint64_t few_hits = 0;
   NoiseSums plain;     // of D
   NoiseSums relative;  // of D / sqrt(window^2 + 0.01)
+  double skew = 0;     // what has been subtracted from relative.squares, since noise is skewed
   void add(const TileError& other);
+  void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
 };
 
@@ -81,8 +96,14 @@ struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
 };
-// `spp`: samples per pixel behind the means, both halves together.
-TileError estimate_error(const HalfMeans& halves, std::uint64_t spp);
+// The tile as it stood some samples before; those are among the later ones.
+struct EarlierMeans {
+  HalfMeans halves;
+  std::uint64_t spp = 0;  // at least 2, fewer than now
+};
+// `spp`: samples per pixel behind the means, both halves together. Without `earlier` skewed noise is not
+// corrected for.
+TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
 // Whether pixel (x, y) is one of few_hits.
 bool has_few_hits(const HalfMeans& halves, int x, int y);
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -63,5 +64,20 @@ struct ExrPicture {
 };
 // Scanline, ZIP compressed. The bytes are a function of the picture only.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
+
+// Where the bytes of a file go that is larger than one likes to have in memory.
+class ByteSink {
+ public:
+  virtual ~ByteSink() = default;
+  virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
+};
+// A picture that comes in bands of whole rows, from the top: each of them as a picture of as many rows, all with the
+// same channels and without strings. The file is that of the whole picture.
+struct ExrBands {
+  FrameSize size;
+  std::map<std::string, std::string> strings;
+  std::function<ExrPicture(int band)> band;  // asked for 0, 1, 2, ... until there are all rows
+};
+Result<void> write_exr(const ExrBands& bands, ByteSink& sink);
 
 }  // namespace ls

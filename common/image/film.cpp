@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
@@ -36,10 +37,9 @@ Film::Film(TileGrid grid, AovSet aovs) : grid_(grid), aovs_(aovs) {
   tiles_.resize(grid.count());
 }
 
-std::uint64_t Film::Tile::spp() const {
-  if (tail) return tail->samples.s1;
-  return full_rounds ? round_range(full_rounds - 1).s1 : 0;
-}
+std::uint64_t Film::Tile::full_spp() const { return full_rounds ? round_range(full_rounds - 1).s1 : 0; }
+
+std::uint64_t Film::Tile::spp() const { return tail ? tail->samples.s1 : full_spp(); }
 
 Result<void> Film::accepts(TileIndex index, RoundIndex round, const Partial& partial) const {
   if (index >= tiles_.size())
@@ -78,7 +78,8 @@ Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& p
   if (const auto ok = accepts(index, round, partial); !ok) return tl::unexpected(ok.error());
   const auto pixels = static_cast<std::size_t>(grid_.rect(index).pixels());
   auto next = std::make_shared<Tile>();
-  if (const Tile* old = tiles_[index].get()) {
+  const Tile* old = tiles_[index].get();
+  if (old) {
     next->full_rounds = old->full_rounds;
     next->chain = old->chain;
     next->sums = old->sums;
@@ -95,35 +96,41 @@ Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& p
   } else {
     next->tail = Tail{partial.header.samples, digest, partial.sums};
   }
-  next->error = estimate(*next, grid_.rect(index));
+  next->error = estimate(*next, old, grid_.rect(index));
   const TileError error = next->error;
   tiles_[index] = std::move(next);
   return error;
 }
 
-std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pixels) {
+std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pixels, bool with_tail) {
   const std::size_t n = kPartialChannels / 2 * pixels;
   std::array<std::vector<double>, 2> out;
   for (std::size_t h = 0; h < 2; ++h) {
     out[h].assign(tile.sums.begin() + static_cast<std::ptrdiff_t>(h * n),
                   tile.sums.begin() + static_cast<std::ptrdiff_t>((h + 1) * n));
-    if (tile.tail)
+    if (tile.tail && with_tail)
       for (std::size_t i = 0; i < n; ++i) out[h][i] += tile.tail->sums[h * n + i];
   }
   return out;
 }
 
-std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels) {
-  auto out = halves(tile, pixels);
-  const double samples = static_cast<double>(tile.spp() / 2);  // of each half: counts are even
+std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels, bool with_tail) {
+  auto out = halves(tile, pixels, with_tail);
+  const double samples =
+      static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);  // of each half: counts are even
   for (auto& half : out)
     for (double& v : half) v /= samples;
   return out;
 }
 
-TileError Film::estimate(const Tile& tile, const PixelRect& rect) {
-  const auto of = means(tile, static_cast<std::size_t>(rect.pixels()));
-  return estimate_error({rect.width(), rect.height(), of[0], of[1]}, tile.spp());
+TileError Film::estimate(const Tile& tile, const Tile* before, const PixelRect& rect) {
+  const auto pixels = static_cast<std::size_t>(rect.pixels());
+  const auto of = means(tile, pixels);
+  const HalfMeans now{rect.width(), rect.height(), of[0], of[1]};
+  if (!before || before->full_rounds == 0) return estimate_error(now, tile.spp());
+  const auto earlier = means(*before, pixels, false);
+  const EarlierMeans parts{{rect.width(), rect.height(), earlier[0], earlier[1]}, before->full_spp()};
+  return estimate_error(now, tile.spp(), &parts);
 }
 
 std::array<std::vector<double>, 2> Film::half_means(TileIndex index) const {
@@ -206,6 +213,14 @@ TileError Film::error() const {
   TileError sum;
   for (TileIndex i = 0; i < tiles_.size(); ++i) sum.add(error(i));
   return sum;
+}
+
+Film Film::row(int row) const {
+  const auto columns = static_cast<std::size_t>(grid_.columns());
+  const std::size_t first = static_cast<std::size_t>(row) * columns;
+  Film band({{grid_.frame.width, grid_.rect(static_cast<TileIndex>(first)).height()}, grid_.tile}, aovs_);
+  std::copy_n(tiles_.begin() + static_cast<std::ptrdiff_t>(first), columns, band.tiles_.begin());
+  return band;
 }
 
 bool Film::operator==(const Film& other) const {

@@ -15,6 +15,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -84,12 +85,18 @@ class Film {
   std::uint64_t memory_bytes() const;  // of the sums and identifiers
   TileError error() const;             // over all tiles, in tile order
 
+  // One row of tiles as a film of its own, with the same tiles: for what is made of an image band by band.
+  Film row(int row) const;
+
   // ---- restart ----
   // Versioned, closed by a SHA-256; whole or one tile at a time (no bytes: nothing folded). Loading refuses
   // damaged or foreign bytes.
   std::vector<std::byte> save() const;
   static Result<Film> load(std::span<const std::byte> bytes);
   std::vector<std::byte> save_tile(TileIndex tile) const;
+  // save_tile() of the tile as it is now, to be called later: it holds that one tile, where a copy of the film would
+  // hold all that are folded meanwhile.
+  std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 
   bool operator==(const Film& other) const;  // same grid, AOVs, and bits in every tile
@@ -107,16 +114,20 @@ class Film {
     std::vector<double> sums;  // planes as in Partial, but for identifiers, of the full rounds
     std::vector<float> ids;    // those, likewise
     std::optional<Tail> tail;
-    TileError error;  // with the tail
+    TileError error;                 // with the tail
+    std::uint64_t full_spp() const;  // of the full rounds
     std::uint64_t spp() const;
     bool operator==(const Tile&) const = default;
   };
-  // Sums with the tail; R, G, B planes of A and of B.
-  static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels);
-  static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels);
-  static TileError estimate(const Tile& tile, const PixelRect& rect);
+  // Sums with the tail, or of the full rounds alone; R, G, B planes of A and of B.
+  static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels,
+                                                   bool with_tail = true);
+  static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels,
+                                                  bool with_tail = true);
+  // `before`: its full rounds are what stood before the tile's last round; null: not known any more.
+  static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
-  std::vector<std::byte> tile_bytes(TileIndex tile) const;
+  static std::vector<std::byte> tile_bytes(const Tile* tile, TileIndex index);
   Result<std::shared_ptr<const Tile>> parse_tile(TileIndex tile, std::span<const std::byte> bytes) const;
 
   // How many planes are sums and identifiers, those of the colour among them.

@@ -1,11 +1,12 @@
 // The film as bytes, for restarts:
 //   film: "LSFILM01", i32 width, height, tile, u32 tiles present, then per tile u32 tile, u64 length, tile
-//   record; SHA-256 tile: "LSTILE01", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0:
-//   none), 32 bytes tail digest,
+//   record; SHA-256 tile: "LSTILE02", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0:
+//   none), 32 bytes tail digest, f64 TileError::skew,
 //         6 planes of doubles, with a tail 6 planes of floats; SHA-256 of all that stands before
 //   With AOVs: "LSFILM02", a u32 more after the tile's side, which AOVs; the planes of their sums stand after
 //   the six, then those of identifiers in floats.
-// Little endian. The error figures are computed anew.
+// Little endian. The error figures are computed anew, but for the one that needs the tile before its last
+// round.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace ls {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE01";
+constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE02";
 
 class Writer {
  public:
@@ -96,8 +97,7 @@ bool read_finite(Reader& in, std::vector<T>& out, std::size_t count) {
 
 }  // namespace
 
-std::vector<std::byte> Film::tile_bytes(TileIndex index) const {
-  const Tile* tile = tiles_[index].get();
+std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
   if (!tile) return {};
   Writer out(kTileMagic);
   out.reserve(256 + tile->sums.size() * sizeof(double) + tile->ids.size() * sizeof(float) +
@@ -109,6 +109,7 @@ std::vector<std::byte> Film::tile_bytes(TileIndex index) const {
   out.value(tail.samples.s0);
   out.value(tail.samples.s1);
   out.value(tail.digest.bytes);
+  out.value(tile->error.skew);
   out.put(std::as_bytes(std::span(tile->sums)));
   out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
@@ -128,23 +129,32 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   tail.samples.s0 = in.value<std::uint64_t>();
   tail.samples.s1 = in.value<std::uint64_t>();
   tail.digest.bytes = in.value<decltype(Digest::bytes)>();
+  const auto skew = in.value<double>();
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
   const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
              ids = pixels * planes_.ids;
-  if (!in.ok() || !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
-      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
+  if (!in.ok() || !std::isfinite(skew) || !read_finite(in, tile->sums, sums) ||
+      !read_finite(in, tile->ids, ids) || (has_tail && !read_finite(in, tail.sums, sums + ids)) ||
+      in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
   const SampleRange full = round_range(tile->full_rounds);
   if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
     return damaged(fmt::format("tile {} has an impossible last round", index));
   if (!has_tail && tile->full_rounds == 0) return damaged(fmt::format("tile {} has no rounds", index));
   if (has_tail) tile->tail = std::move(tail);
-  tile->error = estimate(*tile, rect);
+  tile->error = estimate(*tile, nullptr, rect);
+  tile->error.subtract_skew(skew);
   return tile;
 }
 
-std::vector<std::byte> Film::save_tile(TileIndex tile) const { return tile_bytes(tile); }
+std::vector<std::byte> Film::save_tile(TileIndex tile) const {
+  return tile_bytes(tiles_[tile].get(), tile);
+}
+
+std::function<std::vector<std::byte>()> Film::saver(TileIndex index) const {
+  return [tile = tiles_[index], index] { return tile_bytes(tile.get(), index); };
+}
 
 Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) {
   if (index >= tiles_.size())
@@ -172,7 +182,7 @@ std::vector<std::byte> Film::save() const {
   out.value(present);
   for (TileIndex i = 0; i < tiles_.size(); ++i) {
     if (!tiles_[i]) continue;
-    const auto bytes = tile_bytes(i);
+    const auto bytes = save_tile(i);
     out.value(i);
     out.value(static_cast<std::uint64_t>(bytes.size()));
     out.put(bytes);

@@ -91,21 +91,28 @@ std::uint64_t values_above_half(const Film& film) {
   return above;
 }
 
-Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output) {
+namespace {
+
+// Of a film, or of one row of its tiles; without strings but those of the AOVs. Adds to `clamped`.
+ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool float_output, std::uint64_t& clamped) {
   Planes planes = gather(film);
-  FinalImage out;
   ExrPicture picture{film.grid().frame, {}, {}};
   constexpr const char* kRgb[3] = {"R", "G", "B"};
   for (int c = 0; c < 3; ++c) {
     const std::string layer = fmt::format("stderr.{}", kRgb[c]);
-    if (!float_output) out.clamped += clamp_to_half(planes.rgb[c]);
+    if (!float_output) clamped += clamp_to_half(planes.rgb[c]);
     if (float_output) picture.channels[kRgb[c]] = ExrFloat{std::move(planes.rgb[c])};
     if (!float_output) picture.channels[kRgb[c]] = ExrHalf{std::move(planes.rgb[c])};
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
+  clamped += add_aov_layers(film, manifests, float_output, picture);
+  return picture;
+}
+
+std::map<std::string, std::string> strings_of(const Film& film, const Provenance& from) {
   const ImageError error = image_error(film.error());
-  picture.strings = {
+  std::map<std::string, std::string> strings = {
       {"lightshaft:scene", from.scene.hex()},
       {"lightshaft:job", from.settings_json},
       {"lightshaft:build", from.build},
@@ -114,15 +121,46 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool floa
       {"lightshaft:relmse", fmt::format("{:.9g}", error.relmse)},
       {"lightshaft:relmse_ci95", fmt::format("{:.9g} {:.9g}", error.relmse_lo, error.relmse_hi)},
       {"lightshaft:rmse", fmt::format("{:.9g}", error.rmse)},
+      {"lightshaft:verdict", error.trusted ? "trusted" : error.verdict},
       {"lightshaft:few_hits", fmt::format("{}", error.few_hits)},
       {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
       {"lightshaft:tiles", tile_digests(film)}};
-  if (!from.health.empty()) picture.strings["lightshaft:health"] = from.health;
-  out.clamped += add_aov_layers(film, from.manifests, float_output, picture);
-  auto exr = write_exr(picture);
-  if (!exr) return tl::unexpected(exr.error());
-  out.exr = std::move(*exr);
-  return out;
+  if (!from.health.empty()) strings["lightshaft:health"] = from.health;
+  if (from.core_seconds > 0) strings["lightshaft:core_seconds"] = fmt::format("{:.3f}", from.core_seconds);
+  if (!from.stopped.empty()) strings["lightshaft:stopped"] = from.stopped;
+  return strings;
+}
+
+class MemorySink final : public ByteSink {
+ public:
+  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
+    if (at + bytes.size() > this->bytes.size()) this->bytes.resize(static_cast<std::size_t>(at) + bytes.size());
+    std::copy(bytes.begin(), bytes.end(), this->bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    return {};
+  }
+  std::vector<std::byte> bytes;
+};
+
+}  // namespace
+
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output, ByteSink& sink) {
+  std::uint64_t clamped = 0;
+  ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
+                   return picture_of(film.row(row), from.manifests, float_output, clamped);
+                 }};
+  if (!film.aovs().empty()) {  // names of identifiers, the same for every row
+    std::uint64_t ignored = 0;
+    bands.strings.merge(picture_of(film.row(0), from.manifests, float_output, ignored).strings);
+  }
+  if (auto written = write_exr(bands, sink); !written) return tl::unexpected(written.error());
+  return clamped;
+}
+
+Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output) {
+  MemorySink sink;
+  const auto clamped = write_final_exr(film, from, float_output, sink);
+  if (!clamped) return tl::unexpected(clamped.error());
+  return FinalImage{std::move(sink.bytes), *clamped};
 }
 
 }  // namespace ls

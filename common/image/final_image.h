@@ -20,8 +20,8 @@ namespace ls {
 // row by row, little endian. Pixels not rendered yet are zero.
 Digest pixels_sha256(const Film& film);
 
-// The header strings `lightshaft:...` of the final EXR; `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:few_hits`
-// (pixels) and `:tiles` come from the film.
+// The header strings `lightshaft:...` of the final EXR; `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`,
+// `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and `:tiles` come from the film.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
@@ -32,6 +32,8 @@ struct Provenance {
   // "clean", or canonical_json() of the Health; empty: not known, and not written.
   std::string health;
   MatteManifests manifests = {};
+  double core_seconds = 0;   // CPU time of units; 0: not known, and not written
+  std::string stopped = {};  // why there are no more samples, and what that means; empty: not written
 };
 struct FinalImage {
   std::vector<std::byte> exr;
@@ -40,6 +42,10 @@ struct FinalImage {
 // Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers. Works
 // on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+// The same bytes into `sink`, made a row of tiles at a time: a large film's image takes no memory of its size. Returns
+// how many values were clamped.
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
+                                      ByteSink& sink);
 
 // How many values of R, G and B it clamps in a half image.
 std::uint64_t values_above_half(const Film& film);

@@ -145,6 +145,9 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.size) json["size"] = size_json(*spec.size);
   if (spec.integrator) json["integrator"] = *spec.integrator;
   if (spec.frames) json["frames"] = to_string(*spec.frames);
+  if (spec.max_workers) json["max_workers"] = *spec.max_workers;
+  if (spec.max_units) json["max_units"] = *spec.max_units;
+  if (spec.memory) json["memory"] = *spec.memory;
   if (spec.reference) json["reference"] = spec.reference->hex();
   return dump(json);
 }
@@ -154,7 +157,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   if (!json) return tl::unexpected(json.error());
   Fields fields(*json, "spec",
                 {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
-                 "float", "tags", "frames", "reference"});
+                 "float", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -168,6 +171,13 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
   spec.float_output = fields.boolean("float").value_or(false);
   spec.tags = fields.names("tags").value_or(spec.tags);
   read_frames(fields, spec);
+  const auto some = [&](const char* key) -> std::optional<std::uint32_t> {
+    const auto value = fields.whole(key, 1, kMaxAtOnce);
+    return value ? std::optional(static_cast<std::uint32_t>(*value)) : std::nullopt;
+  };
+  spec.max_workers = some("max_workers");
+  spec.max_units = some("max_units");
+  spec.memory = fields.whole("memory", 1, kMaxMemory);
   read_reference(fields, spec);
   if (fields.error()) return tl::unexpected(*fields.error());
   return spec;

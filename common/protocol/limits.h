@@ -28,6 +28,7 @@ inline constexpr std::size_t kAssetsPerJob = 4096;
 inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
+inline constexpr double kSeconds = 1e12;  // that a worker may report of anything; sums of them stay finite
 
 inline constexpr int kFrameSide = kMaxFrameSide;  // pixels
 inline constexpr std::uint64_t kSampleIndex = kMaxSpp;

@@ -20,6 +20,7 @@ inline constexpr std::size_t kMaxParameterNameBytes = 128;
 inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;  // one attribute after substitution
 inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;  // all attributes together
 inline constexpr std::size_t kMaxSearchPaths = 64;                          // <path>
+inline constexpr std::size_t kMaxObjectChildren = 4096;                // of one object of a Nori file
 inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, by reference too
 inline constexpr int kMaxBsdfNesting = 8;      // bsdfs within bsdfs: a blend of blends is 2^7 of them
 inline constexpr std::size_t kMaxDiagnostics = 20;

@@ -1,5 +1,6 @@
 #include "common/scene/mesh_attributes.h"
 
+#include <algorithm>
 #include <set>
 #include <tuple>
 
@@ -57,16 +58,14 @@ class Walk {
   int in_texture_ = 0;
 };
 
-bool any_attribute(const Scene& scene) {
-  for (const Texture& t : scene.textures)
-    if (std::holds_alternative<MeshAttributeTexture>(t)) return true;
-  return false;
-}
-
 }  // namespace
 
+bool any_attribute(const Scene& scene) {
+  return std::any_of(scene.textures.begin(), scene.textures.end(),
+                     [](const Texture& t) { return std::holds_alternative<MeshAttributeTexture>(t); });
+}
+
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape) {
-  if (!any_attribute(scene)) return {};
   Walk walk(scene);
   walk.go(shape.bsdf);
   if (shape.emitter) walk.go(*shape.emitter);

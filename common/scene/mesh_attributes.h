@@ -16,6 +16,8 @@ struct AttributeUse {
   auto operator<=>(const AttributeUse&) const = default;
 };
 
+// Whether any texture reads one: looks at them all. Where none does, no shape need be asked.
+bool any_attribute(const Scene& scene);
 // Sorted, none twice. Ends for any scene, circular ones as well; indices out of range are passed over.
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape);
 std::vector<AttributeUse> attribute_uses(const Scene& scene, TextureIndex texture);

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "common/scene/limits.h"
 #include "common/scene/suggest.h"
 #include "common/scene/transform.h"
 #include "common/scene/values.h"
@@ -69,15 +71,21 @@ const Plugin* known_plugin(const Element& e, Report& report) {
 
 Object::Object(const Element& e, const Plugin& plugin, Report& report)
     : e_(e), plugin_(plugin), report_(report) {
+  if (e.children.size() > kMaxObjectChildren) {
+    report_.error(e.at, fmt::format("{} has {} elements in it; {} are allowed", title(), e.children.size(),
+                                    kMaxObjectChildren));
+    return;
+  }
+  std::map<std::string_view, const Element*> names;
   for (const Element& child : e.children) {
+    if (report_.full()) return;  // the rest would be for nothing
     const std::string_view name = child.get("name");
-    const auto first = std::find_if(children_.begin(), children_.end(), [&](const Child& c) {
-      return !name.empty() && c.e->get("name") == name;
-    });
-    const bool again = first != children_.end();
+    const auto [first, fresh] = names.emplace(name, &child);
+    const bool again = !fresh && !name.empty();
     if (again)
-      report_.error(value_place(child, "name"), fmt::format("{} is given '{}' twice; first in {}", title(),
-                                                            name, report_.refer_to(first->e->at, child.at)));
+      report_.error(value_place(child, "name"),
+                    fmt::format("{} is given '{}' twice; first in {}", title(), name,
+                                report_.refer_to(first->second->at, child.at)));
     children_.push_back({&child, again});
   }
 }

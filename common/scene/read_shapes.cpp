@@ -204,7 +204,7 @@ bool stays_cylinder(const CylinderShape& c, const Transform& t) {
 // Whether the file has them shows when the mesh is loaded.
 void Reader::check_attributes(const Element& e, const Shape& shape) {
   const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
-  if (mesh && mesh->format == MeshFormat::ply) return;
+  if (!reads_attributes_ || (mesh && mesh->format == MeshFormat::ply)) return;
   if (report_.has_errors()) return;  // its materials may be missing
   for (const AttributeUse& use : attribute_uses(scene_, shape))
     report_.error(

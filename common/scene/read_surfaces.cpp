@@ -40,6 +40,7 @@ std::optional<TextureIndex> Reader::read_plain_texture(const Element& e) {
 
 std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
   const auto index = read_plain_texture<MeshAttributeTexture>(e);
+  reads_attributes_ = true;
   const std::string& name = std::get<MeshAttributeTexture>(scene_.textures[index->value]).name;
   if (!name.empty() && !is_attribute_name(name))
     report_.error(e.at, fmt::format("a mesh has no attribute \"{}\": their names begin with \"vertex_\" or "
@@ -50,6 +51,7 @@ std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
 
 // Where it is read is no mesh.
 void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
+  if (!reads_attributes_) return;
   for (const AttributeUse& use : attribute_uses(scene_, t))
     report_.error(e.at, fmt::format("'{}' of {} \"{}\" can't be the mesh attribute \"{}\": there is no mesh "
                                     "here that has it",

@@ -10,11 +10,11 @@ std::size_t bytes_of(const WaitingPartial& w) {
 }  // namespace
 
 void Assembly::hold(TileIndex tile, RoundIndex round, WaitingPartial waiting) {
-  if (waiting.place && waiting_bytes_ + bytes_of(waiting) > limits::kMaxPendingPartials)
+  if (waiting.place && WaitingBytes::all() + bytes_of(waiting) > limits::kMaxPendingPartials)
     waiting.partial.reset();
-  waiting_bytes_ += bytes_of(waiting);
+  waiting_bytes_.add(bytes_of(waiting));
   auto& slot = waiting_[{tile, round}];
-  waiting_bytes_ -= bytes_of(slot);
+  waiting_bytes_.remove(bytes_of(slot));
   slot = std::move(waiting);
 }
 
@@ -23,21 +23,32 @@ std::optional<WaitingPartial> Assembly::take(TileIndex tile, RoundIndex round, S
   if (found == waiting_.end() || found->second.samples != samples) return std::nullopt;
   std::optional<WaitingPartial> taken(std::move(found->second));
   waiting_.erase(found);
-  waiting_bytes_ -= bytes_of(*taken);
+  waiting_bytes_.remove(bytes_of(*taken));
   return taken;
 }
 
 void Assembly::forget_round(RoundIndex round) {
   std::erase_if(waiting_, [&](const auto& entry) {
     if (entry.first.second != round) return false;
-    waiting_bytes_ -= bytes_of(entry.second);
+    waiting_bytes_.remove(bytes_of(entry.second));
     return true;
   });
 }
 
+void Assembly::discard(TileIndex tile) {
+  std::erase_if(waiting_, [&](const auto& entry) {
+    if (entry.first.first != tile) return false;
+    waiting_bytes_.remove(bytes_of(entry.second));
+    return true;
+  });
+  film_.discard(tile);
+  errors_.discard(tile);
+  health_.discard(tile);
+}
+
 void Assembly::forget_waiting() {
   waiting_.clear();
-  waiting_bytes_ = 0;
+  waiting_bytes_ = WaitingBytes();
 }
 
 Result<TileError> Assembly::fold(TileIndex tile, RoundIndex round, const WaitingPartial& waiting) {

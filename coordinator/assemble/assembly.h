@@ -2,12 +2,14 @@
 // figures. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/image/film.h"
 #include "coordinator/assemble/health_book.h"
 #include "coordinator/assemble/round_errors.h"
@@ -22,6 +24,26 @@ struct WaitingPartial {
   SampleRange samples;
   Digest digest;
   Health health;
+  TimePoint arrived{};  // its zero: before this start
+};
+
+// The bytes that pixels of waiting partials take, of one job; counted for the whole process, too.
+class WaitingBytes {
+ public:
+  WaitingBytes() = default;
+  WaitingBytes(WaitingBytes&& other) noexcept : own_(std::exchange(other.own_, 0)) {}
+  WaitingBytes& operator=(WaitingBytes&& other) noexcept {
+    std::swap(own_, other.own_);
+    return *this;
+  }
+  ~WaitingBytes() { all_ -= own_; }
+  void add(std::size_t bytes) { own_ += bytes, all_ += bytes; }
+  void remove(std::size_t bytes) { own_ -= bytes, all_ -= bytes; }
+  static std::size_t all() { return all_; }
+
+ private:
+  static inline std::atomic<std::size_t> all_{0};
+  std::size_t own_ = 0;
 };
 
 class Assembly {
@@ -31,12 +53,14 @@ class Assembly {
   Assembly(Film film, RoundErrors errors, HealthBook health)
       : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)) {}
 
-  // Keeps a partial until take(). Its pixels are dropped, if it has a place, when too many wait
-  // (kMaxPendingPartials).
+  // Keeps a partial until take(). Its pixels are dropped, if it has a place, when those of all jobs that wait
+  // take kMaxPendingPartials; then they are read from the log again.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
   void forget_round(RoundIndex round);  // a cut round was reopened: what waits of it is void
   void forget_waiting();
+  void discard(TileIndex tile);  // all of it: it is folded again from round 0
+  std::size_t waiting() const { return waiting_.size(); }
   bool holds(TileIndex tile, RoundIndex round) const { return waiting_.contains({tile, round}); }
 
   Result<TileError> fold(TileIndex tile, RoundIndex round, const WaitingPartial& waiting);
@@ -55,15 +79,7 @@ class Assembly {
   RoundErrors errors_;
   HealthBook health_;
   std::map<std::pair<TileIndex, RoundIndex>, WaitingPartial> waiting_;
-  std::size_t waiting_bytes_ = 0;
+  WaitingBytes waiting_bytes_;
 };
-
-// The folded state as a file: {"LSSNAP1\n", build, film, error figures, health}, closed by a SHA-256.
-// Returned as nothing if it is missing, damaged, of another grid, other AOVs or another build: then
-// everything is folded again from the partials.
-std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, const HealthBook& health,
-                                     std::string_view build);
-std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
-                                      bool keep_relative, std::string_view build, AovSet aovs = {});
 
 }  // namespace ls::coordinator

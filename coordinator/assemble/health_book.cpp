@@ -8,41 +8,54 @@ void HealthBook::folded(TileIndex tile, RoundIndex round, const SampleRange& sam
   tails_.erase(tile);
   if (health.clean()) return;
   if (samples == round_range(round))
-    full_.merge(health);
+    full_[tile].merge(health);
   else
     tails_[tile] = health;
 }
 
+void HealthBook::discard(TileIndex tile) {
+  full_.erase(tile);
+  tails_.erase(tile);
+}
+
 Health HealthBook::total() const {
-  Health all = full_;
-  for (const auto& [tile, health] : tails_) all.merge(health);
+  Health all;
+  for (const auto* of : {&full_, &tails_})
+    for (const auto& [tile, health] : *of) all.merge(health);
   return all;
 }
 
-// One line for the full rounds, then one for each tail: its tile and its health.
+// A line for each tile's full rounds, then one for each tail: "f" or "t", the tile and its health.
 std::string HealthBook::save() const {
-  std::string text = canonical_json(full_) + "\n";
-  for (const auto& [tile, health] : tails_)
-    text += std::to_string(tile) + " " + canonical_json(health) + "\n";
+  std::string text;
+  for (const auto& [tile, health] : full_) text += "f " + std::to_string(tile) + " " + canonical_json(health) + "\n";
+  for (const auto& [tile, health] : tails_) text += "t " + std::to_string(tile) + " " + canonical_json(health) + "\n";
   return text;
+}
+
+std::string HealthBook::save_tile(TileIndex tile) const {
+  const auto line = [&](char kind, const std::map<TileIndex, Health>& of) {
+    const auto found = of.find(tile);
+    return found == of.end() ? std::string()
+                             : std::string{kind, ' '} + std::to_string(tile) + " " + canonical_json(found->second) + "\n";
+  };
+  return line('f', full_) + line('t', tails_);
 }
 
 std::optional<HealthBook> HealthBook::load(std::string_view text) {
   HealthBook book;
-  for (bool first = true; !text.empty() || first; first = false) {
+  while (!text.empty()) {
     const auto end = text.find('\n');
     if (end == std::string_view::npos) return std::nullopt;
-    std::string_view line = text.substr(0, end);
+    const std::string_view line = text.substr(0, end);
     text.remove_prefix(end + 1);
+    if (line.size() < 3 || (line[0] != 'f' && line[0] != 't') || line[1] != ' ') return std::nullopt;
     TileIndex tile = 0;
-    if (!first) {
-      const auto [stop, error] = std::from_chars(line.data(), line.data() + line.size(), tile);
-      if (error != std::errc() || stop == line.data() + line.size() || *stop != ' ') return std::nullopt;
-      line.remove_prefix(static_cast<std::size_t>(stop - line.data()) + 1);
-    }
-    auto health = parse_health(line);
+    const auto [stop, error] = std::from_chars(line.data() + 2, line.data() + line.size(), tile);
+    if (error != std::errc() || stop == line.data() + line.size() || *stop != ' ') return std::nullopt;
+    auto health = parse_health(line.substr(static_cast<std::size_t>(stop - line.data()) + 1));
     if (!health) return std::nullopt;
-    (first ? book.full_ : book.tails_[tile]) = std::move(*health);
+    (line[0] == 'f' ? book.full_ : book.tails_)[tile] = std::move(*health);
   }
   return book;
 }

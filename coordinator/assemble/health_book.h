@@ -15,15 +15,16 @@ class HealthBook {
  public:
   // A cut round's is kept apart: a longer range of the same round takes its place, as its pixels do.
   void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
+  void discard(TileIndex tile);  // it is folded again from round 0
   Health total() const;
 
   std::string save() const;
+  std::string save_tile(TileIndex tile) const;  // load() takes those of all tiles one after the other
   static std::optional<HealthBook> load(std::string_view text);  // nothing: damaged
   bool operator==(const HealthBook&) const = default;
 
  private:
-  Health full_;
-  std::map<TileIndex, Health> tails_;  // those that aren't clean
+  std::map<TileIndex, Health> full_, tails_;  // those that aren't clean
 };
 
 }  // namespace ls::coordinator

@@ -53,8 +53,9 @@ void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, dou
 }
 
 json split_json(const TimeSplit& t) {
-  return {{"load", number(t.load)},         {"build", number(t.build)}, {"render", number(t.render)},
-          {"transfer", number(t.transfer)}, {"merge", number(t.merge)}, {"idle", number(t.idle)}};
+  json j;
+  for (const TimePart& part : kTimeParts) j[part.name] = number(t.*part.seconds);
+  return j;
 }
 
 json point(const ConvergencePoint& p) {
@@ -86,6 +87,16 @@ json forecast(const ReportFacts& facts) {
 }
 
 }  // namespace
+
+std::string note_on(StopReason stopped) {
+  if (stopped == StopReason::error)
+    return "stopped at a target error: each tile has as many samples as its own error asked for, so the "
+           "image "
+           "carries a small bias, below the error told; images by samples carry none";
+  if (stopped == StopReason::time)
+    return "stopped by time: another run may end with other samples, so its pixels may differ";
+  return "";
+}
 
 TimeSplit split_of(const JobTotals& totals) {
   TimeSplit split = totals.time;
@@ -172,12 +183,7 @@ std::string report_json(const ReportFacts& facts) {
   j["efficiency"] = known && wall > 0 ? number(1 / wall) : json();
   j["efficiency_per_core"] = known && cores > 0 ? number(1 / cores) : json();
   j["adaptive"] = job.spec.target_error.has_value();
-  if (job.stopped == StopReason::error)
-    j["note"] =
-        "stopped at a target error: each tile has as many samples as its own error asked for, so the image "
-        "carries a small bias, below the error told; images by samples carry none";
-  if (job.stopped == StopReason::time)
-    j["note"] = "stopped by time: another run may end with other samples, so its pixels may differ";
+  if (const std::string note = job.stopped ? note_on(*job.stopped) : ""; !note.empty()) j["note"] = note;
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

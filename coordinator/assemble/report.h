@@ -20,11 +20,13 @@ struct ReportFacts {
   Digest pixels;
   std::uint64_t clamped_values = 0;  // in the final EXR
   std::vector<ConvergencePoint> convergence;
-  std::string replay;  // the job's replay_command()
+  std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nothing: it is not known, or there is no reference
 };
 std::string report_json(const ReportFacts& facts);
 
+// What to know of an image that was not ended by its samples; else empty.
+std::string note_on(StopReason stopped);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
 std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points);

@@ -50,8 +50,9 @@ static_assert(std::is_trivially_copyable_v<TileError>);
 
 template <class T>
 void put(std::vector<std::byte>& out, const T& value) {
-  const auto raw = std::as_bytes(std::span(&value, 1));
-  out.insert(out.end(), raw.begin(), raw.end());
+  const std::size_t at = out.size();
+  out.resize(at + sizeof value);
+  std::memcpy(&out[at], &value, sizeof value);
 }
 
 // Whatever the bytes say, no more is allocated than they hold.
@@ -75,35 +76,57 @@ class Reader {
 
 // Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Written and read by the same build
 // only: the snapshot names its build and is left aside by another one.
+std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
+  const Tile& t = tiles_[tile];
+  std::vector<std::byte> out;
+  put(out, static_cast<std::uint32_t>(t.rounds.size()));
+  for (const auto& [round, error] : t.rounds) {
+    put(out, round);
+    put(out, error);
+  }
+  put(out, static_cast<std::uint32_t>(t.relative.size()));
+  for (const double r : t.relative) put(out, r);
+  return out;
+}
+
 std::vector<std::byte> RoundErrors::save() const {
   std::vector<std::byte> out;
-  for (const Tile& t : tiles_) {
-    put(out, static_cast<std::uint32_t>(t.rounds.size()));
-    for (const auto& [round, error] : t.rounds) {
-      put(out, round);
-      put(out, error);
-    }
-    put(out, static_cast<std::uint32_t>(t.relative.size()));
-    for (const double r : t.relative) put(out, r);
+  for (TileIndex t = 0; t < tiles_.size(); ++t) {
+    const auto tile = save_tile(t);
+    out.insert(out.end(), tile.begin(), tile.end());
   }
   return out;
 }
 
+namespace {
+// One tile's; what follows it is left in `in`.
+template <class Rounds>
+bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
+  std::uint32_t count = 0;
+  if (!in.get(count) || !in.holds(count, sizeof(RoundIndex) + sizeof(TileError))) return false;
+  rounds.resize(count);
+  for (auto& [round, error] : rounds)
+    if (!in.get(round) || !in.get(error)) return false;
+  if (!in.get(count) || !in.holds(count, sizeof(double))) return false;
+  relative.resize(count);
+  return std::all_of(relative.begin(), relative.end(), [&](double& r) { return in.get(r); });
+}
+
+tl::unexpected<Error> damaged() { return fail(Errc::invalid_argument, "saved error figures are damaged"); }
+}  // namespace
+
+Result<void> RoundErrors::load_tile(TileIndex tile, std::span<const std::byte> bytes) {
+  Reader in(bytes);
+  if (tile >= tiles_.size() || !read_tile(in, tiles_[tile].rounds, tiles_[tile].relative) || !in.empty())
+    return damaged();
+  return {};
+}
+
 Result<RoundErrors> RoundErrors::load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative) {
-  const auto damaged = [] { return fail(Errc::invalid_argument, "saved error figures are damaged"); };
   RoundErrors loaded(tiles, keep_relative);
   Reader in(bytes);
-  for (Tile& t : loaded.tiles_) {
-    std::uint32_t count = 0;
-    if (!in.get(count) || !in.holds(count, sizeof(RoundIndex) + sizeof(TileError))) return damaged();
-    t.rounds.resize(count);
-    for (auto& [round, error] : t.rounds)
-      if (!in.get(round) || !in.get(error)) return damaged();
-    if (!in.get(count) || !in.holds(count, sizeof(double))) return damaged();
-    t.relative.resize(count);
-    for (double& r : t.relative)
-      if (!in.get(r)) return damaged();
-  }
+  for (Tile& t : loaded.tiles_)
+    if (!read_tile(in, t.rounds, t.relative)) return damaged();
   if (!in.empty()) return damaged();
   return loaded;
 }

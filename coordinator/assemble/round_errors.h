@@ -25,12 +25,15 @@ class RoundErrors {
   // Summed in tile order, `rounds` of each tile. One that has less counts with what it has; one of which only
   // later rounds are kept, since it was ahead at a checkpoint that has been taken, with the first of those.
   TileError at(std::span<const RoundIndex> rounds) const;
+  void discard(TileIndex tile) { tiles_[tile] = {}; }  // it is folded again from round 0
   void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 
   // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.
   std::vector<std::vector<double>> relative() const;
 
   std::vector<std::byte> save() const;
+  std::vector<std::byte> save_tile(TileIndex tile) const;
+  Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
   static Result<RoundErrors> load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative);
   bool operator==(const RoundErrors&) const = default;
 

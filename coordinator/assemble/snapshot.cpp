@@ -1,74 +1,159 @@
+#include "coordinator/assemble/snapshot.h"
+
+#include <fcntl.h>
+
 #include <bit>
 #include <cstring>
-#include <string_view>
 
-#include "coordinator/assemble/assembly.h"
+#include "coordinator/assemble/snapshot_whole.h"
 
 namespace ls::coordinator {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kMagic = "LSSNAP1\n", kNoHealth = "{}\n";
+constexpr std::string_view kMagic = "LSSNAP2\n";
+constexpr std::uint32_t kEnd = ~std::uint32_t{0};
+constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;  // of one tile
 
-void put_part(std::vector<std::byte>& out, std::span<const std::byte> part) {
-  const std::uint64_t length = part.size();
-  const auto raw = std::as_bytes(std::span(&length, 1));
-  out.insert(out.end(), raw.begin(), raw.end());
-  out.insert(out.end(), part.begin(), part.end());
+struct TileHead {
+  std::uint32_t tile = 0;
+  std::uint64_t film = 0, errors = 0, health = 0;
+};
+
+template <class T>
+void append_value(std::vector<std::byte>& out, const T& value) {
+  const std::size_t at = out.size();
+  out.resize(at + sizeof value);
+  std::memcpy(&out[at], &value, sizeof value);
 }
 
-std::optional<std::span<const std::byte>> take_part(std::span<const std::byte>& in) {
-  std::uint64_t length = 0;
-  if (in.size() < sizeof length) return std::nullopt;
-  std::memcpy(&length, in.data(), sizeof length);
-  in = in.subspan(sizeof length);
-  if (length > in.size()) return std::nullopt;
-  const std::optional part(in.first(static_cast<std::size_t>(length)));
-  in = in.subspan(static_cast<std::size_t>(length));
-  return part;
+std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_view format) {
+  const auto magic = std::as_bytes(std::span(kMagic)), name = std::as_bytes(std::span(format));
+  std::vector<std::byte> out(magic.begin(), magic.end());
+  append_value(out, std::uint64_t{format.size()});
+  out.insert(out.end(), name.begin(), name.end());
+  for (const int side : {grid.frame.width, grid.frame.height, grid.tile}) append_value(out, side);
+  append_value(out, std::uint32_t{aovs.bits()});
+  return out;
+}
+
+// Reads on, and knows the digest of all that was read.
+class Source {
+ public:
+  explicit Source(std::filesystem::path path) : path_(std::move(path)) {
+    if (auto file = File::open(path_, O_RDONLY)) file_ = std::move(*file);
+  }
+  // Nothing: there are not so many.
+  std::optional<std::vector<std::byte>> take(std::uint64_t bytes) {
+    if (!file_ || bytes > kMostPart) return std::nullopt;
+    auto read = read_at(file_, at_, static_cast<std::size_t>(bytes), path_);
+    if (!read) return std::nullopt;
+    at_ += bytes;
+    hash_.update(std::span<const std::byte>(*read));
+    return std::move(*read);
+  }
+  template <class T>
+  std::optional<T> value() {
+    const auto raw = take(sizeof(T));
+    if (!raw) return std::nullopt;
+    T v{};
+    std::memcpy(&v, raw->data(), sizeof v);
+    return v;
+  }
+  // All that is left must be the seal.
+  bool sealed() {
+    const Digest read = hash_.finish();
+    const auto seal = take(sizeof read.bytes);
+    return seal && std::memcmp(seal->data(), read.bytes.data(), sizeof read.bytes) == 0 && !take(1);
+  }
+
+ private:
+  std::filesystem::path path_;
+  File file_;
+  std::uint64_t at_ = 0;
+  Sha256 hash_;
+};
+
+// False: damaged. `health` collects what load() of all of it takes.
+bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
+  TileHead head{.tile = tile};
+  for (std::uint64_t* length : {&head.film, &head.errors, &head.health}) {
+    const auto read = in.value<std::uint64_t>();
+    if (!read) return false;
+    *length = *read;
+  }
+  const auto film_bytes = in.take(head.film), error_bytes = in.take(head.errors), text = in.take(head.health);
+  if (!film_bytes || !error_bytes || !text || film_bytes->empty()) return false;
+  health.append(reinterpret_cast<const char*>(text->data()), text->size());
+  return film.load_tile(tile, *film_bytes).has_value() && errors.load_tile(tile, *error_bytes).has_value();
 }
 
 }  // namespace
 
-std::vector<std::byte> save_snapshot(const Film& film, const RoundErrors& errors, const HealthBook& health,
-                                     std::string_view build) {
-  std::vector<std::byte> out;
-  const auto magic = std::as_bytes(std::span(kMagic));
-  out.insert(out.end(), magic.begin(), magic.end());
-  put_part(out, std::as_bytes(std::span(build)));
-  put_part(out, film.save());
-  put_part(out, errors.save());
-  const std::string told = health.save();
-  put_part(out, std::as_bytes(std::span(told)));
-  const Digest digest = sha256(std::span<const std::byte>(out));
-  const auto seal = std::as_bytes(std::span(digest.bytes));
-  out.insert(out.end(), seal.begin(), seal.end());
-  return out;
+TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const HealthBook& health,
+                         TileIndex tile) {
+  return {tile, film.saver(tile), errors.save_tile(tile), health.save_tile(tile)};
 }
 
-std::optional<Assembly> load_snapshot(std::span<const std::byte> bytes, const TileGrid& grid,
-                                      bool keep_relative, std::string_view build, AovSet aovs) {
-  constexpr std::size_t kSeal = 32;
-  if (bytes.size() < kMagic.size() + kSeal) return std::nullopt;
-  if (std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) return std::nullopt;
-  const auto body = bytes.first(bytes.size() - kSeal);
-  if (std::memcmp(sha256(body).bytes.data(), bytes.data() + body.size(), kSeal) != 0) return std::nullopt;
-  auto rest = body.subspan(kMagic.size());
-  const auto by = take_part(rest);
-  const auto film_bytes = take_part(rest);
-  const auto error_bytes = take_part(rest);
-  // Those of older programs have none.
-  const std::optional<std::span<const std::byte>> health_bytes =
-      rest.empty() ? std::as_bytes(std::span(kNoHealth)) : take_part(rest);
-  if (!by || !film_bytes || !error_bytes || !health_bytes || !rest.empty()) return std::nullopt;
-  if (std::string_view(reinterpret_cast<const char*>(by->data()), by->size()) != build) return std::nullopt;
-  auto film = Film::load(*film_bytes);
-  if (!film || film->grid() != grid || film->aovs() != aovs) return std::nullopt;
-  auto errors = RoundErrors::load(*error_bytes, grid.count(), keep_relative);
-  if (!errors) return std::nullopt;
-  auto health = HealthBook::load({reinterpret_cast<const char*>(health_bytes->data()), health_bytes->size()});
-  if (!health) return std::nullopt;
-  return Assembly(std::move(*film), std::move(*errors), std::move(*health));
+Result<SnapshotFile> SnapshotFile::create(const std::filesystem::path& path, std::string_view suffix,
+                                          const TileGrid& grid, AovSet aovs, std::string_view format) {
+  auto file = AtomicFile::create(path, suffix);
+  if (!file) return tl::unexpected(file.error());
+  SnapshotFile snapshot(std::move(*file));
+  if (auto written = snapshot.put(head_of(grid, aovs, format)); !written)
+    return tl::unexpected(written.error());
+  return snapshot;
+}
+
+Result<void> SnapshotFile::put(std::span<const std::byte> bytes) {
+  hash_.update(bytes);
+  return file_.write(bytes);
+}
+
+Result<void> SnapshotFile::add(const TileSnapshot& tile) {
+  const auto film = tile.film();
+  if (film.empty()) return {};
+  std::vector<std::byte> head;
+  append_value(head, tile.tile);
+  for (const std::uint64_t length : {film.size(), tile.errors.size(), tile.health.size()})
+    append_value(head, length);
+  for (const std::span<const std::byte> part :
+       {std::span<const std::byte>(head), std::span<const std::byte>(film),
+        std::span<const std::byte>(tile.errors), std::as_bytes(std::span(tile.health))})
+    if (auto written = put(part); !written) return written;
+  return {};
+}
+
+Result<void> SnapshotFile::finish() {
+  if (auto written = put(std::as_bytes(std::span(&kEnd, 1))); !written) return written;
+  const Digest seal = hash_.finish();
+  if (auto written = file_.write(std::as_bytes(std::span(seal.bytes))); !written) return written;
+  return file_.sync();
+}
+
+Result<void> SnapshotFile::commit() { return file_.commit(); }
+
+std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
+                                      bool keep_relative, std::string_view format, AovSet aovs) {
+  Source in(path);
+  const auto expected = head_of(grid, aovs, format);
+  const auto head = in.take(expected.size());
+  if (!head) return std::nullopt;
+  if (std::memcmp(head->data(), kWholeSnapshotMagic.data(), kWholeSnapshotMagic.size()) == 0)
+    return load_whole_snapshot(path, grid, keep_relative, format, aovs);
+  if (*head != expected) return std::nullopt;
+  Film film(grid, aovs);
+  RoundErrors errors(grid.count(), keep_relative);
+  std::string health;
+  while (const auto tile = in.value<std::uint32_t>()) {
+    if (*tile == kEnd) {
+      auto book = HealthBook::load(health);
+      if (!in.sealed() || !book) return std::nullopt;
+      return Assembly(std::move(film), std::move(errors), std::move(*book));
+    }
+    if (*tile >= grid.count() || !read_tile(in, *tile, film, errors, health)) return std::nullopt;
+  }
+  return std::nullopt;
 }
 
 }  // namespace ls::coordinator

@@ -30,6 +30,7 @@ class TruthBook {
   // With `rounds` of each tile, or what it has if that is less. Nothing: a tile's picture of then is not
   // known, because the coordinator was restarted meanwhile.
   std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
+  void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }  // it is folded again from round 0
   std::optional<std::vector<TilePicture>> latest() const;
   void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/image/frame.h"
+#include "coordinator/domain/limits.h"
 
 namespace ls::coordinator {
 
@@ -16,7 +17,7 @@ class CostModel {
 
   // Absurd figures (negative, not finite, more than a day) are passed over.
   void measured(TileIndex tile, std::uint64_t pixel_samples, double cpu_seconds) {
-    if (!(cpu_seconds >= 0 && cpu_seconds <= kMaxSeconds) || pixel_samples == 0) return;
+    if (!(cpu_seconds >= 0 && cpu_seconds <= kMostUnitSeconds) || pixel_samples == 0) return;
     const double n = static_cast<double>(pixel_samples);
     seconds_ = seconds_ * kMemory + cpu_seconds;
     samples_ = samples_ * kMemory + n;
@@ -32,7 +33,6 @@ class CostModel {
   }
 
  private:
-  static constexpr double kMaxSeconds = 86400;
   static constexpr double kLeastSeconds = 1e-4;     // the turn-around of any unit
   static constexpr double kMemory = 1 - 1.0 / 256;  // the mean follows the last few hundred results
   double seconds_ = 0, samples_ = 0;

@@ -56,8 +56,8 @@ struct DropUnwanted {
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A running job
-// fails.
+// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A third one is
+// asked to render the unit; where there is none, a running job fails.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -92,6 +92,7 @@ struct ReopenRound {
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
+  std::uint64_t unaudited = 0;  // results that were to be rendered again, and no other worker of the class was there
 };
 // For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to
 // `failed`.
@@ -112,6 +113,19 @@ struct WorkerBlocked {
   JobId job;
   std::string why;
 };
+// This worker rendered wrong pixels, as two others say: it gets no more work of any job, and nothing it sends is
+// taken. To be stored before what follows is carried out; none of its results may be taken up after a restart.
+struct WorkerDistrusted {
+  WorkerId worker;
+  UnitKey unit;  // that it was found by
+  std::string evidence;
+};
+// The film of this tile is void, since a worker that is not trusted has rendered some of it: it is folded again
+// from round 0. No result of it that was accepted so far counts.
+struct TileDiscarded {
+  JobId job;
+  TileIndex tile = 0;
+};
 // A worker that was lost long ago is no longer known.
 struct WorkerForgotten {
   WorkerId worker;
@@ -119,6 +133,6 @@ struct WorkerForgotten {
 
 using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch,
                             JobPinned, JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed,
-                            WorkerStateChanged, WorkerBlocked, WorkerForgotten>;
+                            WorkerStateChanged, WorkerBlocked, WorkerDistrusted, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -27,6 +28,13 @@ struct JobPlan {
   int priority = 0;                                // higher first
   std::vector<std::string> tags;                   // a worker must carry all of them
   std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
+  // ---- whose turn it is, and how much at once (share_book.h, docs/scheduling.md) ----
+  std::string owner;  // the user (JobView::owner); empty: the administrator, whom no limit of users holds
+  std::string group;  // jobs of one owner that share their turns and go in order: a sequence; empty: itself
+  // Limits of the job, or of all jobs of its group together.
+  std::uint32_t max_workers = 0;   // that may hold units of it at once; 0: any number
+  std::uint32_t max_units = 0;     // lent at once; 0: any number
+  std::uint64_t memory_bytes = 0;  // that a worker must have for it, at least; 0: not known
 };
 
 // ---- jobs
@@ -54,6 +62,14 @@ struct JobRestored {
   std::vector<std::vector<double>>
       rel_error;               // [round][tile] of what is folded, as UnitFolded said; only with a target
   double elapsed_seconds = 0;  // since its first ray, before the restart
+  // Results that were being rendered again (Farm::open_audits).
+  struct Audit {
+    TileIndex tile = 0;
+    RoundIndex round = 0;
+    std::optional<std::pair<WorkerId, Digest>> second;  // what another worker said, if it was not the same
+    bool operator==(const Audit&) const = default;
+  };
+  std::vector<Audit> audits;
 };
 
 struct JobCancelled {
@@ -102,6 +118,14 @@ struct WorkerJoined {
   Digest numeric_class;
   int threads = 1;
   std::vector<std::string> tags;
+  std::uint64_t memory_bytes = 0;   // that its renderer may use; 0: not told, then it is given anything
+  std::vector<Digest> blobs_held;   // in its cache, the most recently used first
+};
+// Known to have rendered wrong pixels, from before a restart or by another coordinator: it gets no work, and what it has
+// rendered of jobs that are here is void.
+struct WorkerBarred {
+  WorkerId worker;
+  std::string why;
 };
 // The stream has closed. With an epoch that is not the worker's last it means nothing.
 struct WorkerLost {
@@ -114,6 +138,11 @@ struct WorkerDrains {
 struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;
+};
+// A result of this worker's has come and waits until the coordinator has room for it; behind it all else that the
+// worker says waits, too. That is no fault of the worker's: its leases go on.
+struct ResultsWait {
+  WorkerId worker;
 };
 struct LeaseCameBack {
   WorkerId worker;
@@ -149,7 +178,7 @@ struct Tick {};
 
 using Event =
     std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
-                 JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerLost, WorkerDrains,
-                 LeaseProgress, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+                 JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerBarred, WorkerLost,
+                 WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -31,6 +31,10 @@ class UnitFailures {
   bool exhausted(UnitCode code, std::size_t workers_known) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
   bool any() const { return !units_.empty(); }
+  void mark_workers(std::vector<bool>& used) const {
+    for (const auto& [code, attempts] : units_)
+      for (const FailedAttempt& attempt : attempts) used[attempt.worker] = true;
+  }
 
  private:
   std::map<UnitCode, std::vector<FailedAttempt>> units_;  // attempts per unit are bounded by exhausted()

@@ -16,11 +16,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/error.h"
 #include "coordinator/domain/effect.h"
 #include "coordinator/domain/event.h"
+#include "coordinator/domain/figures.h"
 
 namespace ls::coordinator {
 
@@ -78,6 +80,9 @@ class Farm {
  public:
   struct Options {
     std::string lease_prefix = "l";  // leases are named PREFIX-1, PREFIX-2...; another one for every start
+    ShareLimits limits = {};
+    double audit_rate = 0;         // share of the accepted results that another worker renders again
+    std::uint64_t audit_seed = 0;  // chooses them; workers must not know it
   };
 
   Farm();
@@ -105,8 +110,25 @@ class Farm {
   // Why a job that could run has no worker: names workers of another class, without its tags, blocked or
   // sick. Empty while someone may take it.
   std::string why_waiting(const JobId& id) const;
+  // Core seconds of all users and jobs at work, as their turns are counted; for tests and metrics.
+  struct Shares {
+    std::string owner;
+    int priority = 0;
+    double seconds = 0;
+  };
+  std::vector<Shares> shares() const;
+  AuditFigures audits() const;
+  // Results that are being rendered again: to be stored, or a restart would let off who is wrong.
+  std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
+  std::vector<JobId> take_changed_audits();  // jobs whose open audits may be others than at the last call
+  bool barred(const WorkerId& worker) const;
+  // Whether a job that has no numeric class yet may get this worker's.
+  bool may_pin(const JobId& id, const WorkerId& worker) const;
   int threads_connected() const;
   int workers_connected() const;
+
+  // How much there is of everything that it keeps; for tests: what grows without an end?
+  std::vector<std::pair<std::string, std::size_t>> sizes() const;
 
   // Looks through everything and says what does not add up: planned = done + leased + queued, what leases,
   // workers and jobs say of one another, no worker idle while a unit it may take is queued. Empty if all is

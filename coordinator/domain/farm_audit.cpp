@@ -1,6 +1,10 @@
 // The farm's own book-keeping, checked from end to end.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
 #include "coordinator/domain/farm_state.h"
 
 namespace ls::coordinator {
@@ -39,11 +43,11 @@ std::string audit_job(Job& job, const LeaseBook& leases) {
   return "";
 }
 
-std::string audit_lease(const LeaseRecord& lease) {
+std::string audit_lease(const LeaseRecord& lease,
+                        const std::function<bool(const LeaseRecord&, UnitCode)>& has_unit) {
   std::uint32_t out = 0;
   for (const UnitCode code : lease.units) {
-    const auto it = lease.job->out.find(code);
-    out += it != lease.job->out.end() && it->second.has(lease.seq);
+    out += has_unit(lease, code);
   }
   if (out != lease.remaining || out == 0)
     return fmt::format("lease {}: {} units out, {} counted", lease.seq, out, lease.remaining);
@@ -53,14 +57,94 @@ std::string audit_lease(const LeaseRecord& lease) {
   return "";
 }
 
+std::string audit_load(const std::string& whose, const Load& kept, const Load& counted, std::uint32_t units,
+                       std::uint32_t workers) {
+  if (kept.units != counted.units || kept.leases_at != counted.leases_at)
+    return fmt::format("{}: {} units lent to {} workers, but counted as {} at {}", whose, counted.units,
+                       counted.leases_at.size(), kept.units, kept.leases_at.size());
+  if (units != 0 && kept.units > units)
+    return fmt::format("{}: {} units are lent, {} may be", whose, kept.units, units);
+  if (workers != 0 && kept.leases_at.size() > workers)
+    return fmt::format("{}: {} workers hold some, {} may", whose, kept.leases_at.size(), workers);
+  return "";
+}
+
+std::uint32_t tighter(std::uint32_t a, std::uint32_t b) { return a == 0 || b == 0 ? a + b : std::min(a, b); }
+
+// What is lent of each job, group and user, as the leases say.
+struct Lent {
+  std::map<JobSeq, Load> jobs;
+  std::map<std::string, Load> users, groups;
+  std::map<JobSeq, double> charges;
+
+  explicit Lent(const LeaseBook& leases) {
+    for (const auto& [seq, lease] : leases.all()) {
+      const JobPlan& plan = lease.job->plan;
+      charges[lease.job->seq] += lease.remaining * lease.charge_per_unit;
+      if (lease.audit) continue;
+      for (Load* load : {&jobs[lease.job->seq], &users[plan.owner], &groups[plan.group]}) {
+        load->units += lease.remaining;
+        ++load->leases_at[lease.worker->index];
+      }
+    }
+    users.erase("");
+    groups.erase("");
+  }
+};
+
+std::string audit_job_load(const Job& job, Lent& lent, const ShareLimits& limits) {
+  const JobPlan& plan = job.plan;
+  const std::string name = "job " + plan.brief.job.value;
+  const double charge = lent.charges[job.seq];
+  if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
+    return fmt::format("{}: charged with {} s, lent {} s", name, job.charge_out, charge);
+  const bool alone = plan.group.empty();  // else the limits are the group's
+  return audit_load(name, job.load, lent.jobs[job.seq], alone ? tighter(plan.max_units, limits.units_per_job) : 0,
+                    alone ? tighter(plan.max_workers, limits.workers_per_job) : 0);
+}
+
+std::string audit_loads(const std::string& what, const std::map<std::string, Load>& kept,
+                        std::map<std::string, Load>& counted, std::uint32_t units, std::uint32_t workers) {
+  if (counted.size() != kept.size()) return "a " + what + " that has nothing lent is counted";
+  for (const auto& [name, load] : kept)
+    if (std::string wrong = audit_load(what + " " + name, load, counted[name], units, workers); !wrong.empty())
+      return wrong;
+  return "";
+}
+
 }  // namespace
+
+std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
+  const State& s = *state_;
+  std::size_t of_workers = 0, of_jobs = 0, units = 0;
+  for (const auto& [index, w] : s.workers.all())
+    of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() + w->warmed_up.size() +
+                  w->failures.size();
+  for (const auto& [seq, job] : s.jobs) {
+    of_jobs += job->out.size() + job->audits.size() + job->marks.size() + job->queue.returned().size() +
+               job->load.leases_at.size();
+    units += job->units.accepted_count();
+  }
+  return {{"jobs", s.jobs.size() + s.by_id.size()},
+          {"of jobs", of_jobs},
+          {"units", units},
+          {"leases", s.leases.all().size()},
+          {"workers", s.workers.all().size()},
+          {"of workers", of_workers},
+          {"names", s.workers.names()},
+          {"hungry", s.workers.hungry().size() + s.touched.size()},
+          {"shares", s.shares.kept()},
+          {"loads", s.users.size() + s.groups.size()},
+          {"changed audits", s.audits_changed.size()},
+          {"barred", s.barred.size()}};
+}
 
 std::string Farm::audit() const {
   State& state = *state_;
   std::map<WorkerIndex, std::uint32_t> units_out;
   int threads = 0;
   for (const auto& [seq, lease] : state.leases.all()) {
-    if (std::string wrong = audit_lease(lease); !wrong.empty()) return wrong;
+    if (std::string wrong = audit_lease(lease, State::has); !wrong.empty()) return wrong;
     units_out[lease.worker->index] += lease.remaining;
   }
   for (const auto& [seq, job] : state.jobs) {
@@ -72,12 +156,20 @@ std::string Farm::audit() const {
       return "worker " + worker->id.value + ": its load is counted wrong";
     if (!worker->available() || worker->covered() || !worker->wants_more()) continue;
     for (const auto& [seq, job] : state.jobs) {
-      if (!job->leasable() || !may_serve(*job, *worker, state.ticked) || !state.next_for(*job, *worker))
-        continue;
+      if (!job->leasable() || !state.takes(*job, *worker)) continue;
       return "worker " + worker->id.value + " idles while job " + job->plan.brief.job.value +
              " has a unit for it";
     }
   }
+  const ShareLimits& limits = state.options.limits;
+  Lent lent(state.leases);
+  for (const auto& [seq, job] : state.jobs)
+    if (std::string wrong = audit_job_load(*job, lent, limits); !wrong.empty()) return wrong;
+  std::string wrong =
+      audit_loads("user", state.users, lent.users, limits.units_per_user, limits.workers_per_user);
+  if (wrong.empty())
+    wrong = audit_loads("group", state.groups, lent.groups, limits.units_per_job, limits.workers_per_job);
+  if (!wrong.empty()) return wrong;
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }
 

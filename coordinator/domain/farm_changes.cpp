@@ -114,6 +114,7 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
                                        [&](UnitCode unit) { return round_of(unit) >= last; });
     if (concerned) free_lease(seq, "round is rendered again in full", true);
   }
+  close_audits(job, [&](UnitCode code, const Audit&) { return round_of(code) >= last; });
   for (TileIndex t = 0; t < job.units.tiles(); ++t) job.queue.rewind(t, last);
   job.units.reopen(last);
   effects.emplace_back(ReopenRound{job.plan.brief.job, last});
@@ -121,6 +122,9 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
 
 void Farm::State::take_up_again(Job& job) {
   work_appeared = true;
+  // Of what has ended nothing was void: as an image it stood.
+  for (const auto& [worker, why] : barred)
+    if (const WorkerIndex liar = workers.index_of(worker); !job.units.tiles_of(liar).empty()) void_results(job, liar);
   if (job.adaptive) judge(job);
   job.move_windows(workers.threads());
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);

@@ -28,12 +28,13 @@ void Farm::State::set_state(Job& job, JobState to) {
 }
 
 void Farm::State::refresh(Job& job) {
-  const std::pair key{-static_cast<std::int64_t>(job.plan.priority), job.seq};
-  if (job.leasable() && !job.queue.empty(job.units)) {
-    if (ready.emplace(key, &job).second) work_appeared = true;
-  } else {
-    ready.erase(key);
-  }
+  const bool units = job.leasable() && !job.queue.empty(job.units);
+  work_appeared |= units && !job.has_units;  // it may stand there already for an audit that not everyone can do
+  job.has_units = units;
+  if (units || (job.leasable() && job.audit_waits()))
+    work_appeared |= shares.offer(job);
+  else
+    shares.withdraw(job);
 }
 
 void Farm::State::on(const JobSubmitted& event) {
@@ -69,6 +70,7 @@ void Farm::State::on(const JobRestored& event) {
     job.stopping.reset();
     set_state(job, JobState::running);
   }
+  restore_audits(job, event);
   if (job.adaptive) judge(job);
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
   finish_if_complete(job);
@@ -98,6 +100,10 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
+  // What is in hand is finished; the rest comes back at once. The last first: a lease waits behind earlier ones.
+  const std::vector<LeaseSeq> out = leases_of(*job);
+  for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
+    if (untouched(*leases.find(*seq))) free_lease(*seq, "paused", true);
   refresh(*job);
 }
 
@@ -120,8 +126,9 @@ void Farm::State::on(const JobStopped& event) {
 void Farm::State::on(const JobPriority& event) {
   Job* job = find(event.job);
   if (job == nullptr) return;
-  ready.erase({-static_cast<std::int64_t>(job->plan.priority), job->seq});
+  shares.leave(*job);
   job->plan.priority = event.priority;
+  shares.enter(*job);
   refresh(*job);
 }
 
@@ -152,9 +159,10 @@ void Farm::State::freeze(Job& job, StopReason reason) {
 
 void Farm::State::finish_if_complete(Job& job) {
   if (job.ended() || !job.complete()) return;
+  if (!job.audits.empty()) return refresh(job);  // the image is not said to be right before they are
   if (!job.stopping) job.stopping = StopReason::spp;
   set_state(job, JobState::done);
-  effects.emplace_back(JobFinished{job.plan.brief.job, *job.stopping});
+  effects.emplace_back(JobFinished{job.plan.brief.job, *job.stopping, job.audits_missed});
   refresh(job);
 }
 
@@ -176,6 +184,10 @@ void Farm::State::end(Job& job) {
     worker.briefed.erase(job.seq);
     worker.warmed_up.erase(job.seq);
   }
+  audited.dropped += job.audits.size();
+  if (!job.audits.empty()) audits_changed.insert(job.plan.brief.job);
+  job.audits.clear();
+  job.witnesses.clear();
   job.units.forget_results();
   refresh(job);
 }

@@ -7,6 +7,16 @@
 
 namespace ls::coordinator {
 
+namespace {
+
+std::string in_words(std::uint64_t bytes) {
+  const double mebibytes = static_cast<double>(bytes) / (1 << 20);
+  return mebibytes < 1000 ? fmt::format("{:.0f} MiB", std::ceil(mebibytes))
+                          : fmt::format("{:.1f} GiB", mebibytes / 1024);
+}
+
+}  // namespace
+
 Result<void> check_plan(const JobPlan& plan) {
   const TileGrid& grid = plan.grid;
   if (plan.brief.job.empty()) return fail(Errc::invalid_argument, "a job needs an id");
@@ -142,6 +152,11 @@ std::string Farm::why_waiting(const JobId& id) const {
     std::string why;
     if (job->numeric_class && *job->numeric_class != worker->numeric_class)
       why = "is of another numeric class";
+    else if (worker->barred)
+      why = "is barred, since it rendered wrong pixels";
+    else if (worker->memory_bytes != 0 && job->plan.memory_bytes > worker->memory_bytes)
+      why = fmt::format("has {} of memory and the job needs at least {}", in_words(worker->memory_bytes),
+                        in_words(job->plan.memory_bytes));
     else if (!fits(*job, *worker))
       why = "lacks a tag that the job asks for";
     else if (worker->sick_since)
@@ -160,6 +175,38 @@ std::string Farm::why_waiting(const JobId& id) const {
   if (connected == 0) return "no worker is connected";
   if (named > kMaxNamedWorkers) reasons += fmt::format("; and {} more", named - kMaxNamedWorkers);
   return reasons;
+}
+
+std::vector<Farm::Shares> Farm::shares() const {
+  std::vector<Shares> all;
+  for (const auto& f : state_->shares.figures())
+    all.push_back({f.owner, static_cast<int>(f.priority), f.seconds});
+  return all;
+}
+
+AuditFigures Farm::audits() const { return state_->audited; }
+std::vector<JobRestored::Audit> Farm::open_audits(const JobId& id) const {
+  std::vector<JobRestored::Audit> open;
+  const Job* job = state_->find(id);
+  if (job == nullptr) return open;
+  for (const auto& [code, audit] : job->audits) {
+    open.push_back({tile_of(code), round_of(code), std::nullopt});
+    if (audit.second) open.back().second = {state_->workers.name_of(audit.second->first), audit.second->second};
+  }
+  return open;
+}
+
+std::vector<JobId> Farm::take_changed_audits() {
+  std::vector<JobId> changed(state_->audits_changed.begin(), state_->audits_changed.end());
+  state_->audits_changed.clear();
+  return changed;
+}
+
+bool Farm::barred(const WorkerId& worker) const { return state_->barred.contains(worker); }
+bool Farm::may_pin(const JobId& id, const WorkerId& worker) const {
+  const Job* job = state_->find(id);
+  const Worker* known = std::as_const(state_->workers).find(worker);
+  return job != nullptr && known != nullptr && state_->may_pin(*job, *known);
 }
 
 int Farm::threads_connected() const { return state_->workers.threads(); }

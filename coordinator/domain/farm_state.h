@@ -1,7 +1,8 @@
 // The inside of the farm. Handlers are grouped by subject: farm_jobs, farm_workers, farm_units, farm_leases,
-// schedule, farm_stop.
+// schedule, farm_stop, farm_trust.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -11,18 +12,25 @@
 
 #include "coordinator/domain/farm.h"
 #include "coordinator/domain/lease_book.h"
+#include "coordinator/domain/share_book.h"
 
 namespace ls::coordinator {
 
 struct Farm::State {
-  explicit State(Options options) : leases(std::move(options.lease_prefix)) {}
+  explicit State(Options given) : options(std::move(given)), leases(options.lease_prefix) {}
 
+  const Options options;
   LeaseBook leases;
   WorkerBook workers;
   std::map<JobSeq, std::unique_ptr<Job>> jobs;
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
-  std::map<std::pair<std::int64_t, JobSeq>, Job*> ready;  // jobs with a unit to lease, by (-priority, order)
+  ShareBook shares;                   // the jobs with something to lease, and whose turn it is
+  std::map<std::string, Load> users;   // by owner; the administrator is none
+  std::map<std::string, Load> groups;  // of jobs that have one
+  std::map<WorkerId, std::string> barred;
+  AuditFigures audited;
+  std::set<JobId> audits_changed;
 
   // Of the event in hand.
   TimePoint now{};
@@ -49,7 +57,7 @@ struct Farm::State {
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
-  void refresh(Job& job);  // is it in `ready` as it should be? After any change of its queue, state or window
+  void refresh(Job& job);  // is it offered as it should be? After any change of its queue, state or window
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
   void finish_if_complete(Job& job);
@@ -58,9 +66,11 @@ struct Farm::State {
 
   // ---- farm_workers.cpp ----
   void on(const WorkerJoined& event);
+  void on(const WorkerBarred& event);
   void on(const WorkerLost& event);
   void on(const WorkerDrains& event);
   void on(const LeaseProgress& event);
+  void on(const ResultsWait& event);
   void on(const LeaseCameBack& event);
   void on(const Tick& event);
   void lose(Worker& worker, std::string_view why);
@@ -68,14 +78,38 @@ struct Farm::State {
   void grown(Worker& worker);  // it has finished something
   void expire_leases();
   void forgive_and_forget();
+  void forget_names();  // of workers that are gone and have no part in any job
 
   // ---- farm_units.cpp ----
   void on(const UnitAccepted& event);
   void on(const UnitFolded& event);
   void on(const UnitFailed& event);
-  void compare(Job& job, UnitCode code, const UnitAccepted& event);
+  void charge(Job& job, double cpu_seconds);  // to its owner's share
   void issue_folds(Job& job, TileIndex tile);
   void checkpoint(Job& job, RoundIndex round);
+
+  // ---- farm_trust.cpp: audits, and workers that render wrong pixels ----
+  void compare(Job& job, UnitCode code, const UnitAccepted& event);  // with the accepted result
+  void restore_audits(Job& job, const JobRestored& event);
+  void consider_audit(Job& job, UnitCode code, WorkerIndex first);
+  // The audit that this worker may do.
+  std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
+  bool audit_from(Job& job, Worker& worker);
+  bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;  // its word on this unit counts
+  void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
+  void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
+  void claimed(Job& job, UnitCode code, const UnitAccepted& by);
+  void undecided(Job& job, UnitCode code);
+  enum class Deciders { none, away, there };
+  Deciders deciders(const Job& job, const Audit& audit) const;
+  void settle_audits(Job& job);  // those that nobody can do
+  void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
+  void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
+  void distrust(const UnitKey& unit, WorkerIndex liar, std::string evidence);
+  void bar(const WorkerId& id, const std::string& why);  // of one that stands in `barred` already
+  void void_results(Job& job, WorkerIndex liar);
+  void void_tile(Job& job, TileIndex tile);
+  static void steer_anew(Job& job);
 
   // ---- farm_stop.cpp ----
   // What the fold of this round tells the stop rule, and what comes of it.
@@ -91,7 +125,15 @@ struct Farm::State {
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
   // ---- farm_leases.cpp ----
-  void grant(Job& job, Worker& worker, std::vector<UnitCode> units);
+  void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
+  void load(Job& job, const Worker& worker, std::uint32_t units);
+  void unload(Job& job, std::uint32_t units);
+  void leave_load(Job& job, const Worker& worker);  // one lease less
+  // Units of the job that the limits still allow the worker. Audits pass them: they are the farm's doing, not the
+  // user's, and one that had to wait for the user's other work would keep a finished image from being said to be so.
+  std::uint32_t room(const Job& job, const Worker& worker) const;
+  bool limited(const Job& job) const;
+  static bool has(const LeaseRecord& lease, UnitCode code);  // is the unit still out under it?
   // The unit leaves the lease; nothing is queued. True if no other lease holds it.
   bool detach(LeaseRecord& lease, UnitCode code);
   // All leases give the unit up because its result is there (from `by`).
@@ -106,8 +148,11 @@ struct Farm::State {
 
   // ---- schedule.cpp ----
   void dispatch();
-  void serve(const std::vector<Worker*>& candidates, bool only_uncovered);
-  bool assign(Worker& worker);
+  void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
+  bool assign(Worker& worker, bool only_held);
+  Job* choose(const Worker& worker);  // whose turn it is at this worker
+  bool takes(Job& job, const Worker& worker);
+  bool may_pin(const Job& job, const Worker& worker) const;
   bool lease_from(Job& job, Worker& worker);
   // The next unit of the job for this worker, if it may have one now.
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
@@ -115,6 +160,7 @@ struct Farm::State {
   // At a job's tail: what lies untouched behind other work is better begun by a worker that has none. True if
   // units wait again because of it.
   bool take_back_for_idle();
+  bool untouched(const LeaseRecord& lease) const;  // its worker is busy with earlier ones
   double waits_behind_others(const LeaseRecord& lease) const;
   LeaseRecord* longest_waiting_for(const Worker& idle);
   void copy_overdue(Worker& worker);  // speculation at the tail
@@ -125,9 +171,10 @@ void Farm::State::free_units(LeaseRecord& lease, std::string_view why, bool tell
   Job& job = *lease.job;
   UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, std::string(why)};
   for (const UnitCode code : lease.units) {
-    const auto it = job.out.find(code);
-    if (it == job.out.end() || !it->second.has(lease.seq) || !which(code)) continue;
-    freed.units.push_back(job.key(code));
+    if (!has(lease, code) || !which(code)) continue;
+    if (!lease.audit) freed.units.push_back(job.key(code));
+    if (!lease.audit) job.witnesses.note(code, lease.worker->index);
+    work_appeared |= lease.audit;
     if (!detach(lease, code)) continue;
     job.queue.put_back(code);
     work_appeared = true;

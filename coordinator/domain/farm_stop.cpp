@@ -104,6 +104,7 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
 void Farm::State::give_back_beyond(Job& job, std::string_view why) {
   for (const LeaseSeq seq : leases_of(job))
     free_units(*leases.find(seq), why, true, [&](UnitCode code) { return !job.queue.plans(code); });
+  close_audits(job, [&](UnitCode code, const Audit&) { return !job.queue.plans(code); });
 }
 
 }  // namespace ls::coordinator

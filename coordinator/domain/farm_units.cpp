@@ -18,6 +18,7 @@ void Farm::State::on(const UnitAccepted& event) {
   Job& job = *found;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return unwanted("the job has ended");
+  if (barred.contains(event.worker)) return unwanted("the worker is barred");
   if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
     return unwanted("not a unit of this job");
   if (event.samples != job.range(code)) return unwanted("another sample range is wanted");
@@ -26,7 +27,7 @@ void Farm::State::on(const UnitAccepted& event) {
   }
   if (job.units.accepted(code)) return compare(job, code, event);
 
-  if (worker != nullptr && !job.numeric_class) {
+  if (worker != nullptr && !job.numeric_class) {  // the service has asked may_pin()
     job.numeric_class = worker->numeric_class;
     effects.emplace_back(JobPinned{event.unit.job, worker->numeric_class});
   }
@@ -37,35 +38,18 @@ void Farm::State::on(const UnitAccepted& event) {
   job.units.accept(code, {event.digest, workers.index_of(event.worker)});
   job.failures.accepted(code);
   job.cost.measured(event.unit.tile, job.pixel_samples(code), event.cpu_seconds);
+  charge(job, event.cpu_seconds);
   if (worker != nullptr) {
     ++worker->units_done;
     if (worker->connected) worker->warmed_up.insert(job.seq);
   }
+  consider_audit(job, code, workers.index_of(event.worker));
   issue_folds(job, event.unit.tile);
   refresh(job);
 }
 
-void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
-  const UnitTable::Result& first = *job.units.find(code);
-  if (first.digest == event.digest || first.digest == Digest{}) {
-    effects.emplace_back(DropDuplicate{event.unit, event.worker});
-    return;
-  }
-  const WorkerId first_worker = workers.name_of(first.worker);
-  const Digest first_digest = first.digest;
-  effects.emplace_back(DigestMismatch{event.unit, first_digest, event.digest, first_worker, event.worker});
-  if (job.ended()) return;
-  fail(job,
-       fmt::format("two workers rendered tile {} round {} to different bits though they are of one numeric "
-                   "class: {} to "
-                   "{}, {} to {}. One of them has bad memory or is not what it says: let each render the "
-                   "scene alone with "
-                   "`lightshaft render`, take the one whose pixels_sha256 is not the others' off the farm, "
-                   "and submit the "
-                   "job again",
-                   event.unit.tile, event.unit.round, first_worker.value, first_digest.hex(),
-                   event.worker.value, event.digest.hex()),
-       std::nullopt);
+void Farm::State::charge(Job& job, double cpu_seconds) {
+  if (cpu_seconds > 0 && cpu_seconds <= kMostUnitSeconds) shares.spend(job, cpu_seconds);
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {
@@ -90,13 +74,23 @@ void Farm::State::on(const UnitFolded& event) {
 
 // Of an adaptive job only the rounds that all tiles get make checkpoints; then its levels do.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
-  if (!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop))
-    effects.emplace_back(Checkpoint{job.plan.brief.job, std::vector<RoundIndex>(job.units.tiles(), round + 1),
-                                    static_cast<double>(cut_range(round, job.spp).s1)});
+  const double spp = static_cast<double>(cut_range(round, job.spp).s1);
+  // Rounds that are folded a second time (a tile was void) make none again.
+  if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
+      spp > job.checkpoint_spp) {
+    job.checkpoint_spp = spp;
+    effects.emplace_back(
+        Checkpoint{job.plan.brief.job, std::vector<RoundIndex>(job.units.tiles(), round + 1), spp});
+  }
   if (!job.adaptive) job.move_windows(workers.threads());
 }
 
 LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) {
+  const auto audit = job.audits.find(code);
+  if (audit != job.audits.end() && audit->second.lease != 0) {
+    LeaseRecord* lease = leases.find(audit->second.lease);
+    return lease->worker == &worker ? lease : nullptr;
+  }
   const auto it = job.out.find(code);
   if (it == job.out.end()) return nullptr;
   for (const LeaseSeq seq : it->second.lease) {
@@ -117,12 +111,7 @@ void Farm::State::on(const UnitFailed& event) {
   // was taken back from it is rendered elsewhere.
   LeaseRecord* lease = lease_of(*job, code, *worker);
   if (lease == nullptr) return;
-  if (event.failure.scene_at_fault) {
-    return fail(
-        *job,
-        fmt::format("the scene cannot be rendered: {} (found by {})", event.failure.reason, worker->name),
-        event.failure);
-  }
+  if (lease->audit) return audit_failed(*job, code, *worker, *lease);
   free_units(*lease, "failed", false, [&](UnitCode unit) { return unit == code; });
   count_failure(*job, code, *worker, event.failure);
 }
@@ -144,10 +133,12 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
     fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
          failure);
   };
-  if (job.failures.exhausted(code, known)) return report("");
+  // That the scene is at fault is one worker's word, too: its memory may be bad, or it lies.
+  const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
+  if (job.failures.exhausted(code, known)) return report(at_fault);
   if (known > 0 && willing == 0) {
     return report(
-        fmt::format("no worker is left that may try: each has failed {} units of this job; the last: ",
+        fmt::format("{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
                     kWorkerFailuresPerJob));
   }
   if (was_blocked || !record.blocked_at(now)) return;

@@ -1,5 +1,6 @@
 // Workers: joining, reporting, leaving, and the passing of time.
 #include <algorithm>
+#include <span>
 
 #include "coordinator/domain/farm_state.h"
 
@@ -25,18 +26,30 @@ void Farm::State::on(const WorkerJoined& event) {
   worker.threads = std::clamp(event.threads, 1, kMaxThreads);
   worker.tags = event.tags;
   std::sort(worker.tags.begin(), worker.tags.end());
+  worker.memory_bytes = event.memory_bytes;
+  worker.blobs.clear();
+  for (const Digest& blob : std::span(event.blobs_held).first(std::min(event.blobs_held.size(), kBlobsRemembered)))
+    worker.blobs.push_back(head_of(blob));
+  std::sort(worker.blobs.begin(), worker.blobs.end());
+  const auto known = barred.find(event.worker);
+  worker.barred = known != barred.end();
   worker.draining = false;
   worker.pause = Pause::none;
   worker.briefed.clear();
   worker.warmed_up.clear();
   workers.connected(worker, true);
-  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), "joined"});
+  effects.emplace_back(
+      WorkerStateChanged{worker.id, worker.state(), worker.barred ? "barred: " + known->second : "joined"});
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || !job->plan.target_error) continue;
     job->move_windows(workers.threads());
     refresh(*job);
   }
   touch(worker);
+}
+
+void Farm::State::on(const WorkerBarred& event) {
+  if (barred.try_emplace(event.worker, event.why).second) bar(event.worker, event.why);
 }
 
 void Farm::State::on(const WorkerLost& event) {
@@ -87,6 +100,13 @@ void Farm::State::on(const LeaseProgress& event) {
   }
 }
 
+void Farm::State::on(const ResultsWait& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected) return;
+  grown(*worker);
+  for (const LeaseSeq seq : worker->leases) renew(*leases.find(seq));
+}
+
 void Farm::State::on(const LeaseCameBack& event) {
   Worker* worker = workers.find(event.worker);
   LeaseRecord* lease = leases.find(event.returned.lease);
@@ -103,6 +123,9 @@ void Farm::State::on(const Tick&) {
   ticked = now;
   expire_leases();
   forgive_and_forget();
+  shares.tidy();
+  for (const auto& [seq, job] : jobs)
+    if (!job->audits.empty()) settle_audits(*job);
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
@@ -148,6 +171,23 @@ void Farm::State::forgive_and_forget() {
     touched.erase(worker->index);
     workers.forget(*worker);
   }
+  if (workers.has_many_names()) forget_names();
+}
+
+void Farm::State::forget_names() {
+  std::vector<bool> used = workers.no_index();
+  for (const auto& [seq, job] : jobs) {
+    job->units.mark_workers(used);
+    job->failures.mark_workers(used);
+    job->witnesses.mark_workers(used);
+    for (const auto& [code, audit] : job->audits) {
+      used[audit.first] = true;
+      if (audit.second) used[audit.second->first] = true;
+      if (audit.claim) used[audit.claim->first] = true;
+      for (const WorkerIndex tried : audit.tried) used[tried] = true;
+    }
+  }
+  workers.keep_names(std::move(used));
 }
 
 }  // namespace ls::coordinator

@@ -1,9 +1,11 @@
 // A job as the farm keeps it. Its planned units are at every moment done (accepted), leased or queued.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <limits>
+#include <map>
 #include <unordered_map>
 
 #include "coordinator/domain/adaptive_stop.h"
@@ -12,6 +14,7 @@
 #include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
+#include "coordinator/domain/witness_book.h"
 
 namespace ls::coordinator {
 
@@ -27,6 +30,28 @@ struct Holders {
   void add(LeaseSeq seq) { (lease[0] == 0 ? lease[0] : lease[1]) = seq; }
   void remove(LeaseSeq seq) {
     for (LeaseSeq& l : lease) l = l == seq ? 0 : l;
+  }
+};
+
+// What is lent at once: of a job, or of all jobs of a user.
+struct Load {
+  std::uint32_t units = 0;                                   // copies included, audits not
+  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // by worker, never 0
+};
+
+// An accepted result that is rendered again elsewhere. With a second result that differs, a third decides.
+struct Audit {
+  WorkerIndex first = kNoWorker;
+  std::optional<std::pair<WorkerIndex, Digest>> second;
+  // What one said that nobody had asked: no vote, but the reason to ask.
+  std::optional<std::pair<WorkerIndex, Digest>> claim;
+  std::vector<WorkerIndex> tried;  // and failed
+  TimePoint since{};               // of the second result, or of the restart
+  bool restored = false;           // begun before a restart
+  LeaseSeq lease = 0;              // that it is out under; 0: it waits
+  bool asks(WorkerIndex worker) const {
+    return worker != first && (!second || worker != second->first) && (!claim || worker != claim->first) &&
+           std::find(tried.begin(), tried.end(), worker) == tried.end();
   }
 };
 
@@ -56,6 +81,15 @@ struct Job {
   std::unordered_map<UnitCode, Holders> out;  // leased units
   CostModel cost;
   UnitFailures failures;
+  std::map<UnitCode, Audit> audits;
+  std::uint64_t audits_missed = 0;  // chosen, but nobody else of the class was there
+  WitnessBook witnesses;
+  Load load;
+  std::uint32_t lent = 0;     // units out under all leases, of audits too
+  bool has_units = false;     // to lend, as last looked at
+  bool offered = false;       // stands among those whose turn may come
+  double charge_out = 0;      // core seconds that its leases are charged with (share_book.h)
+  double checkpoint_spp = 0;  // of the last checkpoint by rounds
 
   std::optional<AdaptiveStop> adaptive;  // with a target
   double level_seen = 0;                 // the last level at which the image was judged; 0: none
@@ -67,6 +101,9 @@ struct Job {
     return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
   }
   bool leasable() const { return state == JobState::queued || state == JobState::running; }
+  bool audit_waits() const {
+    return std::any_of(audits.begin(), audits.end(), [](const auto& a) { return a.second.lease == 0; });
+  }
   bool complete() const { return units.folded_count() == queue.planned(); }
 
   SampleRange range(UnitCode code) const { return cut_range(round_of(code), spp); }

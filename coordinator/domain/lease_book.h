@@ -18,6 +18,8 @@ struct LeaseRecord {
   std::uint32_t remaining = 0;
   std::uint32_t reported = 0;   // units done, as its progress said
   double seconds_per_unit = 0;  // predicted CPU seconds, mean over its units
+  double charge_per_unit = 0;   // the same, or an assumption where nothing is measured
+  bool audit = false;           // of one unit that has been accepted
   TimePoint issued{};
   Duration predicted{};  // from issued until all of it is done, the worker's earlier leases included
   TimePoint deadline{};

@@ -33,6 +33,20 @@ inline constexpr double kSpeculateAfter = 1.5;  // of the predicted duration: th
 inline constexpr Duration kSpeculateSlack = 1s;
 inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked at for one idle worker
 
+// ---- whose turn it is ----
+inline constexpr double kMostUnitSeconds = 86400;   // what a result reports beyond is not believed
+inline double believed_seconds(double reported) { return reported >= 0 && reported <= kMostUnitSeconds ? reported : 0; }
+inline constexpr double kAssumedUnitSeconds = 1.0;  // charged for a unit of a job of which nothing is measured
+// So much longer than fair all threads may go on with jobs whose world they hold before they load another.
+inline constexpr double kLocalitySeconds = 5.0;
+inline constexpr std::uint32_t kJobsLookedAt = 64;   // for one whose world the worker holds
+inline constexpr std::size_t kBlobsRemembered = 1024;  // of what a worker says it holds
+
+// ---- audits ----
+inline constexpr std::size_t kMaxAuditsOpen = 64;  // of one job; beyond, none is begun
+inline constexpr Duration kAuditAfterRestart = 60s;  // that workers have to come back for one, before it is dropped
+inline constexpr std::size_t kMaxWitnesses = 65'536;  // units and workers of one job: witness_book.h
+
 // ---- rounds leased ahead of what is folded over all tiles ----
 inline constexpr RoundIndex kRoundsAhead = 64;  // bounds what waits to be folded
 
@@ -43,6 +57,7 @@ inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;
 inline constexpr std::uint32_t kSickJobs = 2;
 inline constexpr Duration kForgiveAfter = 1800s;
 inline constexpr Duration kForgetWorkerAfter = 3600s;  // lost for so long
+inline constexpr std::size_t kNamesKept = 256;  // of workers that are gone; beyond, it is looked who is still needed
 inline constexpr std::uint32_t kMaxNamedWorkers = 8;   // in a message
 
 // ---- stopping ----

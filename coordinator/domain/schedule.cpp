@@ -1,5 +1,6 @@
-// Who gets what next. Previews first (the order of unit codes), higher priorities first, idle workers before
-// those that already have something to do, and small pieces at a job's tail.
+// Who gets what next. Higher priorities first, equal shares within one (share_book.h), previews first (the order of
+// unit codes); idle workers before those that already have something to do, and among them those that hold the
+// world; small pieces at a job's tail.
 #include <algorithm>
 #include <limits>
 
@@ -49,8 +50,11 @@ void Farm::State::dispatch() {
     for (const WorkerIndex index : work_appeared ? workers.hungry() : touched) {
       if (workers.hungry().contains(index)) candidates.push_back(&workers.at(index));
     }
-    serve(candidates, true);
-    serve(candidates, false);
+    const bool choice = candidates.size() > 1;
+    for (const bool only_uncovered : {true, false}) {
+      if (choice) serve(candidates, only_uncovered, true);
+      serve(candidates, only_uncovered, false);
+    }
   } while (take_back_for_idle());
   for (const WorkerIndex index : touched) {
     if (workers.hungry().contains(index)) copy_overdue(workers.at(index));
@@ -70,20 +74,27 @@ bool Farm::State::take_back_for_idle() {
   return false;
 }
 
-// Seconds until the worker begins the lease, if it has not begun it: it works through its leases in order.
-double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
-  const Worker& worker = *lease.worker;
+// It works through its leases in order: this one is not begun as long as earlier ones keep all its threads busy.
+bool Farm::State::untouched(const LeaseRecord& lease) const {
   std::uint32_t units = 0;
+  for (const LeaseSeq seq : lease.worker->leases) {
+    if (seq >= lease.seq) break;
+    units += leases.all().at(seq).remaining;
+  }
+  return lease.reported == 0 && units >= static_cast<std::uint32_t>(lease.worker->threads);
+}
+
+// Seconds until the worker begins the lease, if it has not begun it.
+double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
+  if (!untouched(lease)) return 0;
   double before = 0;
-  for (const LeaseSeq seq : worker.leases) {
+  for (const LeaseSeq seq : lease.worker->leases) {
     if (seq >= lease.seq) break;
     const LeaseRecord& earlier = leases.all().at(seq);
-    units += earlier.remaining;
     // As it is known now; when the first leases were made out, nothing was.
     before += earlier.remaining * earlier.job->predict(earlier.units.front());
   }
-  const bool waits = lease.reported == 0 && units >= static_cast<std::uint32_t>(worker.threads);
-  return waits ? before / worker.threads : 0;
+  return before / lease.worker->threads;
 }
 
 LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
@@ -94,8 +105,8 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
     LeaseRecord& lease = it->second;
     const Job& job = *lease.job;
     // The idle one begins at once what it is given: it has the world, and nothing keeps it from the units.
-    if (lease.worker == &idle || !idle.warmed_up.contains(job.seq) || !may_serve(job, idle, ticked) ||
-        !job.leasable())
+    if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
+        !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
       continue;
     const bool barred = std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode code) {
       return job.failures.failed_on(code, idle.index) || out_of_time(job, idle, code, now);
@@ -106,23 +117,59 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   return found;
 }
 
-void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered) {
+void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders) {
   bool served = true;
-  while (served && !ready.empty()) {
+  while (served && !shares.empty()) {
     served = false;
     for (Worker* worker : candidates) {
-      if (ready.empty()) return;
+      if (shares.empty()) return;
       if (!worker->wants_more() || (only_uncovered && worker->covered())) continue;
-      served |= assign(*worker);
+      served |= assign(*worker, only_holders);
     }
   }
 }
 
-bool Farm::State::assign(Worker& worker) {
-  for (const auto& [order, job] : ready) {
-    if (may_serve(*job, worker, ticked) && lease_from(*job, worker)) return true;  // `ready` may have changed
+bool Farm::State::takes(Job& job, const Worker& worker) {
+  if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return false;
+  return audit_for(job, worker) || (room(job, worker) > 0 && next_for(job, worker));
+}
+
+// What a worker renders that is alone of its class nobody can check: a job goes to a class of several where there is
+// one. Where nothing is audited it does not matter.
+bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
+  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
+  std::map<Digest, int> others;
+  for (const auto& [index, other] : workers.all()) {
+    const bool there = other->connected && !other->draining && !other->sick_since && other->pause != Pause::silent &&
+                       other->pause != Pause::stuck && other->numeric_class != worker.numeric_class;
+    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1) return false;
   }
-  return false;
+  return true;
+}
+
+// The job whose turn it is, or one whose world the worker holds, if that has not had much more than its share: to
+// load a world costs time. A job that nobody renders does not wait for that.
+Job* Farm::State::choose(const Worker& worker) {
+  Job* fair = nullptr;
+  Job* chosen = nullptr;
+  double least = 0;
+  std::uint32_t looked_at = 0;
+  const double slack = kLocalitySeconds * workers.threads();
+  shares.in_turn([&](Job& job, double lag) {
+    if (fair != nullptr && ++looked_at > kJobsLookedAt) return true;
+    if (fair != nullptr && (lag - least > slack || !holds(job, worker))) return false;
+    if (!takes(job, worker)) return false;
+    if (fair == nullptr) fair = &job, least = lag;
+    if (!holds(job, worker) && job.load.units > 0) return false;
+    chosen = &job;
+    return true;
+  });
+  return chosen != nullptr ? chosen : fair;
+}
+
+bool Farm::State::assign(Worker& worker, bool only_held) {
+  Job* job = choose(worker);
+  return job != nullptr && (!only_held || holds(*job, worker)) && lease_from(*job, worker);
 }
 
 std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
@@ -134,7 +181,9 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
 }
 
 bool Farm::State::lease_from(Job& job, Worker& worker) {
-  const LeaseSize size = lease_size(job, worker, workers.threads(), now);
+  if (audit_from(job, worker)) return true;
+  LeaseSize size = lease_size(job, worker, workers.threads(), now);
+  size.units = std::min<std::uint64_t>(size.units, room(job, worker));
   std::vector<UnitCode> units;
   double cost = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
@@ -150,6 +199,7 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
     effects.emplace_back(JobPinned{job.plan.brief.job, worker.numeric_class});
   }
   if (job.state == JobState::queued) set_state(job, JobState::running);
+  shares.served(job);
   grant(job, worker, std::move(units));
   refresh(job);
   return true;
@@ -172,7 +222,9 @@ void Farm::State::copy_overdue(Worker& worker) {
     if (lease.worker == &worker || now < lease.issued + due) continue;
     if (!job.leasable() || !may_serve(job, worker, ticked)) continue;
     std::vector<UnitCode> units;
+    const std::uint32_t most = room(job, worker);
     for (const UnitCode code : lease.units) {
+      if (units.size() >= most) break;
       if (worker.units_out + units.size() >= static_cast<std::uint32_t>(worker.threads)) break;
       const auto it = job.out.find(code);
       if (it == job.out.end() || !it->second.has(seq) || it->second.full()) continue;

@@ -61,6 +61,41 @@ void UnitTable::reopen(RoundIndex index) {
   rounds_complete_ = std::min(rounds_complete_, index);
 }
 
+std::vector<UnitCode> UnitTable::void_tile(TileIndex tile) {
+  std::vector<UnitCode> voided;
+  for (RoundIndex k = 0; k < rounds_.size(); ++k) {
+    Round& r = rounds_[k];
+    if (!r.errors.empty()) r.errors[tile] = std::numeric_limits<double>::quiet_NaN();
+    if (k < folded_[tile]) --r.folded, --folded_count_;
+    if (r.results.empty() || r.results[tile].worker == kNoWorker) continue;
+    voided.push_back(unit_code(k, tile));
+    r.results[tile] = {};
+    --accepted_count_;
+    if (--r.accepted == 0) r.results = {};
+  }
+  issued_[tile] = folded_[tile] = 0;
+  rounds_complete_ = 0;
+  settle_complete();
+  return voided;
+}
+
+void UnitTable::mark_workers(std::vector<bool>& used) const {
+  for (const Round& round : rounds_)
+    for (const Result& result : round.results)
+      if (result.worker != kNoWorker) used[result.worker] = true;
+}
+
+std::vector<TileIndex> UnitTable::tiles_of(WorkerIndex worker) const {
+  std::vector<bool> has(tiles_);
+  for (const Round& r : rounds_)
+    for (TileIndex t = 0; t < r.results.size(); ++t)
+      if (r.results[t].worker == worker) has[t] = true;
+  std::vector<TileIndex> found;
+  for (TileIndex t = 0; t < tiles_; ++t)
+    if (has[t]) found.push_back(t);
+  return found;
+}
+
 void UnitTable::forget_results() {
   for (Round& r : rounds_) r.results = {}, r.errors = {};
 }

@@ -41,6 +41,10 @@ class UnitTable {
   RoundIndex end_of_accepted(TileIndex tile) const;  // one past its last accepted round
   void truncate(TileIndex tile, RoundIndex end);     // forgets its acceptances from `end` on, none folded
   void reopen(RoundIndex round);  // forgets round `round`, accepted or folded; no later one may be known
+  // Forgets all of the tile, accepted and folded. Returns the units that were accepted, ascending.
+  std::vector<UnitCode> void_tile(TileIndex tile);
+  std::vector<TileIndex> tiles_of(WorkerIndex worker) const;  // of which it has an accepted result; ascending
+  void mark_workers(std::vector<bool>& used) const;  // those that accepted results name
   void forget_results();          // of a job that failed: frees the memory, keeps the fold counts
 
   // ---- folding ----

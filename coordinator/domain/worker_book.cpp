@@ -1,13 +1,35 @@
 #include "coordinator/domain/worker_book.h"
 
 #include <algorithm>
+#include <cstring>
+#include <utility>
 
 namespace ls::coordinator {
 
 WorkerIndex WorkerBook::index_of(const WorkerId& id) {
-  const auto [it, made] = index_.try_emplace(id, static_cast<WorkerIndex>(ids_.size()));
-  if (made) ids_.push_back(id);
-  return it->second;
+  const auto known = index_.find(id);
+  if (known != index_.end()) return known->second;
+  WorkerIndex index = static_cast<WorkerIndex>(ids_.size());
+  if (free_.empty()) {
+    ids_.push_back(id);
+  } else {
+    index = free_.back();
+    free_.pop_back();
+    ids_[index] = id;
+  }
+  index_.emplace(id, index);
+  return index;
+}
+
+void WorkerBook::keep_names(std::vector<bool> used) {
+  for (const auto& [index, worker] : workers_) used[index] = true;
+  for (WorkerIndex i = 0; i < ids_.size(); ++i) {
+    if (used[i] || ids_[i].empty()) continue;
+    index_.erase(ids_[i]);
+    ids_[i] = {};
+    free_.push_back(i);
+  }
+  kept_ = index_.size();
 }
 
 Worker& WorkerBook::get(const WorkerId& id) {
@@ -47,9 +69,33 @@ void WorkerBook::connected(Worker& worker, bool yes) {
   worker.connected = yes;
   threads_ += yes ? worker.threads : -worker.threads;
   connected_ += yes ? 1 : -1;
+  if (worker.barred) return;
+  yes ? ++classes_[worker.numeric_class] : --classes_[worker.numeric_class];
+}
+
+void WorkerBook::bar(Worker& worker) {
+  if (!std::exchange(worker.barred, true) && worker.connected) --classes_[worker.numeric_class];
+}
+
+std::uint32_t WorkerBook::of_class(const Digest& numeric_class) const {
+  const auto found = classes_.find(numeric_class);
+  return found == classes_.end() ? 0 : found->second;
+}
+
+std::uint64_t head_of(const Digest& digest) {
+  std::uint64_t head = 0;
+  std::memcpy(&head, digest.bytes.data(), sizeof head);
+  return head;
+}
+
+bool holds(const Job& job, const Worker& worker) {
+  return worker.warmed_up.contains(job.seq) ||
+         std::binary_search(worker.blobs.begin(), worker.blobs.end(), head_of(job.plan.brief.scene));
 }
 
 bool fits(const Job& job, const Worker& worker) {
+  if (worker.barred) return false;
+  if (worker.memory_bytes != 0 && job.plan.memory_bytes > worker.memory_bytes) return false;
   if (job.numeric_class && *job.numeric_class != worker.numeric_class) return false;
   return std::includes(worker.tags.begin(), worker.tags.end(), job.plan.tags.begin(), job.plan.tags.end());
 }

@@ -28,7 +28,10 @@ struct Worker {
   std::uint64_t epoch = 0;
   Digest numeric_class;
   int threads = 1;
-  std::vector<std::string> tags;  // sorted
+  std::vector<std::string> tags;     // sorted
+  std::uint64_t memory_bytes = 0;    // 0: not told
+  std::vector<std::uint64_t> blobs;  // first bytes of what it said it holds, sorted
+  bool barred = false;               // it rendered wrong pixels
   bool connected = false;
   bool draining = false;
   Pause pause = Pause::none;
@@ -55,11 +58,13 @@ struct Worker {
     if (units_out < 2 * static_cast<std::uint32_t>(threads)) return true;
     return leases.size() < kLeasesPerWorker && seconds_out < kLeasesPerWorker * kLeaseSeconds * threads;
   }
-  bool available() const { return connected && !draining && pause == Pause::none && !sick_since; }
+  bool available() const {
+    return connected && !draining && pause == Pause::none && !sick_since && !barred;
+  }
   WorkerState state() const {
     if (!connected) return WorkerState::lost;
     if (draining) return WorkerState::draining;
-    return sick_since ? WorkerState::sick : WorkerState::connected;
+    return sick_since || barred ? WorkerState::sick : WorkerState::connected;
   }
 };
 
@@ -72,6 +77,12 @@ class WorkerBook {
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
   WorkerIndex index_of(const WorkerId& id);  // for workers that are only named in a record
   void forget(Worker& worker);
+  // Names outlive their workers, since results name them; of preemptible workers there come new ones every hour.
+  bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
+  std::size_t names() const { return index_.size(); }
+  // Forgets all names but those of known workers and of indices that are true here. Their indices are given to others.
+  void keep_names(std::vector<bool> used);
+  std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
   // Brings the list of those that want work up to date; call it after any change to a worker.
   void settle(Worker& worker);
@@ -82,16 +93,26 @@ class WorkerBook {
   int threads() const { return threads_; }  // of connected workers
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
+  void bar(Worker& worker);
+  std::uint32_t of_class(const Digest& numeric_class) const;  // connected ones that are not barred
 
  private:
   std::vector<WorkerId> ids_;
   std::unordered_map<WorkerId, WorkerIndex> index_;
+  std::vector<WorkerIndex> free_;
+  std::size_t kept_ = 0;  // names at the last keep_names()
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> hungry_;
   int threads_ = 0, connected_ = 0;
+  std::map<Digest, std::uint32_t> classes_;
 };
 
-// Of the job's numeric class, with its tags; leaves aside what the worker is doing.
+// The first bytes of a digest, as Worker::blobs keeps them.
+std::uint64_t head_of(const Digest& digest);
+// Has the job's world, or at least its files.
+bool holds(const Job& job, const Worker& worker);
+
+// Of the job's numeric class, with its tags, with memory enough, and trusted; leaves aside what the worker is doing.
 bool fits(const Job& job, const Worker& worker);
 // And may take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <exception>
 
@@ -37,6 +39,44 @@ Response not_found(const Request& request) {
                                   path.empty() ? "/" : path.substr(0, 200)));
 }
 
+constexpr std::string_view kOneJob = "/api/v1/jobs/{id}";
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    out += std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '~'
+               ? std::string(1, static_cast<char>(c))
+               : fmt::format("%{:02X}", c);
+  return out;
+}
+
+std::string target_of(const Request& request) {
+  std::string target;
+  for (const auto& segment : request.segments) target += "/" + escaped(segment);
+  for (const auto& [name, value] : request.query)
+    target += fmt::format("{}{}={}", target.find('?') == std::string::npos ? '?' : '&', escaped(name),
+                          escaped(value));
+  return target;
+}
+
+// A job that another coordinator has: the client is sent there.
+std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
+                                     const Params& params) {
+  if (params.empty() || !plausible_id(params[0])) return std::nullopt;
+  const auto owner = coordinator.elsewhere({params[0]});
+  if (!owner)
+    return problem(503, "which coordinator has this job cannot be found out now: " + owner.error().message);
+  if (!*owner) return std::nullopt;
+  if (!(*owner)->alive || (*owner)->http.empty())
+    return problem(
+        503,
+        "the coordinator that has this job does not answer; unless the job has ended, another one takes "
+        "it over within seconds: ask again");
+  Response response = problem(307, "another coordinator has this job; its address is in Location");
+  response.headers.emplace_back("Location", (*owner)->http + target_of(request));
+  return response;
+}
+
 Response options_response(const std::string& allow) {
   Response response;
   response.status = 204;
@@ -46,10 +86,24 @@ Response options_response(const std::string& allow) {
 
 }  // namespace
 
-Api::Api(coordinator::Coordinator& coordinator, std::string token, Limits limits, StaticFiles files)
-    : coordinator_(coordinator), auth_(std::move(token)), limits_(limits), files_(std::move(files)) {}
+Api::Api(coordinator::Coordinator& coordinator, TokenBook& tokens, Limits limits, StaticFiles files, bool secure)
+    : coordinator_(coordinator),
+      tokens_(tokens),
+      auth_(tokens, {{limits.requests_per_second, std::max(1.0, 2 * limits.requests_per_second)},
+                     {limits.wrong_tokens_per_minute / 60, std::max(1.0, limits.wrong_tokens_per_minute)},
+                     secure}),
+      limits_(limits),
+      files_(std::move(files)) {}
 
-std::variant<Response, Match> Api::admit(const Request& request) const {
+std::variant<Response, Match> Api::admit(Request& request) {
+  auto found = admit_route(request);
+  // Those who are known were counted where they became so.
+  if (request.caller.token_id.empty())
+    if (auto refused = auth_.too_often(request, nullptr)) return *refused;
+  return found;
+}
+
+std::variant<Response, Match> Api::admit_route(Request& request) {
   auto found = find_route(request.method, request.segments);
   if (!found) {
     const bool reads = request.method == Method::get || request.method == Method::head;
@@ -63,7 +117,7 @@ std::variant<Response, Match> Api::admit(const Request& request) const {
     }
     // Under /api only those with a token learn what exists.
     if (!request.segments.empty() && request.segments.front() == "api")
-      if (auto refused = auth_.refuse(request)) return *refused;
+      if (auto refused = refuse_caller(Access::token, request)) return *refused;
     return not_found(request);
   }
   if (auto* wrong = std::get_if<WrongMethod>(&*found)) {
@@ -74,10 +128,30 @@ std::variant<Response, Match> Api::admit(const Request& request) const {
     return response;
   }
   Match& match = std::get<Match>(*found);
-  if (match.route->access == Access::token)
-    if (auto refused = auth_.refuse(request)) return *refused;
+  if (auto refused = refuse_caller(match.route->access, request)) return *refused;
   if (auto refused = refuse_body(*match.route, request)) return *refused;
   return std::move(match);
+}
+
+std::optional<Response> Api::refuse_caller(Access access, Request& request) {
+  if (access == Access::open) return std::nullopt;
+  auto caller = auth_.identify(request);
+  if (auto* refused = std::get_if<Response>(&caller)) return std::move(*refused);
+  request.caller = std::move(std::get<Caller>(caller));
+  if (auto refused = auth_.too_often(request, &request.caller)) return refused;
+  if (allows(access, request.caller.role)) return std::nullopt;
+  return problem(403, fmt::format("a token of the role '{}' may not do this; it takes: {}",
+                                  to_string(request.caller.role), to_string(access)));
+}
+
+std::optional<Response> Api::refuse_job(const Match& match, const Request& request) const {
+  if (request.caller.role != Role::submit || !match.route->pattern.starts_with("/api/v1/jobs/{id}"))
+    return std::nullopt;
+  const auto id = job_of(request, match.params);
+  if (!id && id.error().code != Errc::not_found) return problem(id.error());
+  const auto owner = id ? coordinator_.owner(*id) : tl::unexpected(id.error());
+  if (owner && request.caller.sees(*owner)) return std::nullopt;
+  return problem(404, fmt::format("'{}' has no such job", request.caller.user));
 }
 
 std::optional<Response> Api::refuse_body(const Route& route, const Request& request) const {
@@ -113,7 +187,23 @@ std::variant<Response, std::unique_ptr<BodySink>> Api::open_upload(const Match& 
 }
 
 Response Api::handle(const Match& match, const Request& request) {
-  return guarded(match.route->pattern, [&] { return match.route->handler(*this, request, match.params); });
+  return guarded(match.route->pattern, [&] {
+    auto refused = refuse_job(match, request);
+    return refused ? std::move(*refused) : match.route->handler(*this, request, match.params);
+  });
+}
+
+// Whose job it is the other coordinator knows; of one that is here no more is told.
+bool Api::may_be_elsewhere(const Match& match, const Response& response) const {
+  return response.status == 404 && match.route->pattern.starts_with(kOneJob) && !match.params.empty() &&
+         !coordinator_.owner(JobId{match.params[0]});
+}
+
+Response Api::ask_elsewhere(const Match& match, const Request& request, Response response) {
+  return guarded(match.route->pattern, [&] {
+    auto other = at_its_owner(coordinator_, request, match.params);
+    return other ? std::move(*other) : std::move(response);
+  });
 }
 
 Response guarded(std::string_view what, const std::function<Response()>& work) {

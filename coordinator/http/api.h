@@ -31,11 +31,13 @@ class BodySink {
 
 class Api {
  public:
-  Api(coordinator::Coordinator& coordinator, std::string token, Limits limits, StaticFiles files);
+  // `tokens` outlives this. `secure`: what comes here came over TLS.
+  Api(coordinator::Coordinator& coordinator, TokenBook& tokens, Limits limits, StaticFiles files,
+      bool secure = false);
 
-  // A match to go on with, or the answer already: an unknown address, no token, too long a body, a static
-  // file.
-  std::variant<Response, Match> admit(const Request& request) const;
+  // A match to go on with, or the answer already: an unknown address, no token or one that may not, too many
+  // requests, too long a body, a static file. Sets request.caller.
+  std::variant<Response, Match> admit(Request& request);
   // Bytes that this request's body may have, announced or not.
   std::uint64_t body_limit(const Route& route, const Request& request) const;
   // What becomes of this request's body: the route's kind, or `archive` if it is of a type that the route
@@ -43,6 +45,10 @@ class Api {
   BodyKind body_kind(const Route& route, const Request& request) const;
   // Runs the route's handler; no exception leaves it.
   Response handle(const Match& match, const Request& request);
+  // Whether a 404 may be because another coordinator has the job. Then ask_elsewhere(), which may wait for a second,
+  // says so, or gives the answer back as it was.
+  bool may_be_elsewhere(const Match& match, const Response& response) const;
+  Response ask_elsewhere(const Match& match, const Request& request, Response response);
   // For bodies that are streamed: BodyKind::blob and archive.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
   // Long work ends at its next step: the coordinator stops.
@@ -51,17 +57,29 @@ class Api {
 
   coordinator::Coordinator& coordinator() { return coordinator_; }
   Auth& auth() { return auth_; }
+  TokenBook& tokens() { return tokens_; }
   Counters& counters() { return counters_; }
   const Limits& limits() const { return limits_; }
+  // Asked at every look at /metrics; before the first request. Without it there are no webhooks.
+  void webhooks(std::function<WebhookFigures()> figures) { webhooks_ = std::move(figures); }
+  std::optional<WebhookFigures> webhooks() const {
+    return webhooks_ ? std::optional(webhooks_()) : std::nullopt;
+  }
 
  private:
+  std::variant<Response, Match> admit_route(Request& request);
+  std::optional<Response> refuse_caller(Access access, Request& request);
   std::optional<Response> refuse_body(const Route& route, const Request& request) const;
+  // To a submit token every job of others is as if it were not.
+  std::optional<Response> refuse_job(const Match& match, const Request& request) const;
 
   coordinator::Coordinator& coordinator_;
+  TokenBook& tokens_;
   Auth auth_;
   Limits limits_;
   StaticFiles files_;
   Counters counters_;
+  std::function<WebhookFigures()> webhooks_;
   std::stop_source stop_;
 };
 

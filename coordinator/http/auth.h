@@ -1,7 +1,8 @@
-// Who may ask. A request shows the bearer token, or a session cookie that the token was traded for.
+// Who may ask. A request shows a bearer token, or a session cookie that a token was traded for.
 //
-// A session is `expiry.nonce.mac`, the mac keyed by the token: it needs no memory and survives a restart of
-// the coordinator. Sessions closed by DELETE /session are remembered until they expire or the process ends.
+// A session is `expiry.nonce.token-id.mac`, the mac keyed by the admin token: it needs no memory, survives a
+// restart of the coordinator, and is worth what its token is worth: nothing once that is revoked. Sessions
+// closed by DELETE /session are remembered until they expire or the process ends.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 
+#include "coordinator/http/caller.h"
+#include "coordinator/http/limits.h"
 #include "coordinator/http/message.h"
+#include "coordinator/http/throttle.h"
+#include "coordinator/http/token_book.h"
 
 namespace ls::http {
 
@@ -21,14 +27,26 @@ UnixClock system_unix_clock();
 
 class Auth {
  public:
-  explicit Auth(std::string token, UnixClock now = system_unix_clock());
+  struct Options {
+    Pace requests{};        // of one token, or of one address without any
+    Pace failures{};        // wrong tokens of one address
+    bool secure = false;    // over TLS: the cookie is for it alone
+  };
+  // `book` outlives this.
+  Auth(const TokenBook& book, Options options, UnixClock now = system_unix_clock());
 
-  // Nothing if the request may go on, else the 401 or 403. A cookie counts for an unsafe method only if the
-  // browser says that the request comes from our own pages.
-  std::optional<Response> refuse(const Request& request) const;
+  // Who asks, else the 401, 403 or 429. A cookie counts for an unsafe method only if the browser says that the
+  // request comes from our own pages.
+  std::variant<Caller, Response> identify(const Request& request);
 
-  // POST /session: the Set-Cookie value for the right token, else nothing.
-  std::optional<std::string> open_session(std::string_view token) const;
+  // 429 if this one, or (without a caller) this address, asks too often.
+  std::optional<Response> too_often(const Request& request, const Caller* caller);
+
+  // Whether the token that this caller came with is still worth anything.
+  bool still_valid(const Caller& caller) const;
+
+  // POST /session: the Set-Cookie value for a token, else why not.
+  std::variant<std::string, Response> open_session(const Request& request, std::string_view token);
   // DELETE /session: forgets the request's session, if it has one; gives the Set-Cookie value that clears it.
   std::string close_session(const Request& request);
 
@@ -36,14 +54,18 @@ class Auth {
   static bool cross_site(const Request& request);
 
  private:
-  bool token_matches(std::string_view token) const;
-  bool session_valid(std::string_view session) const;
+  std::variant<Caller, Response> caller_of_token(const Request& request, std::string_view token,
+                                                 std::string_view wrong);
+  std::optional<Caller> caller_of_session(std::string_view session) const;
   std::string_view session_of(const Request& request) const;
   std::string mac(std::string_view text) const;
+  std::string cookie(std::string_view value, std::int64_t seconds) const;
 
-  std::string token_;
-  std::string cookie_name_;  // has a part of the token's digest: cookies don't tell ports apart
+  const TokenBook& book_;
+  const Options options_;
+  std::string cookie_name_;  // has a part of the key's digest: cookies don't tell ports apart
   UnixClock now_;
+  Throttle throttle_;
   mutable std::mutex mutex_;
   std::map<std::string, std::int64_t, std::less<>> revoked_;  // session -> expiry
 };

@@ -58,7 +58,15 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
   std::string chunk;
   while (!parser.is_done()) {
     const Read read = co_await read_portion(parser, chunk, began, received);
-    if (read != Read::ok) co_return Body{read, {}};
+    if (read != Read::ok) {
+      // An upload in parts keeps what has arrived, also where connections never live for a whole chunk.
+      disarm();
+      auto keep = [&sink, &chunk] {
+        return chunk.empty() ? std::nullopt : sink.append(std::as_bytes(std::span(chunk)));
+      };
+      co_await run_on(shared_.slow, shared_.io, std::move(keep));
+      co_return Body{read, {}};
+    }
     if (chunk.empty() || (chunk.size() < kBodyChunk && !parser.is_done())) continue;
     disarm();
     const auto paused = SteadyClock::now();

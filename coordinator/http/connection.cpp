@@ -5,6 +5,7 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <exception>
+#include <utility>
 
 #include "common/base/log.h"
 #include "coordinator/http/head_text.h"
@@ -15,8 +16,8 @@ namespace ls::http {
 
 using boost::system::error_code;
 
-Connection::Connection(Tcp::socket socket, Shared& shared)
-    : socket_(std::move(socket)),
+Connection::Connection(Tcp::socket socket, std::shared_ptr<const TlsIdentity> tls, Shared& shared)
+    : stream_(std::move(socket), std::move(tls)),
       shared_(shared),
       limits_(shared.api.limits()),
       watchdog_(shared.io),
@@ -27,6 +28,7 @@ Connection::Connection(Tcp::socket socket, Shared& shared)
 
 Connection::~Connection() {
   charge(0);
+  charge_answer(0);
   shared_.open.erase(this);
   --shared_.api.counters().connections;
 }
@@ -37,18 +39,32 @@ void Connection::wind_down() {
 }
 
 void Connection::cut() {
-  error_code ignored;
-  socket_.close(ignored);
+  stream_.close();
   if (events_wait_ != nullptr) events_wait_->cancel();
 }
 
 net::awaitable<void> Connection::serve() {
   try {
+    if (!co_await open()) co_return;
     while (!shared_.stopping && co_await serve_one()) {
     }
+    arm(SteadyClock::now() + steady_seconds(limits_.linger_seconds));
+    co_await stream_.say_goodbye();
   } catch (const std::exception& e) {
     log_warn("", fmt::format("an HTTP connection was dropped: {}", e.what()));
   }
+}
+
+// A handshake has the time of a header: whoever is slow at it waits alone.
+net::awaitable<bool> Connection::open() {
+  arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));
+  const Stream::Opened opened = co_await stream_.open();
+  disarm();
+  if (opened == Stream::Opened::plain_text) {
+    const Response told = problem(400, "this port speaks TLS: ask it with https://, not http://");
+    co_await answer_unread(told);
+  }
+  co_return opened == Stream::Opened::ready;
 }
 
 net::awaitable<bool> Connection::serve_one() {
@@ -66,6 +82,7 @@ net::awaitable<bool> Connection::serve_one() {
     co_return false;
   }
   Request& request = std::get<Request>(parsed);
+  request.peer = stream_.peer();
   const auto admitted = shared_.api.admit(request);
   if (const auto* response = std::get_if<Response>(&admitted)) {
     const bool kept = co_await answer(request, *response, parser.keep_alive() && !request.has_body);
@@ -91,21 +108,49 @@ net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match,
   Response response;
   if (body.answer) {
     response = std::move(*body.answer);
-  } else if (route.lane == Lane::here) {
-    response = shared_.api.handle(match, request);
   } else {
-    auto work = [this, &match, &request] { return shared_.api.handle(match, request); };
-    response = co_await run_on(route.lane == Lane::quick ? shared_.quick : shared_.slow, shared_.io,
-                               std::move(work));
+    response = co_await handle_on_lane(match, request);
   }
   if (response.events) {
     co_await stream_events(request, response);
     co_return false;
   }
+  if (!charge_answer(response.in_memory())) {
+    response = problem(503, "too much is being sent to others that read slowly; try again");
+    response.headers.emplace_back("Retry-After", "2");
+  }
   const bool unread = request.has_body && !parser.is_done();
   const bool kept = co_await answer(request, response, parser.keep_alive() && !unread);
+  charge_answer(0);
   if (unread) co_await linger();
   co_return kept;
+}
+
+net::awaitable<Response> Connection::handle_on_lane(const Match& match, const Request& request) {
+  const Lane lane = match.route->lane;
+  if (lane == Lane::here) co_return shared_.api.handle(match, request);
+  net::thread_pool& pool = lane == Lane::quick ? shared_.quick : lane == Lane::slow ? shared_.slow : shared_.away;
+  bool elsewhere = false;
+  auto work = [this, &match, &request, &elsewhere] {
+    Response answer = shared_.api.handle(match, request);
+    elsewhere = shared_.api.may_be_elsewhere(match, answer);
+    return answer;
+  };
+  Response response = co_await run_on(pool, shared_.io, std::move(work));
+  if (!elsewhere) co_return response;
+  auto ask = [this, &match, &request, &response] {
+    return shared_.api.ask_elsewhere(match, request, std::move(response));
+  };
+  co_return co_await run_on(shared_.away, shared_.io, std::move(ask));
+}
+
+// One that is larger than all that may be in memory is sent when nothing else is.
+bool Connection::charge_answer(std::uint64_t bytes) {
+  shared_.answers -= std::exchange(answer_charged_, 0);
+  if (bytes <= kSmallAnswer) return true;
+  if (shared_.answers > 0 && shared_.answers + bytes > kMaxAnswers) return false;
+  shared_.answers += answer_charged_ = bytes;
+  return true;
 }
 
 net::awaitable<Connection::Read> Connection::read_header(Parser& parser) {
@@ -131,6 +176,8 @@ net::awaitable<bool> Connection::answer(const Request& request, const Response& 
   const HeadOptions options{.keep_alive = keep_alive, .method = request.method};
   const std::string head = head_text(response, options, system_unix_clock()());
   const bool bodyless = request.method == Method::head || response.status == 204 || response.status == 304;
+  const auto* file = std::get_if<FileBody>(&response.body);
+  if (file && !bodyless) co_return co_await write_file(head, *file) && keep_alive;
   const bool written = co_await write_all(head, bodyless ? std::span<const std::byte>{} : response.bytes());
   co_return written&& keep_alive;
 }

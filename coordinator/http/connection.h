@@ -18,6 +18,7 @@
 #include "coordinator/http/api.h"
 #include "coordinator/http/event_queue.h"
 #include "coordinator/http/request_head.h"
+#include "coordinator/http/stream.h"
 
 namespace ls::http {
 
@@ -37,16 +38,18 @@ struct Shared {
   net::thread_pool& quick;
   net::thread_pool& slow;
   net::thread_pool& bundles;
+  net::thread_pool& away;
   Api& api;
   std::set<Connection*> open;
   std::size_t event_streams = 0;
   std::uint64_t buffered = 0;  // bytes of request bodies in memory
+  std::uint64_t answers = 0;   // and of answers
   bool stopping = false;
 };
 
 class Connection {
  public:
-  Connection(Tcp::socket socket, Shared& shared);
+  Connection(Tcp::socket socket, std::shared_ptr<const TlsIdentity> tls, Shared& shared);
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -66,9 +69,12 @@ class Connection {
   };
 
   // ---- connection.cpp ----
+  net::awaitable<bool> open();       // false: close
   net::awaitable<bool> serve_one();  // false: close
   net::awaitable<Read> read_header(Parser& parser);
   net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
+  net::awaitable<Response> handle_on_lane(const Match& match, const Request& request);
+  bool charge_answer(std::uint64_t bytes);  // against kMaxAnswers; false: too much at once
   net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
   net::awaitable<void> answer_unread(const Response& response);
   net::awaitable<void> answer_failed_read(Read read);
@@ -84,18 +90,22 @@ class Connection {
 
   // ---- event_writer.cpp ----
   net::awaitable<void> stream_events(const Request& request, const Response& response);
-  net::awaitable<void> write_events(EventQueue& queue);
+  net::awaitable<void> write_events(EventQueue& queue, const Caller& reader);
   void watch_reader();
 
   // ---- socket_io.cpp ----
   net::awaitable<Read> fill();  // more bytes into buffer_
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
+  net::awaitable<bool> write_file(std::string_view head, const FileBody& file);
+  // The pace of a longer body of which `sent` bytes have gone since `began`.
+  net::awaitable<bool> write_paced(std::string_view head, std::span<const std::byte> body,
+                                   SteadyClock::time_point began, std::uint64_t& sent);
   net::awaitable<void> linger();
   void arm(SteadyClock::time_point deadline);
   void disarm();
   SteadyClock::time_point pace(SteadyClock::time_point began, std::uint64_t bytes) const;
 
-  Tcp::socket socket_;
+  Stream stream_;
   Shared& shared_;
   const Limits& limits_;
   net::steady_timer watchdog_;
@@ -104,7 +114,7 @@ class Connection {
   bool idle_ = true;
   bool reader_gone_ = false;                  // of an event stream
   net::steady_timer* events_wait_ = nullptr;  // set while an event stream runs
-  std::uint64_t charged_ = 0;
+  std::uint64_t charged_ = 0, answer_charged_ = 0;
   std::array<char, 64> discard_{};
   beast::flat_buffer buffer_;
   std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);  // callbacks look at it first

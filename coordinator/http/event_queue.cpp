@@ -30,14 +30,15 @@ bool is_frame(const std::string& job, const std::string& sequence) {
 EventQueue::EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake)
     : bounds_(bounds), job_(std::move(job)), expected_(after_id + 1), wake_(std::move(wake)) {}
 
-void EventQueue::push(const coordinator::StreamEvent& event) {
+void EventQueue::push(const coordinator::StreamEvent& event, const coordinator::StreamEvent* shown) {
   const std::lock_guard lock(mutex_);
   if (overflowed_ || !wake_) return;
   std::string text;
   if (const auto expected = std::exchange(expected_, std::nullopt); expected && event.id > *expected)
     text = fmt::format("event: reset\ndata: {{\"missed_from\":{},\"missed_to\":{}}}\n\n", *expected,
                        event.id - 1);
-  if (job_.empty() || event.job.empty() || event.job == job_ || is_frame(event.job, job_)) text += format_event(event);
+  const bool wanted = job_.empty() || event.job.empty() || event.job == job_ || is_frame(event.job, job_);
+  if (wanted && shown != nullptr) text += format_event(*shown);
   if (text.empty()) return;
   const bool first = text_.empty();
   if (events_ == bounds_.events || text_.size() + text.size() > bounds_.bytes) {

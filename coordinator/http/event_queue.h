@@ -26,7 +26,9 @@ class EventQueue {
   EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake);
 
   // Any thread, in the order of ids. Never waits; what doesn't fit ends the queue: see overflowed().
-  void push(const coordinator::StreamEvent& event);
+  void push(const coordinator::StreamEvent& event) { push(event, &event); }
+  // `shown`: what the reader may see of it; null: nothing.
+  void push(const coordinator::StreamEvent& event, const coordinator::StreamEvent* shown);
 
   // What is waiting, as text for the wire; empty if nothing.
   std::string take();

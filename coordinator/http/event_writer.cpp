@@ -9,6 +9,7 @@
 #include "coordinator/http/head_text.h"
 #include "coordinator/http/problem.h"
 #include "coordinator/http/run_on.h"
+#include "coordinator/http/visible.h"
 
 namespace ls::http {
 namespace {
@@ -74,13 +75,16 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     head += fmt::format("event: reset\ndata: {{\"missed_from\":0,\"missed_to\":{}}}\n\n", start.after);
   if (!co_await write_all(head, {})) co_return;
 
-  auto subscribe = [&coordinator, after = start.after, queue] {
-    return coordinator.subscribe(after,
-                                 [queue](const coordinator::StreamEvent& event) { queue->push(event); });
+  auto subscribe = [&coordinator, after = start.after, queue, reader = wanted.reader] {
+    return coordinator.subscribe(after, [queue, reader](const coordinator::StreamEvent& event) {
+      if (reader.role != Role::submit) return queue->push(event);
+      const auto shown = visible(event, reader);
+      queue->push(event, shown ? &*shown : nullptr);
+    });
   };
   auto subscription = co_await run_on(shared_.quick, shared_.io, std::move(subscribe));
   watch_reader();
-  co_await write_events(*queue);
+  co_await write_events(*queue, wanted.reader);
   queue->close();
   auto unsubscribe = [handle = std::move(subscription)]() mutable {
     handle.reset();  // on the pool: it may wait for a callback that is under way
@@ -89,8 +93,8 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
   co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
 }
 
-net::awaitable<void> Connection::write_events(EventQueue& queue) {
-  while (!shared_.stopping && !reader_gone_) {
+net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& reader) {
+  while (!shared_.stopping && !reader_gone_ && shared_.api.auth().still_valid(reader)) {
     const bool last = queue.overflowed();
     const std::string text = queue.take();
     if (!text.empty()) {
@@ -110,12 +114,11 @@ net::awaitable<void> Connection::write_events(EventQueue& queue) {
 
 // A reader says nothing more: whatever comes, its goodbye above all, ends the stream.
 void Connection::watch_reader() {
-  socket_.async_read_some(net::buffer(discard_),
-                          [this, alive = std::weak_ptr(alive_)](error_code, std::size_t) {
-                            if (alive.expired()) return;
-                            reader_gone_ = true;
-                            if (events_wait_ != nullptr) events_wait_->cancel();
-                          });
+  stream_.read_in_background(net::buffer(discard_), [this, alive = std::weak_ptr(alive_)] {
+    if (alive.expired()) return;
+    reader_gone_ = true;
+    if (events_wait_ != nullptr) events_wait_->cancel();
+  });
 }
 
 }  // namespace ls::http

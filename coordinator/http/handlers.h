@@ -13,8 +13,12 @@ Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
 Response get_metrics(Api&, const Request&, const Params&);
 Response get_openapi(Api&, const Request&, const Params&);
+Response get_session(Api&, const Request&, const Params&);
 Response post_session(Api&, const Request&, const Params&);
 Response delete_session(Api&, const Request&, const Params&);
+Response get_tokens(Api&, const Request&, const Params&);    // handlers_tokens.cpp
+Response post_token(Api&, const Request&, const Params&);    // handlers_tokens.cpp
+Response delete_token(Api&, const Request&, const Params&);  // handlers_tokens.cpp
 Response get_workers(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const Params&);

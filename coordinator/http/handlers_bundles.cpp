@@ -15,8 +15,8 @@ namespace {
 
 class BundleSink final : public BodySink {
  public:
-  BundleSink(Api& api, Spool spool, ArchiveKind kind, Fields query)
-      : api_(api), spool_(std::move(spool)), kind_(kind), query_(std::move(query)) {}
+  BundleSink(Api& api, Spool spool, ArchiveKind kind, Fields query, Caller caller)
+      : api_(api), spool_(std::move(spool)), kind_(kind), query_(std::move(query)), caller_(std::move(caller)) {}
 
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     if (bytes.size() > api_.limits().bundle_bytes - spool_.size())
@@ -45,13 +45,15 @@ class BundleSink final : public BodySink {
     job.scene_text = std::move(*text);
     job.scene_name = bundle->scene;
     job.assets = bundle->assets;
-    return submit_job(api_, std::move(job));
+    job.owner = caller_.user;
+    return submit_job(api_, std::move(job), caller_);
   }
 
   Api& api_;
   Spool spool_;
   ArchiveKind kind_;
   Fields query_;
+  Caller caller_;
 };
 
 }  // namespace
@@ -60,13 +62,15 @@ std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api& api, const Re
   if (!request.header("content-encoding").empty())
     return problem(415, "send the bundle as it is: Content-Encoding is not decoded");
   // What is wrong with the query is told before gigabytes have come.
-  if (const auto spec = spec_from_query(request.query, ""); !spec) return problem(spec.error());
+  const auto spec = spec_from_query(request.query, "");
+  if (!spec) return problem(spec.error());
+  if (auto refused = refuse_priority(api, request.caller, spec->priority)) return std::move(*refused);
   auto spool = Spool::open(api.limits().spool);
   if (!spool) return problem(spool.error());
   const bool zip = media_type(request.header("content-type")).find("zip") != std::string::npos &&
                    media_type(request.header("content-type")).find("gzip") == std::string::npos;
   return std::make_unique<BundleSink>(api, std::move(*spool), zip ? ArchiveKind::zip : ArchiveKind::tar,
-                                      request.query);
+                                      request.query, request.caller);
 }
 
 }  // namespace ls::http

@@ -106,7 +106,8 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
 }
 
 
-Response file_response(std::string content_type, std::vector<std::byte> bytes, const std::string& name) {
+template <class Body>
+Response file_response(std::string content_type, Body bytes, const std::string& name) {
   Response response;
   response.content_type = std::move(content_type);
   response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}\"", name));
@@ -116,15 +117,18 @@ Response file_response(std::string content_type, std::vector<std::byte> bytes, c
 
 }  // namespace
 
-Response get_jobs(Api& api, const Request&, const Params&) {
-  return json_response(200, coordinator::jobs_json(api.coordinator().jobs()));
+Response get_jobs(Api& api, const Request& request, const Params&) {
+  auto jobs = api.coordinator().jobs();
+  std::erase_if(jobs, [&](const auto& job) { return !request.caller.sees(job.owner); });
+  return json_response(200, coordinator::jobs_json(jobs));
 }
 
 Response post_job(Api& api, const Request& request, const Params&) {
   const bool is_json = media_type(request.header("content-type")) == "application/json";
   auto submit = is_json ? from_json(api, request) : from_xml(request);
   if (!submit) return problem(submit.error());
-  return submit_job(api, std::move(*submit));
+  submit->owner = request.caller.user;
+  return submit_job(api, std::move(*submit), request.caller);
 }
 
 Response get_job(Api& api, const Request& request, const Params& params) {
@@ -140,6 +144,8 @@ Response patch_job(Api& api, const Request& request, const Params& params) {
   if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
   const auto change = read_change(request.body);
   if (!change) return problem(change.error());
+  if (change->priority)
+    if (auto refused = refuse_priority(api, request.caller, *change->priority)) return std::move(*refused);
   if (const auto done = api.coordinator().change(*id, *change); !done) return problem(done.error());
   return get_job(api, request, params);
 }
@@ -156,6 +162,8 @@ Response delete_job(Api& api, const Request& request, const Params& params) {
 Response get_image_exr(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());
+  if (const auto path = api.coordinator().final_file(*id, "image.exr"); !path.empty())
+    if (auto file = open_file_body(path)) return file_response("image/x-exr", std::move(*file), id->value + ".exr");
   auto image = api.coordinator().image_exr(*id);
   return image ? file_response("image/x-exr", std::move(*image), id->value + ".exr") : problem(image.error());
 }
@@ -190,6 +198,12 @@ Response get_samples_png(Api& api, const Request& request, const Params& params)
 Response get_report(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());
+  if (const auto path = api.coordinator().final_file(*id, "report.json"); !path.empty())
+    if (auto file = open_file_body(path)) {
+      Response response = json_response(200, {});
+      response.body = std::move(*file);
+      return response;
+    }
   auto report = api.coordinator().report_json(*id);
   return report ? json_response(200, std::move(*report)) : problem(report.error());
 }

@@ -4,6 +4,7 @@
 #include "coordinator/http/handlers.h"
 #include "coordinator/http/json_read.h"
 #include "coordinator/http/problem.h"
+#include "coordinator/http/visible.h"
 #include "coordinator/views.h"
 
 namespace ls::http {
@@ -19,6 +20,7 @@ Response no_content(std::string set_cookie) {
 Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
+  stream.reader = request.caller;
   // The header is what a browser sends when it reconnects: newer than the address it once opened.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
@@ -42,7 +44,9 @@ Response get_healthz(Api&, const Request&, const Params&) { return text_response
 Response get_readyz(Api& api, const Request&, const Params&) {
   std::string why_not;
   if (!api.coordinator().ready(&why_not)) return problem(503, "not ready: " + why_not);
-  return text_response(200, "text/plain", "ready\n");
+  // Jobs go on while Redis is away: told, but no reason to send anybody elsewhere.
+  const std::string trouble = api.coordinator().store_status().trouble;
+  return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
 }
 
 Response get_metrics(Api& api, const Request&, const Params&) {
@@ -50,11 +54,16 @@ Response get_metrics(Api& api, const Request&, const Params&) {
   return text_response(
       200, "text/plain; version=0.0.4; charset=utf-8",
       metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(), api.counters(),
-                   coordinator.store_status()));
+                   coordinator.store_status(), coordinator.figures(), coordinator.audits(), api.webhooks()));
 }
 
 Response get_openapi(Api&, const Request&, const Params&) {
   return json_response(200, std::string(embedded_openapi()));
+}
+
+Response get_session(Api&, const Request& request, const Params&) {
+  const Caller& caller = request.caller;
+  return json_response(200, write_json({{"role", to_string(caller.role)}, {"user", caller.user}}));
 }
 
 Response post_session(Api& api, const Request& request, const Params&) {
@@ -65,9 +74,9 @@ Response post_session(Api& api, const Request& request, const Params&) {
   const auto token = body->find("token");
   if (token == body->end() || !token->is_string())
     return problem(400, "the body must be {\"token\": \"...\"}");
-  auto cookie = api.auth().open_session(token->get_ref<const std::string&>());
-  if (!cookie) return problem(401, "this is not the token in the coordinator's data folder (file 'token')");
-  return no_content(std::move(*cookie));
+  auto cookie = api.auth().open_session(request, token->get_ref<const std::string&>());
+  if (auto* refused = std::get_if<Response>(&cookie)) return std::move(*refused);
+  return no_content(std::move(std::get<std::string>(cookie)));
 }
 
 Response delete_session(Api& api, const Request& request, const Params&) {
@@ -76,8 +85,15 @@ Response delete_session(Api& api, const Request& request, const Params&) {
   return no_content(api.auth().close_session(request));
 }
 
-Response get_workers(Api& api, const Request&, const Params&) {
-  return json_response(200, coordinator::workers_json(api.coordinator().workers()));
+Response get_workers(Api& api, const Request& request, const Params&) {
+  auto workers = api.coordinator().workers();
+  for (auto& worker : workers) {
+    if (request.caller.role != Role::submit) continue;
+    // Also one without a job may say what it did of others': why it failed, or is barred.
+    const auto owner = api.coordinator().owner(JobId{worker.job});
+    if (!owner || !request.caller.sees(*owner)) hide_work(worker);
+  }
+  return json_response(200, coordinator::workers_json(workers));
 }
 
 Response get_events(Api&, const Request& request, const Params&) { return event_stream(request, {}); }

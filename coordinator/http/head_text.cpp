@@ -40,7 +40,7 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
   const bool bodyless = response.status == 204 || response.status == 304;
   // To a HEAD, the length is what GET would send; where HEAD has a route of its own there is none to tell.
   const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
-  if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.bytes().size()));
+  if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
   for (const auto& [name, value] : response.headers) field(name, value);
   if (!has(response, "Cache-Control")) field("Cache-Control", "no-store");
   if (!has(response, "Content-Security-Policy"))

@@ -26,8 +26,10 @@ struct StatusName {
 constexpr std::array kPhrases = {
     StatusName{200, "OK"},
     StatusName{201, "Created"},
+    StatusName{202, "Accepted"},
     StatusName{204, "No Content"},
     StatusName{304, "Not Modified"},
+    StatusName{307, "Temporary Redirect"},
     StatusName{400, "Bad Request"},
     StatusName{401, "Unauthorized"},
     StatusName{403, "Forbidden"},
@@ -39,6 +41,8 @@ constexpr std::array kPhrases = {
     StatusName{413, "Content Too Large"},
     StatusName{414, "URI Too Long"},
     StatusName{415, "Unsupported Media Type"},
+    StatusName{416, "Range Not Satisfiable"},
+    StatusName{429, "Too Many Requests"},
     StatusName{431, "Request Header Fields Too Large"},
     StatusName{500, "Internal Server Error"},
     StatusName{501, "Not Implemented"},
@@ -76,8 +80,18 @@ std::optional<std::string_view> Request::parameter(std::string_view wanted) cons
 std::span<const std::byte> Response::bytes() const {
   return std::visit(overloaded{[](const std::string& s) { return std::as_bytes(std::span(s)); },
                                [](const std::vector<std::byte>& v) { return std::span<const std::byte>(v); },
-                               [](std::span<const std::byte> s) { return s; }},
+                               [](std::span<const std::byte> s) { return s; },
+                               [](const FileBody&) { return std::span<const std::byte>(); }},
                     body);
+}
+
+std::uint64_t Response::length() const {
+  const auto* file = std::get_if<FileBody>(&body);
+  return file ? file->size : bytes().size();
+}
+
+std::uint64_t Response::in_memory() const {
+  return std::holds_alternative<std::span<const std::byte>>(body) ? 0 : bytes().size();
 }
 
 Response text_response(int status, std::string content_type, std::string body) {

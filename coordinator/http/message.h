@@ -11,6 +11,9 @@
 #include <variant>
 #include <vector>
 
+#include "coordinator/http/caller.h"
+#include "coordinator/http/file_body.h"
+
 namespace ls::http {
 
 enum class Method { get, head, post, put, patch, del, options };
@@ -27,6 +30,8 @@ struct Request {
   std::optional<std::uint64_t> content_length;
   bool has_body = false;  // a length above zero, or chunked
   std::string body;
+  std::string peer;  // address that it comes from, without port; empty: unknown
+  Caller caller;     // set by Api::admit for a route that asks who it is; of the least role before
 
   std::string_view header(std::string_view lower_case_name) const;         // empty if absent
   std::optional<std::string_view> parameter(std::string_view name) const;  // the first of this name
@@ -36,17 +41,20 @@ struct Request {
 struct EventStream {
   std::optional<std::uint64_t> after_id;  // nothing: from now on
   std::string job;                        // empty: everything
+  Caller reader;                          // who may see it
 };
 
 struct Response {
   int status = 200;
   std::string content_type;  // empty: no body
   Fields headers;
-  std::variant<std::string, std::vector<std::byte>, std::span<const std::byte>>
+  std::variant<std::string, std::vector<std::byte>, std::span<const std::byte>, FileBody>
       body;  // the span: static data
   std::optional<EventStream> events;
 
-  std::span<const std::byte> bytes() const;
+  std::span<const std::byte> bytes() const;  // of a file: none
+  std::uint64_t length() const;              // of the body
+  std::uint64_t in_memory() const;           // bytes that this response keeps while it is sent
 };
 
 Response text_response(int status, std::string content_type, std::string body);

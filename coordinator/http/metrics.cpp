@@ -4,6 +4,8 @@
 
 #include <iterator>
 
+#include "coordinator/http/process_figures.h"
+
 namespace ls::http {
 namespace {
 
@@ -73,6 +75,79 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
   single(out, "lightshaft_worker_threads", "gauge", "Render threads of connected workers.", threads);
 }
 
+void write_leases(std::string& out, const coordinator::FarmFigures& f) {
+  single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
+  single(out, "lightshaft_units_lent", "gauge", "Units of these leases.", f.units_lent_now);
+  single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
+  single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_lent);
+  head(out, "lightshaft_units_freed_total", "counter",
+       "Units that a worker had and that went back to wait for another, by cause.");
+  // All causes, so that a rate is known from the first one on.
+  auto freed = f.units_freed;
+  for (const char* cause : {"worker lost", "deadline passed", "returned", "failed", "cancelled"})
+    freed[cause];
+  for (const auto& [cause, count] : freed)
+    fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", cause,
+                   count);
+}
+
+void write_results(std::string& out, const coordinator::FarmFigures& f) {
+  head(out, "lightshaft_results_total", "counter",
+       "Results that workers handed in. equal, differing: a second one of a unit, against the first.");
+  const auto results = [&](std::string_view what, std::uint64_t count) {
+    fmt::format_to(std::back_inserter(out), "lightshaft_results_total{{verdict=\"{}\"}} {}\n", what, count);
+  };
+  results("accepted", f.accepted);
+  results("equal", f.equal);
+  results("differing", f.differing);
+  results("unwanted", f.unwanted);
+  results("refused", f.refused);
+  results("not_stored", f.not_stored);
+  single(out, "lightshaft_units_folded_total", "counter", "Units folded into images.", f.folded);
+  single(out, "lightshaft_fold_lag_seconds_total", "counter",
+         "Seconds from a result's arrival to its fold, summed over lightshaft_units_folded_total.",
+         f.fold_lag_seconds);
+  single(out, "lightshaft_results_arrived", "gauge", "Results that are being checked and stored.",
+         f.arrived_now);
+  single(out, "lightshaft_results_arrived_bytes", "gauge", "Memory that these take.", f.arrived_bytes);
+  single(out, "lightshaft_results_waiting", "gauge",
+         "Accepted results that wait for an earlier round of their tile.", f.waiting_now);
+  single(out, "lightshaft_chores", "gauge", "Writes that wait for the disk.", f.chores_now);
+  single(out, "lightshaft_result_bytes_total", "counter", "Bytes of results from workers.", f.result_bytes);
+  single(out, "lightshaft_blob_bytes_total", "counter", "Bytes of blobs sent to workers.", f.blob_bytes);
+}
+
+void write_audits(std::string& out, const coordinator::AuditFigures& a) {
+  head(out, "lightshaft_audits_total", "counter",
+       "Results chosen to be rendered again by another worker, and what came of it.");
+  for (const auto& [what, count] : {std::pair("asked", a.asked), std::pair("equal", a.equal),
+                                    std::pair("differ", a.differ), std::pair("dropped", a.dropped)})
+    fmt::format_to(std::back_inserter(out), "lightshaft_audits_total{{verdict=\"{}\"}} {}\n", what, count);
+  single(out, "lightshaft_workers_barred_total", "counter", "Workers found to render wrong pixels.",
+         a.workers_barred);
+  single(out, "lightshaft_tiles_discarded_total", "counter",
+         "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
+}
+
+void write_webhooks(std::string& out, const WebhookFigures& w) {
+  head(out, "lightshaft_webhook_sendings_total", "counter",
+       "Attempts to tell a receiver of a job's event; a failed one is tried again later.");
+  fmt::format_to(std::back_inserter(out),
+                 "lightshaft_webhook_sendings_total{{result=\"taken\"}} {}\n"
+                 "lightshaft_webhook_sendings_total{{result=\"failed\"}} {}\n",
+                 w.delivered, w.failed_attempts);
+  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.", w.given_up);
+  single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
+}
+
+void write_process(std::string& out) {
+  const ProcessFigures p = process_figures();
+  single(out, "process_resident_memory_bytes", "gauge", "Memory of the coordinator.", p.resident_bytes);
+  single(out, "process_open_fds", "gauge", "Files and sockets that it has open.", p.open_files);
+  single(out, "process_threads", "gauge", "Its threads.", p.threads);
+  single(out, "process_cpu_seconds_total", "counter", "CPU time of it.", p.cpu_seconds);
+}
+
 }  // namespace
 
 void Counters::answered(Method method, int status) {
@@ -87,10 +162,16 @@ std::map<std::pair<Method, int>, std::uint64_t> Counters::requests() const {
 
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters, const coordinator::StoreStatus& store) {
+                         const Counters& counters, const coordinator::StoreStatus& store,
+                         const coordinator::FarmFigures& farm, const coordinator::AuditFigures& audits,
+                         const std::optional<WebhookFigures>& webhooks) {
   std::string out;
   write_jobs(out, jobs);
   write_workers(out, workers);
+  write_leases(out, farm);
+  write_results(out, farm);
+  write_audits(out, audits);
+  write_process(out);
   single(out, "lightshaft_events_total", "counter", "Id of the last event.", last_event);
   head(out, "lightshaft_http_requests_total", "counter", "Requests answered.");
   for (const auto& [key, count] : counters.requests())
@@ -103,9 +184,11 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
          "Event streams closed because the reader was too slow.", counters.events_dropped.load());
   single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
          counters.body_bytes.load());
+  if (webhooks) write_webhooks(out, *webhooks);
   if (!store.mirror.empty()) {
     single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
-    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.", store.behind);
+    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.",
+           store.behind);
   }
   return out;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -30,8 +31,16 @@ class Counters {
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
 
+// Of what receivers of job events are told (coordinator/webhooks).
+struct WebhookFigures {
+  std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
+};
+
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters, const coordinator::StoreStatus& store = {});
+                         const Counters& counters, const coordinator::StoreStatus& store = {},
+                         const coordinator::FarmFigures& farm = {},
+                         const coordinator::AuditFigures& audits = {},
+                         const std::optional<WebhookFigures>& webhooks = std::nullopt);
 
 }  // namespace ls::http

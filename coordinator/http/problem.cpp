@@ -44,6 +44,12 @@ Response problem(int status, std::string_view detail) {
   return from_json(status, base(status, "about:blank", detail));
 }
 
+Response too_many(int wait_seconds, std::string_view detail) {
+  Response response = problem(429, detail);
+  response.headers.emplace_back("Retry-After", std::to_string(wait_seconds));
+  return response;
+}
+
 Response problem(const Error& error) { return problem(status_of(error.code), error.message); }
 
 Response problem(const Error& error, std::span<const Diagnostic> diagnostics) {

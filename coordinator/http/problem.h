@@ -16,6 +16,8 @@ int status_of(Errc code);
 // {type, title, status, detail}; `detail` says what happened, where, and what to do.
 Response problem(int status, std::string_view detail);
 Response problem(const Error& error);
+// 429 with Retry-After.
+Response too_many(int wait_seconds, std::string_view detail);
 // With diagnostics: [{severity, file, line, column, text, source_line, length}] when a scene was refused.
 Response problem(const Error& error, std::span<const Diagnostic> diagnostics);
 

@@ -10,6 +10,7 @@ namespace {
 
 constexpr Access kOpen = Access::open;
 constexpr Access kToken = Access::token;
+constexpr Access kSubmit = Access::submit;
 constexpr BodyKind kNone = BodyKind::none;
 constexpr BodyKind kWhole = BodyKind::buffered;
 
@@ -23,17 +24,18 @@ constexpr std::string_view kBundleTypes =
 constexpr std::array kRoutes = {
     Route{Method::get, "/healthz", kOpen, Lane::here, kNone, 0, get_healthz},
     Route{Method::get, "/readyz", kOpen, Lane::quick, kNone, 0, get_readyz},
-    Route{Method::get, "/metrics", kToken, Lane::quick, kNone, 0, get_metrics},
+    Route{Method::get, "/metrics", Access::see, Lane::quick, kNone, 0, get_metrics},
     Route{Method::get, "/api/v1/openapi.json", kToken, Lane::here, kNone, 0, get_openapi},
     Route{Method::post, "/api/v1/session", kOpen, Lane::here, kWhole, kMaxSessionJson, post_session, kJson},
+    Route{Method::get, "/api/v1/session", kToken, Lane::here, kNone, 0, get_session},
     Route{Method::del, "/api/v1/session", kOpen, Lane::here, kNone, 0, delete_session},
     Route{Method::get, "/api/v1/jobs", kToken, Lane::quick, kNone, 0, get_jobs},
-    Route{Method::post, "/api/v1/jobs", kToken, Lane::slow, kWhole, kMaxSceneXml, post_job, kJobTypes,
+    Route{Method::post, "/api/v1/jobs", kSubmit, Lane::slow, kWhole, kMaxSceneXml, post_job, kJobTypes,
           kBundleTypes},
     Route{Method::get, "/api/v1/jobs/{id}", kToken, Lane::quick, kNone, 0, get_job},
-    Route{Method::patch, "/api/v1/jobs/{id}", kToken, Lane::quick, kWhole, kMaxControlJson, patch_job,
+    Route{Method::patch, "/api/v1/jobs/{id}", kSubmit, Lane::quick, kWhole, kMaxControlJson, patch_job,
           kPatchJson},
-    Route{Method::del, "/api/v1/jobs/{id}", kToken, Lane::quick, kNone, 0, delete_job},
+    Route{Method::del, "/api/v1/jobs/{id}", kSubmit, Lane::quick, kNone, 0, delete_job},
     Route{Method::get, "/api/v1/jobs/{id}/image.exr", kToken, Lane::slow, kNone, 0, get_image_exr},
     Route{Method::get, "/api/v1/jobs/{id}/image.png", kToken, Lane::slow, kNone, 0, get_image_png},
     Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Lane::slow, kNone, 0, get_error_png},
@@ -41,15 +43,18 @@ constexpr std::array kRoutes = {
     Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Lane::slow, kNone, 0, get_report},
     Route{Method::get, "/api/v1/jobs/{id}/report.html", kToken, Lane::slow, kNone, 0, get_report_page},
     Route{Method::get, "/api/v1/jobs/{id}/convergence.csv", kToken, Lane::quick, kNone, 0, get_convergence},
-    Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Lane::quick, kNone, 0, get_tiles},
+    Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Lane::slow, kNone, 0, get_tiles},
     Route{Method::get, "/api/v1/jobs/{id}/log", kToken, Lane::quick, kNone, 0, get_log},
     Route{Method::get, "/api/v1/jobs/{id}/events", kToken, Lane::quick, kNone, 0, get_job_events},
     Route{Method::get, "/api/v1/events", kToken, Lane::quick, kNone, 0, get_events},
+    Route{Method::get, "/api/v1/tokens", Access::admin, Lane::quick, kNone, 0, get_tokens},
+    Route{Method::post, "/api/v1/tokens", Access::admin, Lane::slow, kWhole, kMaxControlJson, post_token, kJson},
+    Route{Method::del, "/api/v1/tokens/{token}", Access::admin, Lane::slow, kNone, 0, delete_token},
     Route{Method::get, "/api/v1/workers", kToken, Lane::quick, kNone, 0, get_workers},
-    Route{Method::post, "/api/v1/blobs/missing", kToken, Lane::quick, kWhole, kMaxDigestList,
+    Route{Method::post, "/api/v1/blobs/missing", kToken, Lane::away, kWhole, kMaxDigestList,
           post_blobs_missing, kJson},
-    Route{Method::head, "/api/v1/blobs/{sha256}", kToken, Lane::quick, kNone, 0, head_blob},
-    Route{Method::put, "/api/v1/blobs/{sha256}", kToken, Lane::slow, BodyKind::blob, 0, nullptr},
+    Route{Method::head, "/api/v1/blobs/{sha256}", kToken, Lane::away, kNone, 0, head_blob},
+    Route{Method::put, "/api/v1/blobs/{sha256}", kSubmit, Lane::slow, BodyKind::blob, 0, nullptr},
 };
 
 std::string_view next_part(std::string_view& pattern) {
@@ -87,6 +92,24 @@ void add(std::string& list, std::string_view name) {
 }  // namespace
 
 std::span<const Route> routes() { return kRoutes; }
+
+std::string_view to_string(Access access) {
+  switch (access) {
+    case Access::open: return "anybody";
+    case Access::token: return "submit, read, admin";
+    case Access::submit: return "submit, admin";
+    case Access::see: return "read, admin";
+    case Access::admin: return "admin";
+  }
+  return "";
+}
+
+bool allows(Access access, Role role) {
+  if (access == Access::open || role == Role::admin) return true;
+  if (role == Role::submit) return access == Access::token || access == Access::submit;
+  if (role == Role::read) return access == Access::token || access == Access::see;
+  return false;
+}
 
 std::optional<std::variant<Match, WrongMethod>> find_route(Method method,
                                                            std::span<const std::string> segments) {

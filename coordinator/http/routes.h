@@ -17,11 +17,20 @@ namespace ls::http {
 
 class Api;
 
-enum class Access { open, token };
+enum class Access {
+  open,    // anybody
+  token,   // any token but a worker's: submit, read, admin. What a submit token sees is its own
+  submit,  // submit, admin
+  see,     // read, admin: what is of all users together
+  admin,
+};
+std::string_view to_string(Access access);
+bool allows(Access access, Role role);
 enum class Lane {
   here,   // answered by the network thread: touches nothing that may wait
   quick,  // out of memory
   slow,   // reads scenes, writes images
+  away,   // asks other machines, which may not answer for a while
 };
 enum class BodyKind {
   none,      // anything that comes is thrown away

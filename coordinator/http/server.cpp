@@ -51,11 +51,12 @@ Result<Address> parse_address(const std::string& text) {
 
 struct Server::State {
   // In this order: what a coroutine's frame uses outlives the io_context that destroys the frame.
-  std::unique_ptr<net::thread_pool> quick, slow, bundles;
+  std::unique_ptr<net::thread_pool> quick, slow, bundles, away;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};
   Tcp::acceptor acceptor{io};
+  std::shared_ptr<const TlsIdentity> tls;
   std::thread thread;
 
   std::mutex mutex;
@@ -104,7 +105,7 @@ net::awaitable<void> Server::State::accept_loop() {
       continue;
     }
     socket.set_option(Tcp::no_delay(true), ec);
-    net::co_spawn(io, run(std::make_unique<Connection>(std::move(socket), *shared)), net::detached);
+    net::co_spawn(io, run(std::make_unique<Connection>(std::move(socket), tls, *shared)), net::detached);
   }
 }
 
@@ -158,12 +159,14 @@ int Server::port() const {
   return state_->acceptor.local_endpoint(ignored).port();
 }
 
-void Server::start(Api& api) {
+void Server::start(Api& api, std::shared_ptr<const TlsIdentity> tls) {
   State& s = *state_;
+  s.tls = std::move(tls);
   s.quick = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().quick_threads));
   s.slow = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().slow_threads));
   s.bundles = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().bundle_threads));
-  s.shared = std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, *s.bundles, api, {}, 0, 0, false});
+  s.away = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().away_threads));
+  s.shared = std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, *s.bundles, *s.away, api, {}, 0, 0, 0, false});
   net::co_spawn(s.io, s.accept_loop(), net::detached);
   s.thread = std::thread([&s] { s.io.run(); });
 }
@@ -189,6 +192,7 @@ void Server::stop() {
   s.quick->join();
   s.slow->join();
   s.bundles->join();
+  s.away->join();
   state_.reset();  // with it the frames of connections that were cut: they use the api
 }
 

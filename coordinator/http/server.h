@@ -10,6 +10,8 @@
 
 namespace ls::http {
 
+class TlsIdentity;  // tls_identity.h
+
 class Server {
  public:
   // Binds and listens on "host:port" (port 0: any; "[::1]:8080" for IPv6). A port in use is an error: it is
@@ -18,8 +20,8 @@ class Server {
   ~Server();  // stops
 
   int port() const;  // until stop()
-  // `api` lives until stop() has returned.
-  void start(Api& api);
+  // `api` lives until stop() has returned. With `tls` only that is spoken.
+  void start(Api& api, std::shared_ptr<const TlsIdentity> tls = nullptr);
   // Ends listening and event streams, gives requests under way Limits::stop_seconds, then cuts them.
   void stop();
 

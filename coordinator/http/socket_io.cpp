@@ -1,9 +1,8 @@
 // Reading and writing with deadlines.
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include "coordinator/http/connection.h"
+#include "coordinator/http/run_on.h"
 
 namespace ls::http {
 
@@ -18,8 +17,7 @@ void Connection::arm(SteadyClock::time_point deadline) {
   watchdog_.async_wait([this, alive = std::weak_ptr(alive_)](error_code ec) {
     if (ec || alive.expired() || SteadyClock::now() < deadline_) return;
     timed_out_ = true;
-    error_code ignored;
-    socket_.cancel(ignored);
+    stream_.cancel();
   });
 }
 
@@ -36,36 +34,63 @@ net::awaitable<Connection::Read> Connection::fill() {
   if (buffer_.size() >= kReadBuffer) co_return Read::malformed;
   error_code ec;
   const auto space = buffer_.prepare(kReadBuffer - buffer_.size());
-  const std::size_t n = co_await socket_.async_read_some(space, net::redirect_error(net::use_awaitable, ec));
+  const std::size_t n = co_await stream_.read_some(space, ec);
   if (ec) co_return timed_out_ ? Read::too_slow : Read::closed;
   buffer_.commit(n);
   co_return Read::ok;
 }
 
 net::awaitable<bool> Connection::write_all(std::string_view head, std::span<const std::byte> body) {
-  const auto began = SteadyClock::now();
+  std::uint64_t sent = 0;
+  const bool written = co_await write_paced(head, body, SteadyClock::now(), sent);
+  if (written) disarm();
+  co_return written;
+}
+
+net::awaitable<bool> Connection::write_paced(std::string_view head, std::span<const std::byte> body,
+                                             SteadyClock::time_point began, std::uint64_t& sent) {
   const std::size_t total = head.size() + body.size();
-  std::size_t sent = 0;
-  while (sent < total) {
+  std::size_t done = 0;
+  while (done < total) {
     arm(pace(began, sent));
-    const std::string_view head_left = head.substr(std::min(sent, head.size()));
-    const auto body_left = body.subspan(sent - std::min(sent, head.size()));
+    const std::string_view head_left = head.substr(std::min(done, head.size()));
+    const auto body_left = body.subspan(done - std::min(done, head.size()));
     const std::array<net::const_buffer, 2> buffers = {
         net::buffer(head_left.data(), head_left.size()),
         net::buffer(body_left.data(), std::min(body_left.size(), kWriteSlice))};
     error_code ec;
-    sent += co_await socket_.async_write_some(buffers, net::redirect_error(net::use_awaitable, ec));
+    const std::size_t n = co_await stream_.write_some(buffers, ec);
+    done += n;
+    sent += n;
     if (ec) co_return false;
   }
+  co_return true;
+}
+
+net::awaitable<bool> Connection::write_file(std::string_view head, const FileBody& file) {
+  const auto began = SteadyClock::now();
+  std::uint64_t sent = 0;
+  std::vector<std::byte> slice(kWriteSlice);
+  for (std::uint64_t offset = 0; offset < file.size;) {
+    disarm();  // the disk has its time; the reader's is counted while it is written to
+    auto work = [&slice, &file, offset] {
+      return read_slice(file, offset, std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
+    };
+    const std::size_t n = co_await run_on(shared_.slow, shared_.io, std::move(work));
+    if (n == 0) co_return false;
+    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began, sent))
+      co_return false;
+    offset += n;
+  }
+  if (file.size == 0) co_return co_await write_all(head, {});
   disarm();
   co_return true;
 }
 
 // Closing while the client still sends would reset the connection and lose the answer: read on for a little.
 net::awaitable<void> Connection::linger() {
-  error_code ec;
-  socket_.shutdown(Tcp::socket::shutdown_send, ec);
   arm(SteadyClock::now() + steady_seconds(limits_.linger_seconds));
+  co_await stream_.say_goodbye();
   for (std::uint64_t total = buffer_.size(); total < kLingerBytes; total += buffer_.size()) {
     buffer_.consume(buffer_.size());
     if (co_await fill() != Read::ok) break;

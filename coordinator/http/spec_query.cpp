@@ -50,7 +50,8 @@ Result<Json> parse_number(std::string_view key, std::string_view text, std::stri
 
 // The JSON value of one key of the spec; nothing if there is no such key.
 std::optional<Result<Json>> parse_value(std::string_view key, std::string_view text) {
-  if (key == "spp" || key == "seed") return parse_number<std::uint64_t>(key, text, "a whole number");
+  if (key == "spp" || key == "seed" || key == "max_workers" || key == "max_units" || key == "memory")
+    return parse_number<std::uint64_t>(key, text, "a whole number");
   if (key == "target_error" || key == "time") return parse_number<double>(key, text, "a number");
   if (key == "priority") return parse_number<int>(key, text, "a whole number");
   if (key == "size") return parse_size(text);
@@ -95,7 +96,8 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
           Errc::invalid_argument,
           fmt::format(
               "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
-              "aov, define, priority, float, tags, frames, reference",
+              "aov, define, priority, float, tags, frames, max_workers, max_units, memory, "
+              "reference",
               key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);

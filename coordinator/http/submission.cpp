@@ -22,7 +22,15 @@ Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
   return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
 }
 
-Response submit_job(Api& api, coordinator::SubmitRequest request) {
+std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority) {
+  if (caller.role != Role::submit || priority <= api.limits().user_priority) return std::nullopt;
+  return problem(403, fmt::format("priority {} goes before other users' jobs: with a token of the role 'submit' at most "
+                                  "{} is possible; ask the administrator (--user-priority)",
+                                  priority, api.limits().user_priority));
+}
+
+Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller) {
+  if (auto refused = refuse_priority(api, caller, request.spec.priority)) return std::move(*refused);
   const auto id = api.coordinator().submit(std::move(request));
   if (!id) return problem(id.error().error, id.error().diagnostics);
   const std::string url = "/api/v1/jobs/" + id->value;

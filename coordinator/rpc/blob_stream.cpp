@@ -4,21 +4,34 @@
 
 #include <algorithm>
 
-#include "common/base/secret.h"
 #include "common/protocol/limits.h"
 #include "coordinator/rpc/convert.h"
 #include "proto/convert.h"
 
 namespace ls::coordinator::rpc {
 
-BlobStream::BlobStream(BlobStore& blobs, const lightshaft::farm::v1::FetchBlobRequest& request,
-                       const std::string& join_token, std::function<void()> on_gone)
-    : blobs_(blobs), request_(request), join_token_(join_token), on_gone_(std::move(on_gone)) {}
+BlobStream::BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::FetchBlobRequest& request,
+                       const JoinCheck& may_join, RunOn run, std::function<void()> on_gone)
+    : coordinator_(coordinator),
+      blobs_(coordinator.blobs()),
+      request_(request),
+      may_join_(may_join),
+      run_(std::move(run)),
+      on_gone_(std::move(on_gone)) {}
 
-void BlobStream::begin() {
-  if (!join_token_.empty() && !equal_secret(request_.join_token(), join_token_))
+// Nothing of this is touched after a write or the end has begun: OnDone may come at once.
+void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
+  if (const int wait = guard.wait(address, request_.join_token()); wait > 0)
+    return Finish({grpc::StatusCode::RESOURCE_EXHAUSTED, too_many_wrong_tokens(wait)});
+  const bool right = may_join_(request_.join_token());
+  guard.tried(address, request_.join_token(), right);
+  if (!right)
     return Finish(
         {grpc::StatusCode::UNAUTHENTICATED, "wrong join token; the coordinator's is in DATA/join-token"});
+  run_([this] { open(); });
+}
+
+void BlobStream::open() {
   const auto digest = wire::digest_from(request_.digest(), "digest");
   if (!digest) return Finish(to_status(digest.error()));
   digest_ = *digest;
@@ -39,13 +52,14 @@ void BlobStream::next() {
   if (!bytes) return Finish(to_status(bytes.error()));
   if (bytes->empty()) return Finish({grpc::StatusCode::INTERNAL, "the blob is shorter than its stated size"});
   offset_ += bytes->size();
+  coordinator_.blob_sent(bytes->size());
   chunk_.set_data(bytes->data(), bytes->size());
   StartWrite(&chunk_);
 }
 
 void BlobStream::OnWriteDone(bool ok) {
   if (!ok) return Finish({grpc::StatusCode::CANCELLED, "the worker left"});
-  next();
+  run_([this] { next(); });
 }
 
 void BlobStream::OnDone() {

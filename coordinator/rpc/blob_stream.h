@@ -1,29 +1,36 @@
-// One FetchBlob: chunks of a blob, read as the worker takes them.
+// One FetchBlob: chunks of a blob, read as the worker takes them, on threads of its own: a blob that must be fetched
+// first may take minutes, and gRPC's few threads are those that listen to workers.
 #pragma once
 
 #include <functional>
 
+#include "coordinator/rpc/join_guard.h"
 #include "coordinator/service.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
 
 namespace ls::coordinator::rpc {
 
+using RunOn = std::function<void(std::function<void()>)>;  // runs it soon, on another thread
+
 class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::BlobChunk> {
  public:
-  BlobStream(BlobStore& blobs, const lightshaft::farm::v1::FetchBlobRequest& request,
-             const std::string& join_token, std::function<void()> on_gone);
-  void begin();  // starts the first write, or ends with what is wrong
+  BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::FetchBlobRequest& request,
+             const JoinCheck& may_join, RunOn run, std::function<void()> on_gone);
+  void begin(const JoinGuard& guard, const std::string& address);  // starts the first write, or ends with what is wrong
 
   void OnWriteDone(bool ok) override;
   void OnDone() override;
 
  private:
+  void open();
   void next();
 
+  Coordinator& coordinator_;
   BlobStore& blobs_;
   const lightshaft::farm::v1::FetchBlobRequest& request_;  // lives as long as the call
-  const std::string& join_token_;
+  const JoinCheck& may_join_;
+  const RunOn run_;
   const std::function<void()> on_gone_;
   Digest digest_;
   std::uint64_t offset_ = 0, size_ = 0;

@@ -12,6 +12,7 @@
 #include "common/protocol/limits.h"
 #include "coordinator/rpc/blob_stream.h"
 #include "coordinator/rpc/limits.h"
+#include "coordinator/rpc/read_pool.h"
 #include "coordinator/rpc/work_stream.h"
 
 namespace ls::coordinator {
@@ -28,10 +29,19 @@ class Refusal final : public Reactor {
   explicit Refusal(const grpc::Status& status) { this->Finish(status); }
   void OnDone() override { delete this; }
 };
+
+std::shared_ptr<grpc::ServerCredentials> credentials(const std::optional<GrpcServer::Tls>& tls) {
+  if (!tls) return grpc::InsecureServerCredentials();
+  grpc::SslServerCredentialsOptions options(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+  options.pem_root_certs = tls->ca;
+  options.pem_key_cert_pairs.push_back({tls->key, tls->cert});
+  return grpc::SslServerCredentials(options);
+}
 }  // namespace
 
 struct GrpcServer::Impl final : pb::Farm::CallbackService {
-  Impl(Coordinator& c, std::string token) : coordinator(c), join_token(std::move(token)) {}
+  Impl(Coordinator& c, JoinCheck check, JoinGuard g)
+      : coordinator(c), may_join(std::move(check)), guard(std::move(g)) {}
 
   grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>* Work(grpc::CallbackServerContext* context) override {
     const std::lock_guard lock(mutex);
@@ -40,7 +50,7 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
           stopping ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down")
                    : grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many workers are connected"));
     const TimePoint deadline = clock.now() + std::chrono::seconds(rpc::kHelloSeconds);
-    auto* stream = new WorkStream(coordinator, context, deadline, [this](WorkStream* gone) {
+    auto* stream = new WorkStream(coordinator, context, guard, deadline, [this](WorkStream* gone) {
       const std::lock_guard inner(mutex);
       streams.erase(gone);
     });
@@ -49,15 +59,17 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
     return stream;
   }
 
-  grpc::ServerWriteReactor<pb::BlobChunk>* FetchBlob(grpc::CallbackServerContext*,
+  grpc::ServerWriteReactor<pb::BlobChunk>* FetchBlob(grpc::CallbackServerContext* context,
                                                      const pb::FetchBlobRequest* request) override {
     if (++fetches > rpc::kFetches) {
       --fetches;
       return new Refusal<grpc::ServerWriteReactor<pb::BlobChunk>>(
           grpc::Status(grpc::StatusCode::UNAVAILABLE, "too many transfers at once; try again"));
     }
-    auto* stream = new BlobStream(coordinator.blobs(), *request, join_token, [this] { --fetches; });
-    stream->begin();
+    auto* stream = new BlobStream(
+        coordinator, *request, may_join, [this](std::function<void()> read) { reads.run(std::move(read)); },
+        [this] { --fetches; });
+    stream->begin(guard, address_of_peer(context->peer()));
     return stream;
   }
 
@@ -72,7 +84,8 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   }
 
   Coordinator& coordinator;
-  const std::string join_token;
+  const JoinCheck may_join;
+  const JoinGuard guard;
   const SystemClock clock;
   std::unique_ptr<grpc::Server> server;
   std::mutex mutex;
@@ -80,18 +93,19 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   std::set<WorkStream*> streams;  // guarded by mutex
   bool stopping = false;          // guarded by mutex
   std::atomic<int> fetches{0};
+  rpc::ReadPool reads;  // ends after the last stream
   std::jthread sweeper;
 };
 
-GrpcServer::GrpcServer(Coordinator& coordinator, std::string join_token)
-    : impl_(std::make_unique<Impl>(coordinator, std::move(join_token))) {}
+GrpcServer::GrpcServer(Coordinator& coordinator, JoinCheck may_join, JoinGuard guard)
+    : impl_(std::make_unique<Impl>(coordinator, std::move(may_join), std::move(guard))) {}
 
 GrpcServer::~GrpcServer() { stop(); }
 
-Result<int> GrpcServer::start(const std::string& address) {
+Result<int> GrpcServer::start(const std::string& address, const std::optional<Tls>& tls) {
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(address, credentials(tls), &port);
   builder.RegisterService(impl_.get());
   builder.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
   builder.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
@@ -103,6 +117,9 @@ Result<int> GrpcServer::start(const std::string& address) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
+  // What may come of a stream that is not read; gRPC would let it grow to megabytes of each worker.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, rpc::kUnreadBytes);
   impl_->server = builder.BuildAndStart();
   if (!impl_->server || port == 0) {
     impl_->server.reset();
@@ -113,6 +130,7 @@ Result<int> GrpcServer::start(const std::string& address) {
             "not this machine's; choose another with --grpc",
             address));
   }
+  impl_->reads.start(rpc::kReadThreads);
   impl_->sweeper = std::jthread([this](std::stop_token token) { impl_->sweep(token); });
   return port;
 }
@@ -130,6 +148,7 @@ void GrpcServer::stop() {
   // Streams that do not end by themselves within this time are cut.
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
   impl_->server->Wait();
+  impl_->reads.stop();
   impl_->server.reset();
 }
 

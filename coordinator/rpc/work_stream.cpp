@@ -31,9 +31,10 @@ void Outlet::close() {
 }
 
 WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context,
-                       TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
+                       const JoinGuard& guard, TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
     : coordinator_(coordinator),
       context_(context),
+      guard_(guard),
       hello_deadline_(hello_deadline),
       on_gone_(std::move(on_gone)),
       outlet_(std::make_shared<Outlet>(this)) {}
@@ -103,16 +104,26 @@ void WorkStream::greet(FromWorker message) {
   if (!hello)
     return refuse({Errc::invalid_argument, "bad message: the first one on a stream must be the hello"},
                   false);
-  if (hello->protocol != kProtocolVersion)
-    return refuse(
-        {Errc::failed_precondition,
-         fmt::format(
-             "this worker speaks protocol {}, the coordinator speaks {}: install the same version on both",
-             hello->protocol, kProtocolVersion)},
-        false);
+  if (hello->protocol != kProtocolVersion) {
+    const Error other{Errc::failed_precondition,
+                      fmt::format("this worker speaks protocol {}, the coordinator speaks {}: install the same "
+                                  "version on both",
+                                  hello->protocol, kProtocolVersion)};
+    log_warn(fmt::format("peer={} worker={} build={}", context_->peer(), log_value(hello->name),
+                         log_value(hello->build)),
+             "refused: " + other.message);
+    return refuse(other, false);
+  }
+  const std::string address = address_of_peer(context_->peer());
+  if (const int wait = guard_.wait(address, hello->join_token); wait > 0) {
+    log_warn("peer=" + context_->peer(), "refused: too many wrong join tokens came from its address");
+    return refuse({Errc::resource_exhausted, too_many_wrong_tokens(wait)}, true);
+  }
   auto session = coordinator_.connect(*hello, outlet_);
+  if (session || session.error().code == Errc::unauthenticated)
+    guard_.tried(address, hello->join_token, session.has_value());
   if (!session) {
-    log_warn(fmt::format("peer={} worker={}", context_->peer(), hello->name),
+    log_warn(fmt::format("peer={} worker={}", context_->peer(), log_value(hello->name)),
              "refused: " + session.error().message);
     return refuse(session.error(), session.error().code == Errc::unavailable ||
                                        session.error().code == Errc::resource_exhausted);

@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "common/base/clock.h"
+#include "coordinator/rpc/join_guard.h"
 #include "coordinator/service.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
@@ -43,8 +44,9 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
  public:
   // `open_streams` is decremented at the end. `on_gone` tells the server, last thing before the stream is
   // deleted.
-  WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, TimePoint hello_deadline,
-             std::function<void(WorkStream*)> on_gone);
+  // `guard` outlives this.
+  WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
+             TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
   void refuse(const Error& error, bool retry);  // tells the worker, then ends the stream
@@ -64,6 +66,7 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
 
   Coordinator& coordinator_;
   grpc::CallbackServerContext* context_;
+  const JoinGuard& guard_;
   const TimePoint hello_deadline_;
   const std::function<void(WorkStream*)> on_gone_;
   std::shared_ptr<Outlet> outlet_;

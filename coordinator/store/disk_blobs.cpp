@@ -15,6 +15,13 @@
 namespace ls::coordinator {
 namespace {
 
+Result<void> move_durably(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (auto made = make_folder(to.parent_path()); !made) return made;
+  if (::rename(from.c_str(), to.c_str()) != 0) return tl::unexpected(errno_error("rename to", to));
+  if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
+  return sync_folder(to.parent_path().parent_path());
+}
+
 class DiskUpload final : public BlobStore::Upload {
  public:
   DiskUpload(Digest digest, File file, std::filesystem::path temporary, std::filesystem::path final_path)
@@ -55,11 +62,7 @@ class DiskUpload final : public BlobStore::Upload {
               "send it again",
               size_, got.hex(), digest_.hex()));
     if (::fsync(file_.fd()) != 0) return tl::unexpected(errno_error("sync", temporary_));
-    if (auto made = make_folder(final_.parent_path()); !made) return made;
-    if (::rename(temporary_.c_str(), final_.c_str()) != 0)
-      return tl::unexpected(errno_error("rename to", final_));
-    if (auto synced = sync_folder(final_.parent_path()); !synced) return synced;
-    return sync_folder(final_.parent_path().parent_path());
+    return move_durably(temporary_, final_);
   }
 
   Digest digest_;
@@ -71,14 +74,23 @@ class DiskUpload final : public BlobStore::Upload {
 
 }  // namespace
 
-Result<std::unique_ptr<DiskBlobs>> DiskBlobs::open(std::filesystem::path folder) {
-  if (auto made = make_folder(folder / "tmp"); !made) return tl::unexpected(made.error());
+Result<std::unique_ptr<DiskBlobs>> DiskBlobs::open(std::filesystem::path folder, std::filesystem::path work) {
+  if (auto made = make_folder(work / "tmp"); !made) return tl::unexpected(made.error());
   std::error_code error;
-  for (const auto& left : std::filesystem::directory_iterator(folder / "tmp", error)) {
+  for (std::filesystem::directory_iterator left(work / "tmp", error), end; !error && left != end;
+       left.increment(error)) {
     std::error_code ignored;
-    std::filesystem::remove(left.path(), ignored);
+    std::filesystem::remove(left->path(), ignored);
   }
-  return std::unique_ptr<DiskBlobs>(new DiskBlobs(std::move(folder)));
+  std::unique_ptr<DiskBlobs> blobs(new DiskBlobs(std::move(folder), std::move(work)));
+  auto parts =
+      UploadParts::open(blobs->work_ / "unfinished",
+                        [blobs = blobs.get()](const Digest& digest, const std::filesystem::path& whole) {
+                          return move_durably(whole, blobs->path(digest));
+                        });
+  if (!parts) return tl::unexpected(parts.error());
+  blobs->parts_ = std::move(*parts);
+  return blobs;
 }
 
 std::filesystem::path DiskBlobs::path(const Digest& digest) const {
@@ -87,6 +99,14 @@ std::filesystem::path DiskBlobs::path(const Digest& digest) const {
 }
 
 bool DiskBlobs::has(const Digest& digest) const { return ::access(path(digest).c_str(), R_OK) == 0; }
+
+// A disk that cannot be read now (EIO, ESTALE, EACCES) says nothing of what is on it.
+Result<bool> DiskBlobs::find(const Digest& digest) const {
+  if (has(digest)) return true;
+  if (errno == ENOENT || errno == ENOTDIR) return false;
+  const Error error = errno_error("look at", path(digest));
+  return fail(Errc::unavailable, error.message);
+}
 
 Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   struct stat info {};
@@ -117,10 +137,38 @@ Result<void> DiskBlobs::put(const Digest& digest, std::span<const std::byte> byt
 }
 
 Result<std::unique_ptr<BlobStore::Upload>> DiskBlobs::begin_upload(const Digest& digest) {
-  std::string name = (folder_ / "tmp" / (digest.hex() + ".XXXXXX")).string();
+  std::string name = (work_ / "tmp" / (digest.hex() + ".XXXXXX")).string();
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);
   if (fd < 0) return tl::unexpected(errno_error("make", name));
   return std::make_unique<DiskUpload>(digest, File(fd), name, path(digest));
+}
+
+std::uint64_t DiskBlobs::received(const Digest& digest) const { return parts_->received(digest); }
+
+Result<std::unique_ptr<BlobStore::Upload>> DiskBlobs::resume_upload(const Digest& digest,
+                                                                    std::uint64_t offset) {
+  return parts_->resume(digest, offset);
+}
+
+Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
+  if (unfinished) return parts_->list();
+  std::vector<Digest> all;
+  std::error_code error;
+  const std::filesystem::directory_iterator end;
+  for (std::filesystem::directory_iterator group(folder_, error); !error && group != end; group.increment(error)) {
+    if (group->path().filename().string().size() != 2) continue;
+    std::error_code gone;
+    for (std::filesystem::directory_iterator file(group->path(), gone); !gone && file != end; file.increment(gone))
+      if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
+  }
+  if (error)
+    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));
+  return all;
+}
+
+Result<void> DiskBlobs::remove(const Digest& digest) {
+  if (::unlink(path(digest).c_str()) == 0 || errno == ENOENT) return {};
+  return tl::unexpected(errno_error("remove", path(digest)));
 }
 
 }  // namespace ls::coordinator

@@ -108,18 +108,52 @@ Result<void> sync_folder(const std::filesystem::path& folder) {
   return {};
 }
 
+Result<AtomicFile> AtomicFile::create(std::filesystem::path path, std::string_view suffix) {
+  std::filesystem::path temporary = path.string() + std::string(suffix);
+  auto file = File::open(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+  if (!file) return tl::unexpected(file.error());
+  return AtomicFile(std::move(path), std::move(temporary), std::move(*file));
+}
+
+AtomicFile::~AtomicFile() {
+  if (file_) ::unlink(temporary_.c_str());
+}
+
+Result<void> AtomicFile::write(std::span<const std::byte> bytes) { return write_all(file_, bytes, temporary_); }
+
+Result<void> AtomicFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::pwrite(file_.fd(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return tl::unexpected(errno_error("write", temporary_));
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+    offset += static_cast<std::uint64_t>(n);
+  }
+  return {};
+}
+
+Result<void> AtomicFile::sync() {
+  if (::fsync(file_.fd()) != 0) return tl::unexpected(errno_error("sync", temporary_));
+  return {};
+}
+
+Result<void> AtomicFile::commit() {
+  if (auto synced = sync(); !synced) return synced;
+  if (auto renamed = commit_unsynced(); !renamed) return renamed;
+  return sync_folder(path_.parent_path());
+}
+
+Result<void> AtomicFile::commit_unsynced() {
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0) return tl::unexpected(errno_error("rename to", path_));
+  file_ = File();
+  return {};
+}
+
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const std::filesystem::path temporary = path.string() + ".tmp";
-  const auto written = [&]() -> Result<void> {
-    auto file = File::open(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    if (!file) return tl::unexpected(file.error());
-    if (auto done = write_all(*file, bytes, temporary); !done) return done;
-    if (::fsync(file->fd()) != 0) return tl::unexpected(errno_error("sync", temporary));
-    if (::rename(temporary.c_str(), path.c_str()) != 0) return tl::unexpected(errno_error("rename to", path));
-    return sync_folder(path.parent_path());
-  }();
-  if (!written) ::unlink(temporary.c_str());
-  return written;
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto written = file->write(bytes); !written) return written;
+  return file->commit();
 }
 
 Result<File> lock_folder(const std::filesystem::path& folder) {

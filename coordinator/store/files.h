@@ -46,6 +46,29 @@ Result<void> sync_folder(const std::filesystem::path& folder);
 // whole.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
+// The same of what is too large for memory at once: written piece by piece to PATH + `suffix`, and whole at its place
+// only after commit(). One that is not committed leaves nothing.
+class AtomicFile {
+ public:
+  static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");
+  AtomicFile(AtomicFile&&) noexcept = default;
+  ~AtomicFile();
+
+  Result<void> write(std::span<const std::byte> bytes);  // behind what is there
+  Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
+  Result<void> sync();
+  Result<void> commit();   // with sync()
+  // Without: after a power failure the old or no content may stand there, after a crash of this process the new one.
+  Result<void> commit_unsynced();
+
+ private:
+  AtomicFile(std::filesystem::path path, std::filesystem::path temporary, File file)
+      : path_(std::move(path)), temporary_(std::move(temporary)), file_(std::move(file)) {}
+
+  std::filesystem::path path_, temporary_;
+  File file_;  // none: moved from, or committed
+};
+
 // Holds `folder` for this process alone until destroyed. failed_precondition if another one has it.
 Result<File> lock_folder(const std::filesystem::path& folder);
 

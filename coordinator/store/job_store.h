@@ -41,7 +41,8 @@ struct JobTotals {
 
 struct StoredJob {
   JobId id;
-  std::string name;  // scene file name
+  std::string name;   // scene file name
+  std::string owner;  // user name; empty: the admin, and in records of earlier versions
   double submitted_unix = 0;
   Digest scene;  // blob
   RenderSettings settings;
@@ -58,7 +59,10 @@ struct StoredJob {
   std::optional<Digest> numeric_class;
   std::string build;  // of the worker that the job was pinned with
   JobTotals totals;
+  // Workers that rendered wrong pixels, in records of earlier versions: now JobStore::barred().
+  std::vector<WorkerId> distrusted;
   std::uint64_t revision = 0;  // number of the change, where a store counts them (Redis)
+  std::uint64_t fence = 0;     // number of its owner, where several coordinators share a store
   bool damaged = false;  // its record can't be read: id, `failed` and `error` are all that is known
   bool operator==(const StoredJob&) const = default;
 };
@@ -68,6 +72,13 @@ Result<StoredJob> parse_stored_job(std::string_view json);
 struct LogLine {
   double unix_time = 0;
   std::string text;
+};
+
+// One that rendered wrong pixels, and what says so.
+struct BarredWorker {
+  WorkerId worker;
+  std::string evidence;
+  bool operator==(const BarredWorker&) const = default;
 };
 
 class JobStore {
@@ -91,11 +102,31 @@ class JobStore {
                                const LogLine& line) = 0;  // the oldest beyond kLogLinesKept go
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
+  // Kept for good, beyond the jobs that it was found by; of one that is known the first evidence stays.
+  virtual Result<void> bar(const BarredWorker& worker) = 0;
+  virtual Result<std::vector<BarredWorker>> barred() const = 0;
+
   // Adds `amount` to a named counter and returns its value before; durable. For ids that must never come
   // twice.
   virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
 
   virtual StoreStatus status() const { return {}; }
+
+  // ---- of a store that several coordinators share ----
+  struct Inherited {
+    StoredJob job;
+    std::string from;  // the coordinator that had it
+  };
+  struct Moved {
+    std::vector<BarredWorker> barred;  // found by another one; to be heeded before the rest
+    std::vector<JobId> lost;           // to another one: nothing of them is stored here any more
+    std::vector<Inherited> inherited;  // from one that is gone; one that was lost before may be among them
+  };
+  virtual Moved moved() { return {}; }  // each is told once
+  // Under which addresses this coordinator can be reached.
+  virtual void announce(const std::string&, const std::string&) {}
+  // Who has a job that this one does not know; may wait for a second. Nothing: nobody.
+  virtual Result<std::optional<Elsewhere>> elsewhere(const JobId&) { return std::nullopt; }
 };
 
 Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file);

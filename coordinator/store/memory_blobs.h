@@ -11,7 +11,7 @@
 
 namespace ls::coordinator {
 
-class MemoryBlobs final : public BlobStore {
+class MemoryBlobs : public BlobStore {
  public:
   // From now on `digest` is read from this file. The caller has computed the digest; the file must not
   // change.

@@ -66,6 +66,17 @@ class MemoryJobStore final : public JobStore {
     if (found == log_.end()) return std::vector<LogLine>{};
     return std::vector<LogLine>(found->second.begin(), found->second.end());
   }
+  Result<void> bar(const BarredWorker& worker) override {
+    const std::lock_guard lock(mutex_);
+    barred_.try_emplace(worker.worker, worker.evidence);
+    return {};
+  }
+  Result<std::vector<BarredWorker>> barred() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<BarredWorker> all;
+    for (const auto& [worker, evidence] : barred_) all.push_back({worker, evidence});
+    return all;
+  }
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
     const std::lock_guard lock(mutex_);
     auto& value = counters_[counter];
@@ -78,6 +89,7 @@ class MemoryJobStore final : public JobStore {
   std::vector<StoredJob> jobs_;
   std::map<JobId, std::vector<ConvergencePoint>> points_;
   std::map<JobId, std::deque<LogLine>> log_;
+  std::map<WorkerId, std::string> barred_;
   std::map<std::string, std::uint64_t> counters_;
 };
 

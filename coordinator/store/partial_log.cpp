@@ -15,72 +15,12 @@
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
 #include "coordinator/limits.h"
+#include "coordinator/store/partial_header.h"
 
 namespace ls::coordinator {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x3250534c;     // "LSP2"
-constexpr std::uint32_t kOldMagic = 0x3150534c;  // "LSP1": with three counters instead of a text
 constexpr std::uint64_t kHealthBytes = 64 << 10;
-
-// As on disk; little endian like every machine we run on.
-struct RawHeader {
-  std::uint32_t magic = kMagic, bytes = 0;
-  std::uint32_t tile = 0, round = 0;
-  std::uint64_t s0 = 0, s1 = 0;
-  std::array<std::uint8_t, 32> digest{};
-  double cpu_seconds = 0, at_seconds = 0;
-  std::uint64_t health_bytes = 0, health_check = 0, unused = 0;
-  std::array<char, ls::limits::kIdBytes> worker{};
-  std::uint64_t payload_check = 0;
-  std::uint64_t header_check = 0;  // over all before it
-};
-static_assert(sizeof(RawHeader) == 184);
-
-std::uint64_t check_of(std::span<const std::byte> bytes) {
-  const Digest digest = sha256(bytes);
-  std::uint64_t check = 0;
-  std::memcpy(&check, digest.bytes.data(), sizeof check);
-  return check;
-}
-
-std::uint64_t header_check(const RawHeader& raw) {
-  return check_of(std::as_bytes(std::span(&raw, 1)).first(offsetof(RawHeader, header_check)));
-}
-
-RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr, std::span<const std::byte> health) {
-  RawHeader raw;
-  raw.bytes = static_cast<std::uint32_t>(exr.size());
-  raw.tile = record.tile;
-  raw.round = record.round;
-  raw.s0 = record.samples.s0;
-  raw.s1 = record.samples.s1;
-  raw.digest = record.digest.bytes;
-  raw.cpu_seconds = record.cpu_seconds;
-  raw.at_seconds = record.at_seconds;
-  raw.health_bytes = health.size();
-  if (!health.empty()) raw.health_check = check_of(health);
-  std::memcpy(raw.worker.data(), record.worker.value.data(),
-              std::min(record.worker.value.size(), raw.worker.size()));
-  raw.payload_check = check_of(exr);
-  raw.header_check = header_check(raw);
-  return raw;
-}
-
-PartialRecord unpack(const RawHeader& raw, Health health) {
-  PartialRecord record;
-  record.tile = raw.tile;
-  record.round = raw.round;
-  record.samples = {raw.s0, raw.s1};
-  record.digest.bytes = raw.digest;
-  record.cpu_seconds = raw.cpu_seconds;
-  record.at_seconds = raw.at_seconds;
-  record.health = std::move(health);
-  record.worker.value.assign(raw.worker.data(), strnlen(raw.worker.data(), raw.worker.size()));
-  return record;
-}
-
-std::uint64_t health_bytes(const RawHeader& raw) { return raw.magic == kMagic ? raw.health_bytes : 0; }
 
 // The header at `offset` if a whole record of a file of `size` bytes stands there.
 std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
@@ -90,9 +30,9 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   if (!bytes) return std::nullopt;
   RawHeader raw;
   std::memcpy(&raw, bytes->data(), sizeof raw);
-  if ((raw.magic != kMagic && raw.magic != kOldMagic) || raw.header_check != header_check(raw)) return std::nullopt;
-  if (raw.bytes > ls::limits::kPartialBytes || health_bytes(raw) > kHealthBytes ||
-      raw.bytes + health_bytes(raw) > size - offset - sizeof raw)
+  if ((raw.magic != kPartialMagic && raw.magic != kOldPartialMagic) || raw.header_check != header_check(raw)) return std::nullopt;
+  if (raw.bytes > ls::limits::kPartialBytes || raw.text_bytes() > kHealthBytes ||
+      raw.bytes + raw.text_bytes() > size - offset - sizeof raw)
     return std::nullopt;
   return raw;
 }
@@ -101,7 +41,7 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
 std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                 const std::filesystem::path& path) {
   Health health;
-  if (raw.magic == kOldMagic) {
+  if (raw.magic == kOldPartialMagic) {
     health.add(HealthCause::unnamed, raw.health_bytes);
     health.add(HealthCause::negative, raw.health_check);
     health.add(HealthCause::majorant_violation, raw.unused);
@@ -116,8 +56,15 @@ std::optional<Health> health_at(const File& file, std::uint64_t offset, const Ra
 
 }  // namespace
 
+PartialLog::PartialLog(std::filesystem::path folder) : folder_(std::move(folder)) {}
+PartialLog::~PartialLog() = default;
+
 std::filesystem::path PartialLog::segment_path(std::uint32_t segment) const {
   return folder_ / fmt::format("partials-{:03}.seg", segment);
+}
+
+std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
+  return folder_ / fmt::format("partials-{:03}.idx", segment);
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
@@ -133,6 +80,26 @@ Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folde
   return log;
 }
 
+// The whole segment from its index. False: there is none that is sound.
+bool PartialLog::scan_index(std::uint32_t segment, const File& file, std::uint64_t size) {
+  const auto bytes = read_file(index_path(segment), limits::kMaxSegmentBytes);
+  const auto headers = bytes ? unpack_index(*bytes, size) : std::nullopt;
+  if (!headers) return false;
+  const std::size_t before = found_.size();
+  std::uint64_t at = 0;
+  for (const RawHeader& raw : *headers) {
+    auto health = health_at(file, at + sizeof(RawHeader) + raw.bytes, raw, segment_path(segment));
+    if (!health) {
+      found_.resize(before);
+      return false;
+    }
+    found_.push_back(
+        {unpack(raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw.bytes, raw.payload_check}});
+    at += raw.record_bytes();
+  }
+  return true;
+}
+
 Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
   const auto path = segment_path(segment);
   auto file = File::open(path, O_RDWR);
@@ -140,6 +107,7 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
   struct stat info {};
   if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
   const auto size = static_cast<std::uint64_t>(info.st_size);
+  if (!last && scan_index(segment, *file, size)) return {};
   std::uint64_t at = 0;
   while (at < size) {
     const auto raw = header_at(*file, at, size, path);
@@ -152,7 +120,8 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
     if (!health) break;
     found_.push_back(
         {unpack(*raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
-    at += sizeof(RawHeader) + raw->bytes + health_bytes(*raw);
+    if (last) headers_.push_back(*raw);
+    at += raw->record_bytes();
   }
   if (at == size) return {};
   // In an older segment this is damage of the disk: what follows is rendered again, the bytes stay for
@@ -180,6 +149,17 @@ Result<void> PartialLog::start_segment(std::uint32_t segment) {
   return {};
 }
 
+// Best effort: a restart that does not find it looks through the segment. One that was given up after a failed write
+// or sync gets none.
+void PartialLog::finish_segment() {
+  std::uint64_t bytes = 0;
+  for (const RawHeader& header : headers_) bytes += header.record_bytes();
+  if (bytes == size_)
+    if (const auto written = write_atomically(index_path(segment_), pack_index(headers_)); !written)
+      log_warn(fmt::format("file={}", index_path(segment_).string()), written.error().message);
+  headers_.clear();
+}
+
 Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::span<const std::byte> exr) {
   if (exr.size() > ls::limits::kPartialBytes)
     return fail(Errc::invalid_argument, fmt::format("a partial of {} bytes is larger than {}", exr.size(),
@@ -196,6 +176,7 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
       lost_ = done.error();
       return tl::unexpected(done.error());
     }
+    finish_segment();
     if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
   }
   const RawHeader raw = pack(record, exr, health);
@@ -211,6 +192,7 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
   }
   const Place place{segment_, size_ + sizeof raw, raw.bytes, raw.payload_check};
   size_ += whole;
+  headers_.push_back(raw);
   unsynced_ = true;
   return place;
 }

@@ -1,6 +1,7 @@
 // Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed
 // size, closed by a checksum, the EXR bytes, and the unit's health as text where it isn't clean. What stood in a file when sync() returned survives kill -9
-// and power loss; a torn record behind it is found at open() and cut.
+// and power loss; a torn record behind it is found at open() and cut. Beside a full segment stands an index of its
+// headers, partials-NNN.idx.
 //
 // append() and sync() from one thread; read() from any.
 #pragma once
@@ -31,8 +32,12 @@ struct PartialRecord {
   bool operator==(const PartialRecord&) const = default;
 };
 
+struct RawHeader;  // partial_header.h
+
 class PartialLog {
  public:
+  ~PartialLog();
+
   struct Place {
     std::uint32_t segment = 0;
     std::uint64_t offset = 0;  // of the EXR bytes
@@ -62,9 +67,12 @@ class PartialLog {
   Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
 
  private:
-  explicit PartialLog(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  explicit PartialLog(std::filesystem::path folder);
   std::filesystem::path segment_path(std::uint32_t segment) const;
+  std::filesystem::path index_path(std::uint32_t segment) const;
   Result<void> scan(std::uint32_t segment, bool last);
+  bool scan_index(std::uint32_t segment, const File& file, std::uint64_t size);
+  void finish_segment();
   Result<void> start_segment(std::uint32_t segment);
   Result<void> flush();
 
@@ -74,6 +82,7 @@ class PartialLog {
   std::uint64_t size_ = 0;  // of the current segment
   bool unsynced_ = false;
   std::optional<Error> lost_;  // of a full segment that could not be synced: told by the next sync()
+  std::vector<RawHeader> headers_;  // of the current segment
   std::vector<Entry> found_;
   std::uint64_t cut_bytes_ = 0;
 };

@@ -14,7 +14,7 @@
 #include <memory>
 
 #include "coordinator/store/job_store.h"
-#include "coordinator/store/redis_link.h"
+#include "coordinator/store/redis_members.h"
 
 namespace ls::coordinator {
 
@@ -24,10 +24,13 @@ struct RedisStoreOptions {
   Duration first_retry = std::chrono::milliseconds(100), longest_retry = std::chrono::seconds(2);
   Duration check_every =
       std::chrono::seconds(1);  // whether Redis is there and remembers, while there is no news
+  // Given: other coordinators share this Redis (redis_members.h), and this one has this name among them.
+  std::string node;
 };
 
-// Where Redis does not answer now: unavailable if `local` knows no job (what Redis knows would be missed);
-// else the store opens, and Redis is told when it answers.
+// Where Redis does not answer now: unavailable if `local` knows no job (what Redis knows would be missed), or
+// others share it (what of `local` is still this coordinator's would not be known); else the store opens, and
+// Redis is told when it answers.
 Result<std::unique_ptr<JobStore>> open_redis_job_store(std::unique_ptr<JobStore> local,
                                                        RedisStoreOptions options);
 

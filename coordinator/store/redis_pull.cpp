@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <map>
 
@@ -42,33 +41,15 @@ Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::
 Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const JobId> ids) {
   std::vector<RedisLink::Command> commands;
   for (const JobId& id : ids) commands.push_back({"HGET", redis_job_key(id), "revision"});
-  auto replies = ask(link, commands);
-  if (!replies) return tl::unexpected(replies.error());
   std::vector<std::uint64_t> revisions;
-  for (const RedisReply& reply : *replies) revisions.push_back(number_of(reply.text));
+  for (std::size_t i = 0; i < commands.size(); i += kAskedAtOnce) {
+    const auto portion = std::span(commands).subspan(i, std::min(kAskedAtOnce, commands.size() - i));
+    auto replies = link.run_all(portion);
+    if (!replies) return tl::unexpected(replies.error());
+    // What cannot be read is no revision, and keeps nobody from asking for the others.
+    for (const auto& reply : *replies) revisions.push_back(reply ? number_of(reply->text) : 0);
+  }
   return revisions;
-}
-
-// An id becomes the name of a folder: what else stands in Redis under our keys is none.
-bool is_job_id(std::string_view id) {
-  constexpr std::size_t kLongest = 100;
-  return !id.empty() && id.size() <= kLongest && std::all_of(id.begin(), id.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '-' || c == '_';
-  });
-}
-
-Result<void> take_in(JobStore& local, const RedisJob& job) {
-  auto points = local.points(job.job.id);
-  if (!points) return tl::unexpected(points.error());
-  auto log = local.log(job.job.id);
-  if (!log) return tl::unexpected(log.error());
-  if (auto put = local.put_job(job.job); !put) return put;
-  for (std::size_t i = points->size(); i < job.points.size(); ++i)
-    if (auto added = local.add_point(job.job.id, job.points[i]); !added) return added;
-  if (!log->empty()) return {};
-  for (const LogLine& line : job.log)
-    if (auto added = local.add_log(job.job.id, line); !added) return added;
-  return {};
 }
 
 Result<void> pull_counters(RedisLink& link, JobStore& local) {
@@ -86,15 +67,10 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   return {};
 }
 
-// The ids of which Redis knows more, without those that were removed here.
-Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
-  auto members = link.run({"SMEMBERS", kRedisJobs});
-  if (!members) return tl::unexpected(members.error());
-  std::map<JobId, std::uint64_t> here;
-  for (const StoredJob& job : known) here[job.id] = job.revision;
-  std::vector<JobId> ids;
-  for (const RedisReply& member : members->items)
-    if (is_job_id(member.text)) ids.push_back({member.text});
+// Of `ids` those of which Redis knows more than `here` (id, revision), without those that were removed here.
+Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
+                                     const std::map<JobId, std::uint64_t>& here,
+                                     const std::vector<JobId>& ids, const std::string& node) {
   auto there = revisions_of(link, ids);
   if (!there) return tl::unexpected(there.error());
   std::vector<JobId> wanted;
@@ -109,42 +85,118 @@ Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::spa
       wanted.push_back(ids[i]);
       continue;
     }
-    for (const auto& command : remove_commands(ids[i]))
+    for (const auto& command : remove_commands(ids[i], node))
       if (auto gone = link.run(command); !gone) return tl::unexpected(gone.error());
   }
   return wanted;
 }
 
-}  // namespace
+Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
+  auto members = link.run({"SMEMBERS", kRedisJobs});
+  if (!members) return tl::unexpected(members.error());
+  std::map<JobId, std::uint64_t> here;
+  for (const StoredJob& job : known) here[job.id] = job.revision;
+  std::vector<JobId> ids;
+  for (const RedisReply& member : members->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  return wanted_of(link, local, here, ids, "");
+}
 
-std::string removal_mark(const JobId& job) { return "removed:" + job.value; }
-
-Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
-  if (auto counters = pull_counters(link, local); !counters) return counters;
-  auto wanted = wanted_ids(link, local, known);
-  if (!wanted) return tl::unexpected(wanted.error());
+Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId>& wanted) {
   std::vector<RedisLink::Command> commands;
-  for (const JobId& id : *wanted) commands.push_back({"HGETALL", redis_job_key(id)});
+  for (const JobId& id : wanted) commands.push_back({"HGETALL", redis_job_key(id)});
   auto replies = ask(link, commands);
   if (!replies) return tl::unexpected(replies.error());
 
   std::vector<RedisJob> jobs;
   for (std::size_t i = 0; i < replies->size(); ++i) {
     auto job = parse_redis_job((*replies)[i]);
-    if (job && job->job.id != (*wanted)[i]) job = fail(Errc::internal, "the record is of another job");
+    if (job && job->job.id != wanted[i]) job = fail(Errc::internal, "the record is of another job");
     if (job)
       jobs.push_back(std::move(*job));
     else
-      log_error(fmt::format("job={} store=redis", (*wanted)[i].value),
+      log_error(fmt::format("job={} store=redis", wanted[i].value),
                 job.error().message + "; it is left in Redis as it is");
   }
   std::stable_sort(jobs.begin(), jobs.end(), [](const RedisJob& a, const RedisJob& b) {
     return a.job.submitted_unix < b.job.submitted_unix;
   });
   for (const RedisJob& job : jobs)
-    if (auto taken = take_in(local, job); !taken) return taken;
+    if (auto taken = keep_from_redis(local, job); !taken) return taken;
   if (!jobs.empty()) log_info("store=redis", fmt::format("{} jobs taken from Redis", jobs.size()));
   return {};
+}
+
+}  // namespace
+
+Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
+  auto points = local.points(job.job.id);
+  if (!points) return tl::unexpected(points.error());
+  auto log = local.log(job.job.id);
+  if (!log) return tl::unexpected(log.error());
+  if (auto put = local.put_job(job.job); !put) return put;
+  for (std::size_t i = points->size(); i < job.points.size(); ++i)
+    if (auto added = local.add_point(job.job.id, job.points[i]); !added) return added;
+  if (!log->empty()) return {};
+  for (const LogLine& line : job.log)
+    if (auto added = local.add_log(job.job.id, line); !added) return added;
+  return {};
+}
+
+std::string removal_mark(const JobId& job) { return "removed:" + job.value; }
+
+Result<void> keep_inherited(JobStore& local, const RedisJob& job) {
+  // What is here is of an earlier time, and was another's meanwhile.
+  if (auto removed = local.remove_job(job.job.id); !removed) return removed;
+  return keep_from_redis(local, job);
+}
+
+Result<void> pull_barred(RedisLink& link, JobStore& local) {
+  auto all = link.run({"HGETALL", kRedisBarred});
+  if (!all) return tl::unexpected(all.error());
+  for (const BarredWorker& worker : barred_workers(*all))
+    if (auto kept = local.bar(worker); !kept) return kept;
+  return {};
+}
+
+Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
+  if (auto barred = pull_barred(link, local); !barred) return barred;
+  if (auto counters = pull_counters(link, local); !counters) return counters;
+  auto wanted = wanted_ids(link, local, known);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, *wanted);
+}
+
+Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node) {
+  if (auto barred = pull_barred(link, local); !barred) return barred;
+  auto known = local.jobs();
+  if (!known) return tl::unexpected(known.error());
+  std::vector<RedisLink::Command> commands;
+  for (const StoredJob& job : *known) commands.push_back({"HGET", redis_job_key(job.id), "owner"});
+  auto owners = ask(link, commands);
+  if (!owners) return tl::unexpected(owners.error());
+  std::vector<JobId> gone;
+  std::map<JobId, std::uint64_t> here;
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    const StoredJob& job = (*known)[i];
+    if ((*owners)[i].nil || (*owners)[i].text == node)
+      here[job.id] = job.revision;
+    else
+      gone.push_back(job.id);
+  }
+  for (const JobId& id : gone)
+    log_warn(fmt::format("job={} store=redis", id.value),
+             "another coordinator has taken it over while this one was away: dropped");
+  if (auto removed = local.remove_jobs(gone); !removed) return removed;
+
+  auto owned = link.run({"SMEMBERS", "lightshaft:owned:" + node});
+  if (!owned) return tl::unexpected(owned.error());
+  std::vector<JobId> ids;
+  for (const RedisReply& member : owned->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  auto wanted = wanted_of(link, local, here, ids, node);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, *wanted);
 }
 
 Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known) {

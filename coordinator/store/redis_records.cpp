@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace ls::coordinator {
@@ -10,11 +14,35 @@ namespace {
 using nlohmann::json;
 
 // One step for Redis: between asking for the revision and writing nobody else can write.
+// ARGV: revision, id, fence, node, sequence or '', fields ... A higher fence is a later owner's; under a
+// lower one Redis has forgotten, or been told by an earlier owner, and its revision counts for nothing.
 constexpr const char* kPut = R"(
-if tonumber(redis.call('HGET', KEYS[1], 'revision') or '0') > tonumber(ARGV[1]) then return 0 end
+local fence = tonumber(redis.call('HGET', KEYS[1], 'fence') or '0')
+local mine = tonumber(ARGV[3])
+if fence > mine then return -1 end
+if ARGV[4] ~= '' and fence == mine then
+  local owner = redis.call('HGET', KEYS[1], 'owner')
+  if owner and owner ~= ARGV[4] then return -1 end
+end
+if fence == mine and tonumber(redis.call('HGET', KEYS[1], 'revision') or '0') > tonumber(ARGV[1]) then return 0 end
 redis.call('SADD', KEYS[2], ARGV[2])
-redis.call('HSET', KEYS[1], unpack(ARGV, 3))
+redis.call('HSET', KEYS[1], unpack(ARGV, 6))
+if ARGV[4] ~= '' then
+  redis.call('HSET', KEYS[1], 'fence', ARGV[3], 'owner', ARGV[4])
+  redis.call('SADD', 'lightshaft:owned:' .. ARGV[4], ARGV[2])
+  if ARGV[5] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[5], ARGV[4]) end
+end
 return 1
+)";
+
+// ARGV: id, node, sequence or ''.
+constexpr const char* kRemove = R"(
+local owner = redis.call('HGET', KEYS[1], 'owner')
+redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])
+if owner and owner ~= ARGV[2] then return 0 end
+redis.call('SREM', KEYS[2], ARGV[1])
+if ARGV[3] ~= '' then redis.call('HDEL', 'lightshaft:sequences', ARGV[3]) end
+return redis.call('DEL', KEYS[1])
 )";
 
 std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
@@ -26,6 +54,9 @@ std::optional<TrueFigures> truth_of(const json& t) {
   return truth;
 }
 
+json finite(double value) { return std::isfinite(value) ? value : 0.0; }
+double number_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
+
 json truth_value(const std::optional<TrueFigures>& truth) {
   if (!truth) return nullptr;
   return json::array({truth->rmse, truth->relmse, truth->flip ? json(*truth->flip) : json()});
@@ -34,7 +65,11 @@ json truth_value(const std::optional<TrueFigures>& truth) {
 std::vector<ConvergencePoint> parse_points(const std::string& text) {
   std::vector<ConvergencePoint> points;
   for (const json& p : json::parse(text))
-    points.push_back({p.at(0), p.at(1), p.at(2), {p.at(3), p.at(4), p.at(5), p.at(6)}, truth_of(p.at(7))});
+    points.push_back({number_of(p.at(0)),
+                      number_of(p.at(1)),
+                      number_of(p.at(2)),
+                      {number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)), number_of(p.at(6))},
+                      truth_of(p.at(7))});
   return points;
 }
 
@@ -46,12 +81,34 @@ std::vector<LogLine> parse_log(const std::string& text) {
 
 }  // namespace
 
+bool is_job_id(std::string_view id) {
+  constexpr std::size_t kLongest = 100;
+  return !id.empty() && id.size() <= kLongest && std::all_of(id.begin(), id.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_';
+  });
+}
+
+std::vector<BarredWorker> barred_workers(const RedisReply& fields) {
+  std::vector<BarredWorker> all;
+  for (std::size_t i = 0; i + 1 < fields.items.size(); i += 2)
+    all.push_back({{fields.items[i].text}, fields.items[i + 1].text});
+  return all;
+}
+
 std::string redis_job_key(const JobId& id) { return "lightshaft:job:" + id.value; }
 
 RedisLink::Command put_command(const RedisUpdate& update) {
-  RedisLink::Command command{
-      "EVAL",         kPut, "2", redis_job_key(update.id), kRedisJobs, std::to_string(update.revision),
-      update.id.value};
+  const auto frame = frame_of(update.id);
+  RedisLink::Command command{"EVAL",
+                             kPut,
+                             "2",
+                             redis_job_key(update.id),
+                             kRedisJobs,
+                             std::to_string(update.revision),
+                             update.id.value,
+                             std::to_string(update.fence),
+                             update.node,
+                             frame ? frame->sequence.value : ""};
   const auto add = [&](const char* name, const std::optional<std::string>& value) {
     if (!value) return;
     command.emplace_back(name);
@@ -59,19 +116,26 @@ RedisLink::Command put_command(const RedisUpdate& update) {
   };
   if (update.record) add("revision", std::to_string(update.revision));
   add("record", update.record);
+  if (update.record && !update.node.empty()) add("state", update.state);
   add("points", update.points);
   add("log", update.log);
   return command;
 }
 
-std::vector<RedisLink::Command> remove_commands(const JobId& id) {
+std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node) {
+  if (!node.empty()) {
+    const auto frame = frame_of(id);
+    return {{"EVAL", kRemove, "2", redis_job_key(id), kRedisJobs, id.value, node,
+             frame ? frame->sequence.value : ""}};
+  }
   return {{"SREM", kRedisJobs, id.value}, {"DEL", redis_job_key(id)}};
 }
 
 std::string points_json(const std::vector<ConvergencePoint>& points) {
   json all = json::array();
   for (const auto& p : points)
-    all.push_back({p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
+    all.push_back({finite(p.seconds), finite(p.core_seconds), finite(p.spp), finite(p.error.rmse),
+                   finite(p.error.relmse), finite(p.error.relmse_lo), finite(p.error.relmse_hi),
                    truth_value(p.truth)});
   return dumped(all);
 }
@@ -88,7 +152,10 @@ Result<RedisJob> parse_redis_job(const RedisReply& fields) {
     values[fields.items[i].text] = fields.items[i + 1].text;
   auto job = parse_stored_job(values["record"]);
   if (!job) return tl::unexpected(job.error());
-  RedisJob read{std::move(*job), {}, {}};
+  RedisJob read{std::move(*job), {}, {}, values["owner"], values["from"], 0};
+  // The record is as its last writer knew it; the hash knows of an owner since.
+  std::from_chars(values["fence"].data(), values["fence"].data() + values["fence"].size(), read.fence);
+  read.job.fence = std::max(read.job.fence, read.fence);
   try {
     if (!values["points"].empty()) read.points = parse_points(values["points"]);
     if (!values["log"].empty()) read.log = parse_log(values["log"]);

@@ -19,6 +19,7 @@ CREATE INDEX IF NOT EXISTS points_of_job ON points(job);
 CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL, PRIMARY KEY(job, spp));
 CREATE TABLE IF NOT EXISTS log(n INTEGER PRIMARY KEY, job TEXT NOT NULL, unix REAL, text TEXT);
 CREATE INDEX IF NOT EXISTS log_of_job ON log(job);
+CREATE TABLE IF NOT EXISTS barred(worker TEXT PRIMARY KEY, evidence TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS counters(name TEXT PRIMARY KEY, value INTEGER NOT NULL);
 )";
 
@@ -225,6 +226,23 @@ class SqliteJobStore final : public JobStore {
     rows.bind(job.value).bind(static_cast<std::int64_t>(limits::kLogLinesKept));
     auto row = rows.step("read a log");
     for (; row && *row; row = rows.step("read a log")) all.push_back({rows.real(0), rows.text(1)});
+    if (!row) return tl::unexpected(row.error());
+    return all;
+  }
+
+  Result<void> bar(const BarredWorker& worker) override {
+    const std::lock_guard lock(mutex_);
+    return Statement(db_.get(), "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
+        .bind(worker.worker.value)
+        .bind(worker.evidence)
+        .run("store that a worker is barred");
+  }
+  Result<std::vector<BarredWorker>> barred() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<BarredWorker> all;
+    Statement rows(db_.get(), "SELECT worker, evidence FROM barred ORDER BY worker");
+    auto row = rows.step("read the barred workers");
+    for (; row && *row; row = rows.step("read the barred workers")) all.push_back({{rows.text(0)}, rows.text(1)});
     if (!row) return tl::unexpected(row.error());
     return all;
   }

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "coordinator/store/job_store.h"
@@ -9,21 +10,22 @@ namespace {
 
 using nlohmann::json;
 
+// JSON knows no infinity: it would be written as null, and the record could not be read again.
+double finite(double seconds) { return std::isfinite(seconds) ? seconds : 0; }
+double seconds_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
+
 json to_value(const JobTotals& t) {
-  return {{"render_seconds", t.render_seconds},
-          {"core_seconds", t.core_seconds},
-          {"load_seconds", t.load_seconds},
+  json time;
+  for (const TimePart& part : kTimeParts) time[part.name] = finite(t.time.*part.seconds);
+  return {{"render_seconds", finite(t.render_seconds)},
+          {"core_seconds", finite(t.core_seconds)},
+          {"load_seconds", finite(t.load_seconds)},
           {"peak_rss_bytes", t.peak_rss_bytes},
           {"spp_done", t.spp_done},
           {"units", t.units},
           {"units_planned", t.units_planned},
           {"health", json::parse(canonical_json(t.health))},
-          {"time",
-           {{"load", t.time.load},
-            {"build", t.time.build},
-            {"transfer", t.time.transfer},
-            {"merge", t.time.merge},
-            {"idle", t.time.idle}}},
+          {"time", std::move(time)},
           {"began_unix", t.began_unix},
           {"ended_unix", t.ended_unix},
           {"doubt", t.doubt},
@@ -46,21 +48,22 @@ Health health_of(const json& totals) {
 
 JobTotals totals_of(const json& j) {
   JobTotals t;
-  t.render_seconds = j.at("render_seconds");
-  t.core_seconds = j.at("core_seconds");
-  t.load_seconds = j.at("load_seconds");
+  t.render_seconds = seconds_of(j.at("render_seconds"));
+  t.core_seconds = seconds_of(j.at("core_seconds"));
+  t.load_seconds = seconds_of(j.at("load_seconds"));
   t.peak_rss_bytes = j.at("peak_rss_bytes");
   t.spp_done = j.at("spp_done");
   t.units = j.at("units");
   t.units_planned = j.value("units_planned", std::uint64_t{0});
   t.health = health_of(j);
   const json time = j.value("time", json::object());  // not in records of earlier versions
-  t.time = {time.value("load", 0.),     time.value("build", 0.), 0.,
-            time.value("transfer", 0.), time.value("merge", 0.), time.value("idle", 0.)};
+  for (const TimePart& part : kTimeParts)
+    if (const auto found = time.find(part.name); found != time.end()) t.time.*part.seconds = seconds_of(*found);
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
   t.doubt = j.value("doubt", std::string());
-  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null()) t.few_hits = few->get<std::uint64_t>();
+  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null())
+    t.few_hits = few->get<std::uint64_t>();
   return t;
 }
 
@@ -88,6 +91,7 @@ StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
   job.name = j.at("name");
+  job.owner = j.value("owner", std::string());
   job.submitted_unix = j.at("submitted_unix");
   job.scene = digest_from(j.at("scene"));
   job.settings = required(parse_render_settings(j.at("settings").get<std::string>()));
@@ -109,7 +113,10 @@ StoredJob stored_from(const json& j) {
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
   job.totals = totals_of(j.at("totals"));
+  if (const auto distrusted = j.find("distrusted"); distrusted != j.end())
+    for (const auto& worker : *distrusted) job.distrusted.push_back({worker.get<std::string>()});
   job.revision = j.value("revision", std::uint64_t{0});
+  job.fence = j.value("fence", std::uint64_t{0});
   return job;
 }
 
@@ -121,6 +128,7 @@ std::string to_json(const StoredJob& job) {
     assets.push_back({{"digest", a.digest.hex()}, {"bytes", a.bytes}, {"name", a.name}});
   json j{{"id", job.id.value},
          {"name", job.name},
+         {"owner", job.owner},
          {"submitted_unix", job.submitted_unix},
          {"scene", job.scene.hex()},
          {"settings", canonical_json(job.settings)},
@@ -138,7 +146,9 @@ std::string to_json(const StoredJob& job) {
          {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
          {"build", job.build},
          {"totals", to_value(job.totals)}};
+  for (const WorkerId& worker : job.distrusted) j["distrusted"].push_back(worker.value);
   if (job.revision != 0) j["revision"] = job.revision;
+  if (job.fence != 0) j["fence"] = job.fence;
   // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }

@@ -28,10 +28,15 @@ AREAS = {
     # It folds partials out of the store's log.
     "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store"],
     "coordinator/rpc": COORDINATOR_BASE + ["proto"],
+    "coordinator/tls": ["common"],
     "coordinator/http": COORDINATOR_BASE + ["coordinator/views.h"],
+    # It keeps what it must still tell in files.
+    "coordinator/webhooks": COORDINATOR_BASE + ["coordinator/store", "coordinator/views.h"],
     # What stands in coordinator/ itself wires domain, store and assembler into the service; it knows no network.
     "coordinator": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble"],
     "coordinator/main.cpp": ["common", "coordinator/*"],
+    "coordinator/options.h": COORDINATOR_BASE + ["coordinator/http/limits.h"],
+    "coordinator/options.cpp": COORDINATOR_BASE + ["coordinator/options.h"],
     # `lightshaft render` is coordinator and worker in one process.
     "cli": ["common", "worker/*", "coordinator/*", "cli/cases"],
     # The validation cases see no more than the renderer's public face and what measures and judges them.
@@ -67,10 +72,10 @@ DOORS = [
     Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/preview)\.cpp$", "its decoder, and the preview"),
     Door("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^common/assets/jpeg_\w+\.cpp$", "its decoder"),
     Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
-    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|coordinator/http/(auth|token_file))\.cpp$", "digests and tokens"),
+    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|coordinator/http/(auth|token_file|stream)|coordinator/tls/certificates)\.cpp$", "digests, tokens, TLS"),
     Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
     Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$", "the executables"),
-    Door("libcurl", r"^curl/", r"^cli/", "the command line's client"),
+    Door("libcurl", r"^curl/", r"^cli/|^coordinator/(store/s3_link|webhooks/post)\.cpp$", "the command line's client, the link to S3, and what posts webhooks"),
     Door("nlohmann-json", r"^nlohmann/", EVERYWHERE, "our own code"),
 ]
 # In tests a library may be needed as an oracle or to make broken files; doors bind the product.

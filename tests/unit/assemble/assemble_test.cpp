@@ -7,7 +7,10 @@
 #include "common/image/fake_pixels.h"
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/report.h"
+#include "coordinator/assemble/snapshot.h"
 #include "coordinator/assemble/verify.h"
+#include "coordinator/limits.h"
+#include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
 namespace {
@@ -74,24 +77,115 @@ TEST(RoundErrors, RefusesBytesCutAnywhere) {
     EXPECT_FALSE(RoundErrors::load(std::span(bytes).first(n), 2, true)) << n;
 }
 
+// What is folded, written as the service does.
+void write_to(const std::filesystem::path& path, const Assembly& a, std::string_view format = "f") {
+  auto file = SnapshotFile::create(path, ".new", a.film().grid(), a.film().aovs(), format).value();
+  for (TileIndex t = 0; t < a.film().grid().count(); ++t)
+    ASSERT_TRUE(file.add(snapshot_of(a.film(), a.errors(), a.health(), t)));
+  ASSERT_TRUE(file.finish());
+  ASSERT_TRUE(file.commit());
+}
+
 TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
+  TempFolder dir;
+  const auto path = dir.path() / "film.snap";
   Assembly assembly(kGrid, false);
-  for (TileIndex t = 0; t < kGrid.count(); ++t)
+  for (TileIndex t = 0; t + 1 < kGrid.count(); ++t)  // and one tile that nothing is folded of
     for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
 
-  auto bytes = save_snapshot(assembly.film(), assembly.errors(), assembly.health(), "f");
+  write_to(path, assembly);
 
-  const auto loaded = load_snapshot(bytes, kGrid, false, "f");
+  const auto loaded = load_snapshot(path, kGrid, false, "f");
   ASSERT_TRUE(loaded);
   EXPECT_EQ(loaded->film(), assembly.film());
   EXPECT_EQ(loaded->errors(), assembly.errors());
-  EXPECT_FALSE(load_snapshot(bytes, {{48, 48}, 32}, false, "f"));
-  EXPECT_FALSE(load_snapshot(bytes, kGrid, false, "g"));
+  EXPECT_FALSE(load_snapshot(path, {{48, 48}, 32}, false, "f"));
+  EXPECT_FALSE(load_snapshot(path, kGrid, false, "g"));
+  EXPECT_FALSE(load_snapshot(path, kGrid, false, "f", AovSet(1)));
+  EXPECT_FALSE(load_snapshot(dir.path() / "none", kGrid, false, "f"));
+  const auto bytes = read_file(path, 1 << 20).value();
+  const auto with = [&](std::vector<std::byte> other) {
+    EXPECT_TRUE(write_atomically(path, other));
+    return load_snapshot(path, kGrid, false, "f").has_value();
+  };
   for (std::size_t i = 0; i < bytes.size(); i += 997) {
-    bytes[i] ^= std::byte{1};
-    EXPECT_FALSE(load_snapshot(bytes, kGrid, false, "f")) << i;
-    bytes[i] ^= std::byte{1};
+    auto bad = bytes;
+    bad[i] ^= std::byte{1};
+    EXPECT_FALSE(with(bad)) << i;
+    EXPECT_FALSE(with({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(i)})) << i;
   }
+  auto longer = bytes;
+  longer.push_back({});
+  EXPECT_FALSE(with(longer));
+  EXPECT_TRUE(with(bytes));
+}
+
+TEST(Assembly, ASnapshotTakesEachTileAsItWasWhenItWasCopied) {
+  TempFolder dir;
+  Assembly assembly(kGrid, false);
+  ASSERT_TRUE(assembly.fold(0, 0, waiting(0, {0, 2})));
+  const Film first = assembly.film();
+  auto file = SnapshotFile::create(dir.path() / "film.snap", ".new", kGrid, {}, "f").value();
+  const TileSnapshot tile = snapshot_of(assembly.film(), assembly.errors(), assembly.health(), 0);
+  ASSERT_TRUE(assembly.fold(0, 1, waiting(0, {2, 4})));
+  ASSERT_TRUE(file.add(tile));
+  EXPECT_FALSE(load_snapshot(dir.path() / "film.snap", kGrid, false, "f")) << "it is not at its place yet";
+
+  ASSERT_TRUE(file.finish());
+  ASSERT_TRUE(file.commit());
+
+  EXPECT_EQ(load_snapshot(dir.path() / "film.snap", kGrid, false, "f")->film(), first);
+}
+
+TEST(Assembly, ASnapshotOfAnEarlierProgramIsRead) {
+  TempFolder dir;
+  Assembly assembly(kGrid, false);
+  for (TileIndex t = 0; t < kGrid.count(); ++t) ASSERT_TRUE(assembly.fold(t, 0, waiting(t, {0, 2})));
+  std::vector<std::byte> old;
+  const auto put = [&](std::span<const std::byte> bytes) { old.insert(old.end(), bytes.begin(), bytes.end()); };
+  const auto part = [&](std::span<const std::byte> bytes) {
+    const std::uint64_t length = bytes.size();
+    put(std::as_bytes(std::span(&length, 1)));
+    put(bytes);
+  };
+  put(std::as_bytes(std::span(std::string_view("LSSNAP1\n"))));
+  part(std::as_bytes(std::span(std::string_view("f"))));
+  part(assembly.film().save());
+  part(assembly.errors().save());
+  part({});
+  const Digest seal = sha256(std::span<const std::byte>(old));
+  put(std::as_bytes(std::span(seal.bytes)));
+  ASSERT_TRUE(write_atomically(dir.path() / "film.snap", old));
+
+  const auto loaded = load_snapshot(dir.path() / "film.snap", kGrid, false, "f");
+
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->film(), assembly.film());
+  EXPECT_EQ(loaded->errors(), assembly.errors());
+  EXPECT_FALSE(load_snapshot(dir.path() / "film.snap", kGrid, false, "g"));
+}
+
+TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {
+  const std::size_t before = WaitingBytes::all();
+  constexpr std::size_t kEach = std::size_t{32} * 32 * 6 * sizeof(float);
+  std::size_t kept = 0;
+  {
+    Assembly one(kGrid, false), other(kGrid, false);
+    const PartialLog::Place on_disk{};
+    for (RoundIndex r = 0; r < 4000; ++r) {
+      WaitingPartial w = waiting(0, {0, 2});
+      w.place = on_disk;
+      (r % 2 == 0 ? one : other).hold(0, r, std::move(w));
+    }
+    for (RoundIndex r = 0; r < 4000; ++r) kept += (r % 2 == 0 ? one : other).take(0, r, {0, 2})->partial.has_value();
+    EXPECT_EQ(kept, (limits::kMaxPendingPartials - before) / kEach);
+    WaitingPartial nowhere = waiting(0, {0, 2});  // what is on no disk is kept in any case
+    one.hold(0, 0, std::move(nowhere));
+    EXPECT_EQ(WaitingBytes::all(), before + kEach);
+    Assembly moved = std::move(one);
+    EXPECT_EQ(WaitingBytes::all(), before + kEach);
+  }
+  EXPECT_EQ(WaitingBytes::all(), before) << "what goes is not counted any more";
 }
 
 Health unwell(int x, std::uint64_t sample) {
@@ -120,6 +214,21 @@ TEST(HealthBook, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
   EXPECT_EQ(book.total().nonfinite, 3u);
 }
 
+TEST(HealthBook, ADiscardedTileSaysNothingAndIsFoldedAgain) {
+  HealthBook book, at_once;
+  book.folded(0, 0, {0, 2}, unwell(1, 0));
+  book.folded(1, 0, {0, 2}, unwell(40, 0));
+  book.folded(1, 2, {4, 6}, unwell(41, 5));
+
+  book.discard(1);
+  at_once.folded(0, 0, {0, 2}, unwell(1, 0));
+  EXPECT_EQ(book, at_once);
+
+  book.folded(1, 0, {0, 2}, unwell(42, 0));
+  at_once.folded(1, 0, {0, 2}, unwell(42, 0));
+  EXPECT_EQ(book, at_once);
+}
+
 TEST(HealthBook, RefusesTextCutAnywhereAndOtherText) {
   HealthBook book;
   book.folded(0, 0, {0, 2}, unwell(1, 0));
@@ -128,11 +237,12 @@ TEST(HealthBook, RefusesTextCutAnywhereAndOtherText) {
   const auto lines = [](std::string_view s) { return std::count(s.begin(), s.end(), '\n'); };
   for (std::size_t n = 0; n < text.size(); ++n) {
     const auto part = text.substr(0, n);
-    EXPECT_EQ(HealthBook::load(part).has_value(), part.ends_with('\n') && lines(part) == 1) << part;
+    EXPECT_EQ(HealthBook::load(part).has_value(), part.empty() || (part.ends_with('\n') && lines(part) == 1))
+        << part;
   }
-  for (const char* bad : {"", "x\n", "{}\n{}\n", "{}\n1{}\n", "{}\n-1 {}\n", "{}\n1 []\n"})
+  for (const char* bad : {"x\n", "{}\n", "f 1{}\n", "f -1 {}\n", "t 1 []\n", "g 1 {}\n", "f 1\n"})
     EXPECT_FALSE(HealthBook::load(bad)) << bad;
-  EXPECT_TRUE(HealthBook::load("{}\n"));
+  EXPECT_TRUE(HealthBook::load(""));
 }
 
 TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
@@ -140,8 +250,9 @@ TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
   WaitingPartial first = waiting(0, {0, 2});
   first.health = unwell(1, 0);
   ASSERT_TRUE(assembly.fold(0, 0, first));
-  const auto bytes = save_snapshot(assembly.film(), assembly.errors(), assembly.health(), "f");
-  EXPECT_EQ(load_snapshot(bytes, kGrid, false, "f").value().health(), assembly.health());
+  TempFolder dir;
+  write_to(dir.path() / "film.snap", assembly);
+  EXPECT_EQ(load_snapshot(dir.path() / "film.snap", kGrid, false, "f").value().health(), assembly.health());
   EXPECT_EQ(assembly.health().total(), first.health);
 }
 

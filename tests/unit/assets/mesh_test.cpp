@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <map>
 
+#include "common/assets/obj_corner.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -31,6 +33,25 @@ void expect_sound(const MeshData& m) {
 std::string obj_error(const std::string& text) {
   const auto m = decode_obj("m.obj", bytes_of(text));
   return m ? "" : m.error().message;
+}
+
+// Corners that a file chose to share one place of the table: with a secret that it does not know they do not.
+TEST(Obj, CornersThatShareAPlaceWithoutASecretAreSpreadWithOne) {
+  constexpr std::size_t kPlaces = 10273, kCorners = 500;
+  std::vector<Corner> chosen;
+  for (std::int64_t v = 0; chosen.size() < kCorners; ++v)
+    for (std::int64_t vt = 0; vt < 1000; ++vt)
+      if (CornerHash{}({v, vt, -1}) % kPlaces == 0) chosen.push_back({v, vt, -1});
+
+  for (const std::uint64_t secret : {1ull, 2ull, 0x243f6a8885a308d3ull}) {
+    std::map<std::size_t, std::size_t> places;
+    for (const Corner& c : chosen) ++places[CornerHash{secret}(c) % kPlaces];
+    // Of 500 thrown into 10273 places some two meet; five in one place are a matter of 1e-6.
+    EXPECT_LT(std::max_element(places.begin(), places.end(),
+                               [](const auto& a, const auto& b) { return a.second < b.second; })
+                  ->second,
+              5u);
+  }
 }
 
 TEST(Obj, ReadsAQuadAsTwoTriangles) {

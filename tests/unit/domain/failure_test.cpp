@@ -43,17 +43,40 @@ TEST(Failure, ALoneWorkerGetsASecondAttempt) {
   EXPECT_EQ(rig.job().state, JobState::failed);
 }
 
-TEST(Failure, ASceneAtFaultFailsTheJobAtOnceAndOthersGoOn) {
+TEST(Failure, OneWorkersWordThatTheSceneIsAtFaultFailsNoJob) {
   Rig rig;
   rig.join("a", 1);
-  rig.submit(plan_of("bad", 5, 2));
-  rig.submit(plan_of("good", 5, 2));
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 5, 2));
 
-  rig.fail("a", true);
-  EXPECT_EQ(rig.job("bad").state, JobState::failed);
+  while (!rig.held[{"a"}].empty()) rig.fail("a", true);
+  EXPECT_EQ(rig.job().state, JobState::running);
   rig.render_all();
 
-  EXPECT_EQ(rig.job("good").state, JobState::done);
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Failure, AsManyMustFindTheSceneAtFaultAsFailAnyUnit) {
+  for (const int workers : {1, 2, 3, 4}) {
+    Rig rig;
+    for (int i = 0; i < workers; ++i) rig.join("w" + std::to_string(i), 1);
+    rig.submit(plan_of("bad", 1, 2));
+    std::set<std::string> found;
+    std::vector<Effect> effects;
+    int attempts = 0;
+    for (; rig.job("bad").state == JobState::running && attempts < 10; ++attempts)
+      for (auto& [id, units] : rig.held)
+        if (!units.empty()) {
+          found.insert(id.value);
+          effects = rig.fail(id.value, true);
+          break;
+        }
+
+    EXPECT_EQ(static_cast<int>(found.size()), std::min(workers, 3)) << workers;
+    EXPECT_EQ(attempts, std::max(2, std::min(workers, 3))) << workers;
+    ASSERT_EQ(of<JobFailed>(effects).size(), 1u) << workers;
+    EXPECT_THAT(of<JobFailed>(effects)[0].error, testing::StartsWith("the scene cannot be rendered: tile 0"));
+  }
 }
 
 TEST(Failure, LosingWorkersCostsAUnitNothing) {

@@ -59,11 +59,12 @@ TEST(Job, ASecondEqualResultIsDropped) {
 }
 
 TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
-  Rig rig;
+  Rig rig({.lease_prefix = "t", .audit_rate = 1});
   rig.join("a", 1);
+  rig.join("b", 1);
   rig.submit(plan_of("j", 5, 2));
   const Rig::Held unit = rig.take("a");
-  rig.result("a", unit);
+  rig.result("a", unit);  // which b is asked to render again
 
   const auto effects = rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest_number(666), {"b"}, 0.1});
 
@@ -108,6 +109,25 @@ TEST(Job, PauseStopsLeasesResumeGoesOn) {
   EXPECT_LT(done, 20u);
 
   EXPECT_FALSE(sent<AssignLease>(rig.send(JobResumed{{"j"}})).empty());
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
+  Rig rig;
+  rig.join("w", 2);
+  rig.submit(plan_of("j", 200, 2));
+  for (int i = 0; i < 10; ++i) rig.render("w");
+  ASSERT_GT(rig.worker("w").leases, 1u);
+
+  const auto effects = rig.send(JobPaused{{"j"}});
+
+  EXPECT_FALSE(sent<CancelLease>(effects).empty());
+  EXPECT_EQ(rig.worker("w").leases, 1u);
+  EXPECT_GE(rig.worker("w").units_out, 2u);
+  EXPECT_EQ(rig.held[{"w"}].size(), rig.worker("w").units_out);
+  EXPECT_EQ(rig.farm.audit(), "");
+  rig.send(JobResumed{{"j"}});
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
 }

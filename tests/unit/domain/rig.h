@@ -65,7 +65,9 @@ class Rig {
     UnitKey key() const { return {job, unit.tile, unit.round}; }
   };
 
-  Farm farm{Farm::Options{"t"}};
+  explicit Rig(Farm::Options options = {.lease_prefix = "t"}) : farm(std::move(options)) {}
+
+  Farm farm;
   TimePoint now{};
   std::map<WorkerId, std::deque<Held>> held;
   std::function<double(const UnitKey&)> rel_error = [](const UnitKey&) { return 1.0; };
@@ -93,9 +95,16 @@ class Rig {
   }
   std::vector<Effect> submit(JobPlan plan) { return send(JobSubmitted{std::move(plan)}); }
   std::vector<Effect> join(const std::string& name, int threads, std::uint64_t numeric_class = 1,
-                           std::vector<std::string> tags = {}) {
-    return send(WorkerJoined{
-        {name}, ++epochs_[{name}], name, digest_number(numeric_class), threads, std::move(tags)});
+                           std::vector<std::string> tags = {}, std::uint64_t memory = 0,
+                           std::vector<Digest> blobs = {}) {
+    return send(WorkerJoined{{name},
+                             ++epochs_[{name}],
+                             name,
+                             digest_number(numeric_class),
+                             threads,
+                             std::move(tags),
+                             memory,
+                             std::move(blobs)});
   }
   std::vector<Effect> lose(const std::string& name) {
     held.erase({name});

@@ -319,6 +319,49 @@ TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
   }
 }
 
+// Whichever comes first. With a target that is far away the worker is kept busy until the time is up, and no
+// longer than a job by time alone would keep it.
+TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
+  constexpr double kUnit = 0.05;
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.join("w", 1);
+  rig.cpu_seconds = kUnit;
+  JobPlan plan = uneven_plan(1e-9);
+  plan.time = 20;
+  rig.submit(plan);
+  std::uint64_t units = 0;
+  for (; units < 10000 && !rig.held[{"w"}].empty(); ++units) {
+    rig.now += from_seconds(kUnit);
+    rig.render("w");
+    rig.pass(0s);
+  }
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.job().stopped, StopReason::time);
+  EXPECT_NEAR(seconds(rig.now.time_since_epoch()), 20, 3 * kUnit);
+  EXPECT_EQ(rig.job().units_folded, units) << "nothing was rendered in vain";
+}
+
+TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.join("w", 1);
+  rig.cpu_seconds = .01;
+  JobPlan plan = uneven_plan(.01);
+  plan.time = 1000;
+  rig.submit(plan);
+  for (int i = 0; i < 100000 && !rig.held[{"w"}].empty(); ++i) {
+    rig.now += 10ms;
+    rig.render("w");
+    if (i % 7 == 0) rig.pass(0s);
+  }
+
+  EXPECT_EQ(rig.job().stopped, StopReason::error);
+  EXPECT_EQ(ends_in(rig),
+            stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
+}
+
 TEST(StopByTime, EveryTileGetsItsFirstRound) {
   Rig rig;
   rig.join("w", 1);

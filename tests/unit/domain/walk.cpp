@@ -1,9 +1,28 @@
 #include "tests/unit/domain/walk.h"
 
-#include "common/base/overloaded.h"
-#include "tests/unit/domain/stop_oracle.h"
+#include <array>
 
 namespace ls::coordinator {
+
+// Half of the histories have limits, a third audits, and half of those a liar.
+Walk::Walk(std::uint64_t seed) : random_(seed), farm_(Farm::Options{"r0"}) {
+  const auto some = [&](int most) { return chance(50) ? 0 : 1 + static_cast<std::uint32_t>(pick(static_cast<std::uint64_t>(most))); };
+  if (chance(50)) limits_ = {some(4), some(12), some(4), some(16)};
+  if (chance(33)) audit_rate_ = chance(50) ? 1 : .2;
+  if (audit_rate_ > 0 && chance(50)) liar_ = "w" + std::to_string(1 + pick(3));
+  farm_ = Farm(options());
+}
+
+Farm::Options Walk::options() const {
+  return {.lease_prefix = "r" + std::to_string(restarts_),
+          .limits = limits_,
+          .audit_rate = audit_rate_,
+          .audit_seed = static_cast<std::uint64_t>(restarts_)};
+}
+
+Digest Walk::pixels(const std::string& worker, const UnitKey& unit, const SampleRange& range) {
+  return worker == liar_ && chance(70) ? digest_number(1 + pick(1000)) : honest(unit, range);
+}
 
 std::string Walk::run(int events) {
   for (int i = 0; i < events && wrong_.empty(); ++i) step();
@@ -17,106 +36,6 @@ void Walk::send(const Event& event) {
   check_figures();
 }
 
-void Walk::see(const Effect& effect) {
-  std::visit(
-      overloaded{[&](const Send& e) { see(e); },
-                 [&](const RecordUnit& e) {
-                   auto& accepted = jobs_[e.unit.job].accepted;
-                   const bool once = accepted.try_emplace({e.unit.tile, e.unit.round}, e).second;
-                   if (!once && accepted[{e.unit.tile, e.unit.round}].samples == e.samples) {
-                     // Beyond a stop acceptances are forgotten and may be made again after an extension.
-                     if (!jobs_[e.unit.job].disturbed && !jobs_[e.unit.job].reopened)
-                       blame("a unit was accepted twice");
-                   }
-                   accepted[{e.unit.tile, e.unit.round}] = e;
-                 },
-                 [&](const Fold& e) { see_fold(e); },
-                 [&](const ReopenRound& e) {
-                   StoredJob& job = jobs_[e.job];
-                   for (TileIndex t = 0; t < job.fold_asked.size(); ++t) {
-                     job.fold_asked[t] = std::min(job.fold_asked[t], e.round);
-                     job.folded[t] = std::min(job.folded[t], e.round);
-                     job.accepted.erase({t, e.round});
-                   }
-                   job.done_seen = 0;
-                 },
-                 [&](const JobFinished& e) { see_end(e.job, e.stopped); },
-                 [&](const DigestMismatch&) { blame("a mismatch without a liar"); }, [](const auto&) {}},
-      effect);
-}
-
-void Walk::see(const Send& sent) {
-  FakeWorker& worker = workers_[sent.worker.value];
-  if (!worker.connected) blame("a message to a worker that is gone");
-  std::visit(overloaded{[&](const AssignLease& m) {
-                          if (m.lease.units.empty()) blame("an empty lease");
-                          for (const LeaseUnit& u : m.lease.units)
-                            worker.held.push_back({m.lease.job, m.lease.id, u});
-                        },
-                        [&](const CancelLease& m) {
-                          std::erase_if(worker.held, [&](const auto& h) { return h.lease == m.lease; });
-                        },
-                        [&](const CancelJob& m) {
-                          std::erase_if(worker.held, [&](const auto& h) { return h.job == m.job; });
-                        },
-                        [](const auto&) {}},
-             sent.message);
-}
-
-void Walk::see_fold(const Fold& fold) {
-  StoredJob& job = jobs_[fold.unit.job];
-  RoundIndex& asked = job.fold_asked[fold.unit.tile];
-  const auto it = job.accepted.find({fold.unit.tile, fold.unit.round});
-  if (it == job.accepted.end() || it->second.samples != fold.samples) blame("a fold of what is not accepted");
-  if (fold.unit.round != asked) blame("a fold out of order");
-  ++asked;
-  unfolded_.push_back({fold.unit, fold.samples, error_sum(job, fold.unit.tile, fold.unit.round)});
-}
-
-// The variance per sample is 2^-3 to 2^3, a tile's own, and every round scatters.
-double Walk::error_sum(const StoredJob& job, TileIndex tile, RoundIndex round) {
-  std::mt19937_64 of_tile(job.errors + tile), of_round(job.errors + 1000003 * round + tile);
-  const double variance = std::exp2(static_cast<double>(of_tile() % 7) - 3);
-  const double scatter = .75 + static_cast<double>(of_round() % 512) / 1024;
-  return scatter * variance / static_cast<double>(round_range(round).s1) * 3 *
-         static_cast<double>(job.plan.grid.rect(tile).pixels());
-}
-
-void Walk::see_end(const JobId& id, StopReason reason) {
-  const StoredJob& job = jobs_[id];
-  if (job.folded != job.fold_asked) blame("a job finished before all was folded");
-  if (job.disturbed || reason == StopReason::time || reason == StopReason::user) return;
-  // Where it must end, from its numbers alone.
-  const std::uint64_t spp = farm_.job(id)->spp;
-  const auto target = farm_.plan(id)->target_error;
-  std::vector<RoundIndex> ends(job.folded.size(), round_count(spp));
-  if (target) {
-    const auto error = [&](TileIndex t, RoundIndex k) { return error_sum(job, t, k); };
-    ends = stop_at_once(job.plan.grid, spp, *target, error).ends;
-  }
-  for (TileIndex t = 0; t < ends.size(); ++t) {
-    if (job.folded[t] != ends[t])
-      blame("tile " + std::to_string(t) + " of job " + id.value + " ended after " +
-            std::to_string(job.folded[t]) + " rounds instead of " + std::to_string(ends[t]) + " (" +
-            std::string(to_string(reason)) + ", spp " + std::to_string(spp) + (target ? ", target" : "") +
-            (job.plan.time ? ", time" : "") + ")");
-  }
-}
-
-void Walk::check_figures() {
-  for (auto& [id, job] : jobs_) {
-    const auto figures = farm_.job(id);
-    if (!figures) return blame("a job is gone");
-    if (figures->state == JobState::failed || figures->state == JobState::cancelled) continue;
-    if (figures->units_done < job.done_seen && !job.disturbed && !job.plan.target_error)
-      blame("done regressed");
-    job.done_seen = figures->units_done;
-    if (figures->units_total != figures->units_done + figures->units_leased + figures->units_queued) {
-      blame("planned is not done + leased + queued");
-    }
-  }
-}
-
 void Walk::step() {
   now_ += std::chrono::milliseconds(pick(chance(3) ? 60000 : 300));
   const std::uint64_t what = pick(100);
@@ -126,13 +45,7 @@ void Walk::step() {
   if (what < 45 && !unfolded_.empty()) {
     const UnitFolded folded = unfolded_.front();
     unfolded_.pop_front();
-    StoredJob& job = jobs_[folded.unit.job];
-    if (folded.unit.round == job.folded[folded.unit.tile] &&
-        folded.unit.round < job.fold_asked[folded.unit.tile] &&
-        job.accepted.at({folded.unit.tile, folded.unit.round}).samples == folded.samples) {
-      ++job.folded[folded.unit.tile];
-    }
-    return send(folded);
+    return fold(folded);
   }
   if (what < 70 && !on_the_way_.empty()) {
     const auto it =
@@ -142,6 +55,19 @@ void Walk::step() {
     return send(result);
   }
   worker_acts();
+}
+
+void Walk::fold(const UnitFolded& folded) {
+  StoredJob& job = jobs_[folded.unit.job];
+  const TileIndex tile = folded.unit.tile;
+  if (folded.unit.round == job.folded[tile] && folded.unit.round < job.fold_asked[tile]) {
+    const RecordUnit& result = job.accepted.at({tile, folded.unit.round});
+    if (result.samples == folded.samples) {
+      ++job.folded[tile];
+      job.film[tile].push_back(result.digest);
+    }
+  }
+  send(folded);
 }
 
 void Walk::user_acts() {
@@ -190,6 +116,17 @@ void Walk::submit() {
   if (chance(10)) job.plan.time = 1 + static_cast<double>(pick(20));
   if (chance(10)) job.plan.tags = {"even"};
   job.plan.priority = static_cast<int>(pick(3));
+  job.plan.owner = std::array{"", "ann", "bob"}[pick(3)];
+  if (chance(20)) job.plan.max_workers = 1 + static_cast<std::uint32_t>(pick(3));
+  if (chance(20)) job.plan.max_units = 1 + static_cast<std::uint32_t>(pick(6));
+  if (chance(30)) {  // frames have their sequence's owner and limits
+    job.plan.group = "film";
+    job.plan.owner = "ann";
+    job.plan.max_workers = 2;
+    job.plan.max_units = 5;
+  }
+  if (chance(20)) job.plan.memory_bytes = 8;
+  job.film.resize(job.plan.grid.count());
   job.fold_asked.resize(job.plan.grid.count());
   job.folded.resize(job.plan.grid.count());
   jobs_[id] = job;
@@ -203,7 +140,9 @@ void Walk::join(const std::string& name) {
   worker.numeric_class = name == "w4" ? 2 : 1;
   std::vector<std::string> tags;
   if ((name.back() - '0') % 2 == 0) tags = {"even"};
-  send(WorkerJoined{{name}, ++worker.epoch, name, digest_number(worker.numeric_class), worker.threads, tags});
+  // w0 and w4 do not say what memory they have; w1 has too little for some jobs.
+  const std::uint64_t memory = std::array<std::uint64_t, 5>{0, 4, 16, 16, 0}[static_cast<std::size_t>(name.back() - '0')];
+  send(WorkerJoined{{name}, ++worker.epoch, name, digest_number(worker.numeric_class), worker.threads, tags, memory, {}});
 }
 
 void Walk::worker_acts() {
@@ -246,19 +185,21 @@ void Walk::render(const std::string& name) {
     return send(UnitFailed{{name}, {unit.key(), unit.lease, false, "crashed", 11, {}, {}}});
   on_the_way_.push_back({unit.key(),
                          unit.unit.samples,
-                         honest(unit.key(), unit.unit.samples),
+                         pixels(name, unit.key(), unit.unit.samples),
                          {name},
                          0.001 * static_cast<double>(1 + pick(500))});
 }
 
 // kill -9: what was stored is all that is left. Streams break; workers keep what they hold.
 void Walk::restart() {
-  Farm fresh{Farm::Options{"r" + std::to_string(++restarts_)}};
+  ++restarts_;
+  Farm fresh{options()};
   unfolded_.clear();
   std::vector<Event> restored;
   for (auto& [id, job] : jobs_) {
     const JobFigures f = farm_.job(id).value();
     job.plan = farm_.plan(id).value();
+    if (f.state == JobState::done) ended_before_.insert(id);
     JobRestored event{job.plan, f.state,    f.stopped, f.numeric_class,
                       {},       job.folded, {},        f.first_ray ? 0.5 : 0.0};
     for (const auto& [key, r] : job.accepted)
@@ -270,12 +211,14 @@ void Walk::restart() {
         event.rel_error[k][t] = error_sum(job, t, k);
       }
     }
+    event.audits = farm_.open_audits(id);
     job.fold_asked = job.folded;
     job.done_seen = 0;
     restored.push_back(std::move(event));
   }
   farm_ = std::move(fresh);
   for (auto& [name, worker] : workers_) worker.connected = false;
+  if (found_) farm_.handle(WorkerBarred{{liar_}, "it rendered wrong pixels"}, now_);
   for (const Event& event : restored) {
     for (const Effect& effect : farm_.handle(event, now_)) see(effect);
   }
@@ -307,9 +250,7 @@ void Walk::calm_down() {
     while (!unfolded_.empty() && wrong_.empty()) {
       const UnitFolded folded = unfolded_.front();
       unfolded_.pop_front();
-      StoredJob& job = jobs_[folded.unit.job];
-      if (folded.unit.round == job.folded[folded.unit.tile]) ++job.folded[folded.unit.tile];
-      send(folded);
+      fold(folded);
     }
     if (turn % 50 == 0) send(Tick{});
   }

@@ -1,7 +1,8 @@
 // A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect
-// and bring results late; an assembler that folds later; users who pause, extend, stop and cancel; a
-// coordinator that restarts. After every event the farm audits itself and the walk compares it with its own
-// books.
+// and bring results late; in some histories one that renders wrong pixels; an assembler that folds later; users with
+// limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After every event the
+// farm audits itself and the walk compares it with its own books; at its end a job's film must be what honest
+// workers alone would have made.
 #pragma once
 
 #include <deque>
@@ -16,7 +17,7 @@ namespace ls::coordinator {
 
 class Walk {
  public:
-  explicit Walk(std::uint64_t seed) : random_(seed) {}
+  explicit Walk(std::uint64_t seed);
 
   // A number of random events, then fair weather until every job has ended. What went wrong first; empty:
   // nothing.
@@ -35,6 +36,8 @@ class Walk {
     std::uint64_t errors = 0;  // seed of its tiles' errors
     bool disturbed = false;    // extended or stopped: where it ends is not foreseen here
     bool reopened = false;     // ended, and then given a smaller target
+    bool discarded = false;    // some of it was void
+    std::vector<std::vector<Digest>> film;  // of each tile, round by round
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> fold_asked, folded;
     std::uint64_t done_seen = 0;
@@ -52,6 +55,12 @@ class Walk {
   void see(const Send& sent);
   void see_fold(const Fold& fold);
   void see_end(const JobId& id, StopReason reason);
+  void see_film(const JobId& id);
+  void see_liar(const WorkerDistrusted& found);
+  void see_discard(const TileDiscarded& discarded);
+  void fold(const UnitFolded& folded);
+  Digest pixels(const std::string& worker, const UnitKey& unit, const SampleRange& range);
+  Farm::Options options() const;
   void check_figures();
   void blame(std::string what) {
     if (wrong_.empty()) wrong_ = std::move(what);
@@ -69,8 +78,13 @@ class Walk {
   static double error_sum(const StoredJob& job, TileIndex tile, RoundIndex round);
 
   std::mt19937_64 random_;
-  Farm farm_{Farm::Options{"r0"}};
+  std::string liar_;  // empty: all are honest
+  bool found_ = false;
+  std::set<JobId> ended_before_;  // the liar was found, or a restart: what it had rendered of them stands
+  ShareLimits limits_;
+  double audit_rate_ = 0;
   int restarts_ = 0, submitted_ = 0;
+  Farm farm_;
   TimePoint now_{};
   std::map<std::string, FakeWorker> workers_;
   std::map<JobId, StoredJob> jobs_;

@@ -1,3 +1,5 @@
+#include <cstdlib>
+
 #include "tests/unit/domain/walk.h"
 
 namespace ls::coordinator {
@@ -11,8 +13,14 @@ constexpr std::uint64_t kShort = 60, kLong = 2;
 constexpr std::uint64_t kShort = 2000, kLong = 30;
 #endif
 
+// For a long run: LIGHTSHAFT_WALKS=1000000 bin/domain_test --gtest_filter='RandomWalk.Thousands*'
+std::uint64_t histories() {
+  const char* asked = std::getenv("LIGHTSHAFT_WALKS");
+  return asked ? std::strtoull(asked, nullptr, 10) : kShort;
+}
+
 TEST(RandomWalk, ThousandsOfHistoriesKeepEveryInvariant) {
-  for (std::uint64_t seed = 1; seed <= kShort; ++seed) {
+  for (std::uint64_t seed = 1; seed <= histories(); ++seed) {
     const std::string wrong = Walk(seed).run(150);
     ASSERT_EQ(wrong, "") << "seed " << seed;
   }

@@ -16,14 +16,20 @@ std::int64_t now = 1'000'000;
 
 class AuthTest : public ::testing::Test {
  protected:
-  Auth auth{kToken, [] { return now; }};
+  TokenBook book{kToken, kJoinToken};
+  Auth auth{book, {}, [] { return now; }};
 
-  std::string cookie() {
-    const std::string set = *auth.open_session(kToken);
+  std::string cookie(std::string_view token = kToken) {
+    const std::string set = std::get<std::string>(auth.open_session({}, token));
     return set.substr(0, set.find(';'));
   }
+  static Fields bearer(const std::string& token) { return {{"authorization", "Bearer " + token}}; }
+  std::variant<Caller, Response> identify(Method method, Fields headers) {
+    return auth.identify(request(method, "/api/v1/jobs", std::move(headers)));
+  }
   int status(Method method, Fields headers) {
-    const auto refused = auth.refuse(request(method, "/api/v1/jobs", std::move(headers)));
+    const auto found = identify(method, std::move(headers));
+    const auto* refused = std::get_if<Response>(&found);
     return refused ? refused->status : 200;
   }
 };
@@ -41,16 +47,16 @@ TEST_F(AuthTest, LetsInTheTokenOnly) {
 }
 
 TEST_F(AuthTest, SaysHowToAuthenticate) {
-  const auto refused = auth.refuse(request(Method::get, "/api/v1/jobs"));
+  const auto found = identify(Method::get, {});
 
-  ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->headers.front().first, "WWW-Authenticate");
-  EXPECT_EQ(refused->headers.front().second.substr(0, 6), "Bearer");
+  const auto& refused = std::get<Response>(found);
+  EXPECT_EQ(refused.headers.front().first, "WWW-Authenticate");
+  EXPECT_EQ(refused.headers.front().second.substr(0, 6), "Bearer");
 }
 
 TEST_F(AuthTest, TradesTheTokenForACookieThatScriptsAndOtherSitesCannotUse) {
-  EXPECT_FALSE(auth.open_session("wrong"));
-  const std::string set = *auth.open_session(kToken);
+  EXPECT_EQ(std::get<Response>(auth.open_session({}, "wrong")).status, 401);
+  const std::string set = std::get<std::string>(auth.open_session({}, kToken));
 
   EXPECT_NE(set.find("; HttpOnly"), std::string::npos);
   EXPECT_NE(set.find("; SameSite=Strict"), std::string::npos);
@@ -78,9 +84,11 @@ TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
 TEST_F(AuthTest, SurvivesARestartOfTheCoordinator) {
   const std::string before = cookie();
 
-  Auth restarted(kToken, [] { return now; });
+  const TokenBook same(kToken, "another join token");
+  Auth restarted(same, {}, [] { return now; });
 
-  EXPECT_FALSE(restarted.refuse(request(Method::get, "/api/v1/jobs", {{"cookie", before}})));
+  EXPECT_TRUE(std::holds_alternative<Caller>(
+      restarted.identify(request(Method::get, "/api/v1/jobs", {{"cookie", before}}))));
 }
 
 TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
@@ -97,6 +105,85 @@ TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
   EXPECT_EQ(status(Method::put,
                    {{"cookie", session}, {"origin", "http://farm:8080"}, {"sec-fetch-site", "cross-site"}}),
             403);
+}
+
+TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
+  const auto made = book.add(Role::submit, "anna");
+  ASSERT_TRUE(made);
+  const std::string session = cookie(made->token);
+
+  const auto found = identify(Method::get, {{"cookie", session}});
+  ASSERT_TRUE(std::holds_alternative<Caller>(found));
+  EXPECT_EQ(std::get<Caller>(found).role, Role::submit);
+  EXPECT_EQ(std::get<Caller>(found).user, "anna");
+  // The id inside is under the mac: it can't be made that of another token.
+  std::string other = session;
+  const std::string admin_id = book.list().front().id;
+  other.replace(other.find(made->info.id), admin_id.size(), admin_id);
+  EXPECT_EQ(status(Method::get, {{"cookie", other}}), 401);
+
+  ASSERT_TRUE(book.revoke(made->info.id));
+  EXPECT_EQ(status(Method::get, {{"cookie", session}}), 401);
+  EXPECT_EQ(status(Method::get, bearer(made->token)), 401);
+}
+
+TEST_F(AuthTest, AJoinTokenOpensNothing) {
+  EXPECT_EQ(status(Method::get, bearer(kJoinToken)), 403);
+  EXPECT_EQ(std::get<Response>(auth.open_session({}, kJoinToken)).status, 403);
+  EXPECT_TRUE(book.may_join(kJoinToken));
+  EXPECT_FALSE(book.may_join(kToken));
+  EXPECT_FALSE(book.may_join(""));
+}
+
+TEST_F(AuthTest, OverTlsTheCookieIsForTlsAlone) {
+  Auth over_tls(book, {.secure = true}, [] { return now; });
+  EXPECT_NE(std::get<std::string>(over_tls.open_session({}, kToken)).find("; Secure"), std::string::npos);
+  EXPECT_EQ(std::get<std::string>(auth.open_session({}, kToken)).find("; Secure"), std::string::npos);
+}
+
+TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
+  Auth strict(book, {.failures = {.per_second = .5, .burst = 3}}, [] { return now; });
+  const auto ask = [&](const std::string& token, const std::string& from) {
+    Request r = request(Method::get, "/api/v1/jobs", bearer(token));
+    r.peer = from;
+    const auto found = strict.identify(r);
+    const auto* refused = std::get_if<Response>(&found);
+    return refused ? refused->status : 200;
+  };
+  const std::string read = book.add(Role::read, "").value().token;
+  EXPECT_EQ(ask(kToken, "10.0.0.1"), 200);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(ask("wrong", "10.0.0.1"), 401) << i;
+
+  EXPECT_EQ(ask("wrong", "10.0.0.1"), 429);
+  EXPECT_EQ(ask(read, "10.0.0.1"), 429);  // a right guess does not show
+  EXPECT_EQ(ask(kToken, "10.0.0.1"), 200);
+  EXPECT_EQ(ask("wrong", "10.0.0.2"), 401);
+  now += 2;
+  EXPECT_EQ(ask(read, "10.0.0.1"), 200);
+}
+
+TEST_F(AuthTest, ATokenHasItsOwnShareOfRequests) {
+  Auth strict(book, {.requests = {.per_second = 2, .burst = 4}}, [] { return now; });
+  const Request r = request(Method::get, "/api/v1/jobs");
+  const Caller anna{Role::submit, "anna", "a"}, bert{Role::submit, "bert", "b"};
+  for (int i = 0; i < 4; ++i) EXPECT_FALSE(strict.too_often(r, &anna)) << i;
+
+  const auto refused = strict.too_often(r, &anna);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->status, 429);
+  EXPECT_EQ(refused->headers.back(), (std::pair<std::string, std::string>{"Retry-After", "1"}));
+  EXPECT_FALSE(strict.too_often(r, &bert));
+  EXPECT_FALSE(strict.too_often(r, nullptr));
+  now += 1;
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(strict.too_often(r, &anna)) << i;
+  EXPECT_TRUE(strict.too_often(r, &anna));
+}
+
+TEST(Throttle, TakesAnIpv6NetworkForOnePerson) {
+  EXPECT_EQ(Throttle::group_of("2001:db8:1:2:3:4:5:6"), Throttle::group_of("2001:db8:1:2:9:9:9:9"));
+  EXPECT_NE(Throttle::group_of("2001:db8:1:2:3:4:5:6"), Throttle::group_of("2001:db8:1:3:3:4:5:6"));
+  EXPECT_EQ(Throttle::group_of("10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(Throttle::group_of("::ffff:10.0.0.1"), "::ffff:10.0.0.1");
 }
 
 TEST(TokenFile, IsMadeOnceAndReadableByItsOwnerOnly) {

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/service.h"
@@ -19,7 +20,9 @@ using namespace ls::coordinator;
 
 class FakeBlobs final : public BlobStore {
  public:
+  std::function<void()> before_look;  // at a blob
   bool has(const Digest& digest) const override {
+    if (before_look) before_look();
     const std::lock_guard lock(mutex_);
     return blobs_.count(digest) > 0;
   }
@@ -47,6 +50,16 @@ class FakeBlobs final : public BlobStore {
     return std::make_unique<FakeUpload>(*this, digest);
   }
 
+  std::uint64_t received(const Digest& digest) const override {
+    const std::lock_guard lock(mutex_);
+    const auto found = parts_.find(digest);
+    return found == parts_.end() ? 0 : found->second.size();
+  }
+  Result<std::unique_ptr<Upload>> resume_upload(const Digest& digest, std::uint64_t offset) override {
+    if (offset != received(digest)) return fail(Errc::failed_precondition, "go on where the bytes end");
+    return std::make_unique<FakePart>(*this, digest);
+  }
+
   Digest add(std::string_view text) {
     const Digest digest = sha256(text);
     EXPECT_TRUE(put(digest, std::as_bytes(std::span(text))));
@@ -55,6 +68,18 @@ class FakeBlobs final : public BlobStore {
   std::atomic<int> open_uploads{0};
 
  private:
+  struct FakePart final : Upload {
+    FakePart(FakeBlobs& o, const Digest& d) : owner(o), digest(d) {}
+    Result<void> append(std::span<const std::byte> more) override {
+      const std::lock_guard lock(owner.mutex_);
+      auto& part = owner.parts_[digest];
+      part.insert(part.end(), more.begin(), more.end());
+      return {};
+    }
+    Result<void> finish() override { return owner.put(digest, std::exchange(owner.parts_[digest], {})); }
+    FakeBlobs& owner;
+    Digest digest;
+  };
   struct FakeUpload final : Upload {
     FakeUpload(FakeBlobs& o, const Digest& d) : owner(o), digest(d) { ++owner.open_uploads; }
     ~FakeUpload() override { --owner.open_uploads; }
@@ -69,7 +94,7 @@ class FakeBlobs final : public BlobStore {
   };
 
   mutable std::mutex mutex_;
-  std::map<Digest, std::vector<std::byte>> blobs_;
+  std::map<Digest, std::vector<std::byte>> blobs_, parts_;
 };
 
 class FakeCoordinator final : public Coordinator {
@@ -86,6 +111,7 @@ class FakeCoordinator final : public Coordinator {
     JobView job;
     job.id = JobId{"j-" + std::to_string(jobs_.size() + 1)};
     job.name = request.scene_name;
+    job.owner = request.owner;
     job.spp = request.spec.spp.value_or(16);
     job.priority = request.spec.priority;
     job.warnings = {"'strict_normals' means nothing here"};
@@ -182,12 +208,28 @@ class FakeCoordinator final : public Coordinator {
     kept_.push_back(std::move(event));
     if (kept_.size() > 100) kept_.erase(kept_.begin());
   }
+  // As if that many events had gone by unseen.
+  void miss_events(std::uint64_t count) {
+    const std::lock_guard lock(mutex_);
+    last_event_ += count;
+  }
   std::size_t readers() const {
     const std::lock_guard lock(mutex_);
     return readers_.size();
   }
 
   BlobStore& blobs() override { return store; }
+  Result<std::optional<Elsewhere>> elsewhere(const JobId& id) override {
+    if (before_asking_others) before_asking_others();
+    const auto found = others.find(id.value);
+    return found == others.end() ? std::nullopt : std::optional(found->second);
+  }
+  std::map<std::string, Elsewhere> others;  // jobs that other coordinators have
+  std::function<void()> before_asking_others;
+  std::filesystem::path final_file(const JobId&, const std::string& name) const override {
+    return files.empty() ? files : files / name;
+  }
+  std::filesystem::path files;  // of jobs that are done
   bool ready(std::string* why_not) const override {
     if (!is_ready) *why_not = "the store is being read";
     return is_ready;
@@ -219,7 +261,7 @@ class FakeCoordinator final : public Coordinator {
     return text;
   }
 
-  mutable std::mutex mutex_;
+  mutable std::recursive_mutex mutex_;  // who is told of an event may ask what there is
   std::map<JobId, JobView> jobs_;
   std::vector<StreamEvent> kept_;
   std::map<int, std::function<void(const StreamEvent&)>> readers_;

@@ -13,6 +13,8 @@ namespace ls::http::testing {
 
 inline constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 
+inline constexpr const char* kJoinToken = "join-join-join-join-join";
+
 inline constexpr char kPage[] = "<!doctype html><title>dashboard</title>";
 inline const StaticFile kPages[] = {{"index.html", std::as_bytes(std::span(kPage, sizeof kPage - 1))},
                                     {"js/main.js", std::as_bytes(std::span(kPage, 9))}};
@@ -42,7 +44,10 @@ class ApiTest : public ::testing::Test {
     if (auto* response = std::get_if<Response>(&admitted)) return *response;
     auto& match = std::get<Match>(admitted);
     const BodyKind kind = api.body_kind(*match.route, r);
-    if (kind != BodyKind::blob && kind != BodyKind::archive) return api.handle(match, r);
+    if (kind != BodyKind::blob && kind != BodyKind::archive) {
+      Response answer = api.handle(match, r);
+      return api.may_be_elsewhere(match, answer) ? api.ask_elsewhere(match, r, std::move(answer)) : answer;
+    }
     auto opened = api.open_upload(match, r);
     if (auto* response = std::get_if<Response>(&opened)) return *response;
     auto& sink = std::get<std::unique_ptr<BodySink>>(opened);
@@ -73,7 +78,8 @@ class ApiTest : public ::testing::Test {
 
   FakeCoordinator coordinator;
   Limits limits{.blob_bytes = 1000};
-  Api api{coordinator, kToken, limits, StaticFiles(kPages)};
+  TokenBook tokens{kToken, kJoinToken};
+  Api api{coordinator, tokens, limits, StaticFiles(kPages)};
 };
 
 }  // namespace ls::http::testing

@@ -45,6 +45,11 @@ class RawClient {
       if (!read_some()) return false;
     return true;
   }
+  // Whether something to read comes; nothing is read.
+  bool readable() {
+    pollfd p{fd_, POLLIN, 0};
+    return ::poll(&p, 1, 20'000) == 1;
+  }
   std::string read_all() {
     while (read_some()) {
     }

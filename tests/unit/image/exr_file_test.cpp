@@ -255,6 +255,61 @@ TEST(ExrWrite, WritesHalfFloatAndIntegerChannels) {
   EXPECT_EQ(*exr, *write_exr(picture));
 }
 
+class Memory final : public ByteSink {
+ public:
+  Result<void> write(std::uint64_t at, std::span<const std::byte> more) override {
+    if (at + more.size() > most) return fail(Errc::resource_exhausted, "the disk is full");
+    bytes.resize(std::max<std::size_t>(bytes.size(), at + more.size()));
+    std::copy(more.begin(), more.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    return {};
+  }
+  std::size_t most = std::size_t{1} << 30;
+  std::vector<std::byte> bytes;
+};
+
+// 50 rows in bands of 13: neither is a multiple of the 16 rows that are compressed together.
+ExrPicture rows_of(int y0, int rows) {
+  ExrPicture picture{{7, rows}, {}, {}};
+  std::vector<float> half, full;
+  std::vector<std::uint32_t> count;
+  for (int i = 7 * y0; i < 7 * (y0 + rows); ++i) {
+    half.push_back(static_cast<float>(i)), full.push_back(1 / (1 + static_cast<float>(i)));
+    count.push_back(static_cast<std::uint32_t>(3 * i));
+  }
+  picture.channels = {{"R", ExrHalf{half}}, {"stderr.R", ExrFloat{full}}, {"spp", ExrUint{count}}};
+  return picture;
+}
+
+TEST(ExrWrite, APictureInBandsIsTheFileOfTheWholePicture) {
+  ExrPicture whole = rows_of(0, 50);
+  whole.strings = {{"lightshaft:test", "hello"}};
+  Memory sink;
+
+  const auto written =
+      write_exr({{7, 50}, whole.strings, [](int band) { return rows_of(13 * band, std::min(13, 50 - 13 * band)); }}, sink);
+
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_EQ(sink.bytes, write_exr(whole).value());
+}
+
+TEST(ExrWrite, TellsWhyABandCouldNotBeWrittenWhereverThatWas) {
+  const auto length = write_exr(rows_of(0, 50)).value().size();
+  for (std::size_t most = 0; most < length; most += 97) {
+    Memory sink;
+    sink.most = most;
+    const auto written = write_exr({{7, 50}, {}, [](int band) { return rows_of(25 * band, 25); }}, sink);
+    ASSERT_FALSE(written) << most;
+    EXPECT_EQ(written.error().code, Errc::resource_exhausted);
+    EXPECT_EQ(written.error().message, "the disk is full");
+  }
+}
+
+TEST(ExrWrite, RefusesBandsThatAreNotThoseOfThePicture) {
+  Memory sink;
+  EXPECT_FALSE(write_exr({{7, 40}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too many rows";
+  EXPECT_FALSE(write_exr({{8, 50}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too narrow";
+}
+
 TEST(ExrWrite, RefusesPlanesOfTheWrongSize) {
   ExrPicture picture{{4, 4}, {{"R", ExrFloat{std::vector<float>(15)}}}, {}};
   EXPECT_THAT(write_exr(picture).error().message, HasSubstr("channel R"));

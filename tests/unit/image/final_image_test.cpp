@@ -59,7 +59,10 @@ TEST(PixelsDigest, MakesNoDifferenceBetweenZeros) {
 }
 
 Provenance some_provenance() {
-  return {test::name_of("scene"), R"({"seed":7})", "build 1", test::name_of("class"), 7, 12.3456};
+  Provenance from{test::name_of("scene"), R"({"seed":7})", "build 1", test::name_of("class"), 7, 12.3456};
+  from.core_seconds = 98.7654;
+  from.stopped = "time; so and so";
+  return from;
 }
 
 TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
@@ -79,6 +82,10 @@ TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
         "lightshaft:rmse", "lightshaft:few_hits", "lightshaft:seconds", "lightshaft:tiles"})
     EXPECT_THAT(text, HasSubstr(name));
   EXPECT_THAT(text, HasSubstr(R"({"seed":7})"));
+  const auto header = read_final_exr(image->exr, "final")->strings;
+  EXPECT_EQ(header.at("lightshaft:core_seconds"), "98.765");
+  EXPECT_EQ(header.at("lightshaft:stopped"), "time; so and so");
+  EXPECT_EQ(header.at("lightshaft:verdict"), "trusted");
   for (TileIndex t = 0; t < kGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
 }
 

@@ -77,7 +77,7 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
   const auto spec =
       parse_job_spec(R"({"spp": 128, "target_error": 0.001, "time": 60, "seed": 7, "size": [320, 200],
     "integrator": "volpath", "aov": ["depth"], "defines": {"density": "2.5", "n": 3, "on": true}, "priority": -2, "float": true,
-    "tags": ["gpu", "big-memory"]})");
+    "tags": ["gpu", "big-memory"], "max_workers": 4, "max_units": 100, "memory": 8589934592})");
 
   ASSERT_TRUE(spec) << spec.error().message;
   EXPECT_EQ(*spec, (JobSpec{.spp = 128,
@@ -90,7 +90,10 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
                             .defines = {{"density", "2.5"}, {"n", "3"}, {"on", "true"}},
                             .priority = -2,
                             .float_output = true,
-                            .tags = {"gpu", "big-memory"}}));
+                            .tags = {"gpu", "big-memory"},
+                            .max_workers = 4,
+                            .max_units = 100,
+                            .memory = 8589934592}));
   EXPECT_EQ(parse_job_spec(canonical_json(*spec)).value(), *spec);
 }
 
@@ -130,6 +133,9 @@ TEST(JobSpec, NamesTheKeyThatIsWrong) {
   EXPECT_THAT(spec_error(R"({"priority": 18446744073709551615})"), HasSubstr("'priority'"));
   EXPECT_THAT(spec_error(R"({"float": 1})"), HasSubstr("'float'"));
   EXPECT_THAT(spec_error(R"({"tags": [1]})"), HasSubstr("'tags'"));
+  EXPECT_THAT(spec_error(R"({"max_workers": 0})"), HasSubstr("'max_workers' must be a whole number from 1 to"));
+  EXPECT_THAT(spec_error(R"({"max_units": 1000001})"), HasSubstr("'max_units'"));
+  EXPECT_THAT(spec_error(R"({"memory": "8G"})"), HasSubstr("'memory'"));
 }
 
 TEST(JobSpec, RefusesWhatIsNotOneObject) {

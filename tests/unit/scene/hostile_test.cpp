@@ -6,6 +6,7 @@
 
 #include "common/scene/limits.h"
 #include "common/scene/source_text.h"
+#include "tests/unit/scene/nori_testing.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -128,6 +129,16 @@ TEST(HostileScenes, ALongRunAfterADollarIsNotTriedPrefixByPrefix) {
   const std::string run(65'000, 'a');
   for (int i = 0; i < 450; ++i) text += "<bsdf type=\"null\" id=\"$" + run + "\"/>";
   EXPECT_THAT(first(read(with_sensor(text))), HasSubstr("is given twice"));
+}
+
+// Each compared with all before it, these would take half an hour.
+TEST(HostileScenes, ANoriObjectOfCountlessElementsIsRefusedBeforeAnyIsLookedAt) {
+  std::string text = "<mesh type=\"sphere\">";
+  for (int i = 0; i < 400'000; ++i) text += fmt::format("<float name=\"a{}\" value=\"1\"/>", i);
+  const auto r = read(nori_scene(text + "</mesh>"));
+  EXPECT_FALSE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), 1u);  // of none of the elements
+  EXPECT_THAT(first(r), HasSubstr("mesh \"sphere\" has 400000 elements in it; 4096 are allowed"));
 }
 
 TEST(HostileScenes, NamesOfParametersAreBounded) {

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "common/image/final_image.h"
+#include "coordinator/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -62,6 +63,10 @@ TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->spp.front(), spp.front());
   EXPECT_EQ(picture->spp.back(), spp.back());
+  const auto& header = picture->strings;
+  EXPECT_TRUE(header.at("lightshaft:stopped").starts_with("error; stopped at a target error"));
+  EXPECT_GT(std::stod(header.at("lightshaft:core_seconds")), 0);
+  EXPECT_EQ(header.at("lightshaft:verdict"), "trusted");
   const auto j = report(*coordinator, job);
   EXPECT_EQ(j["stopped"], "error");
   EXPECT_TRUE(j["adaptive"].get<bool>());
@@ -72,6 +77,26 @@ TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   for (std::size_t i = 1; i < curve.size(); ++i) EXPECT_GT(curve[i]["spp"], curve[i - 1]["spp"]);
   EXPECT_EQ(curve.back()["spp"], j["spp"]);
   EXPECT_EQ(curve.back()["relmse"], j["relmse"]) << "the last checkpoint is the image";
+}
+
+TEST(Adaptive, EachTileSaysItsOwnErrorAndTheirMeanIsTheImages) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator, spec_with(kTarget));
+  const auto untouched = nlohmann::json::parse(tiles_json(*coordinator->tiles(job)))["tiles"];
+  EXPECT_TRUE(untouched[0]["relmse"].is_null());
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job));
+
+  double sum = 0, pixels = 0;
+  const std::vector<TileView> all = coordinator->tiles(job).value();
+  for (const TileView& t : all) {
+    ASSERT_TRUE(t.relmse);
+    sum += *t.relmse * t.rect.pixels();
+    pixels += t.rect.pixels();
+  }
+  EXPECT_NEAR(sum / pixels / report(*coordinator, job)["relmse"].get<double>(), 1, 1e-9);
+  const auto tiles = nlohmann::json::parse(tiles_json(*coordinator->tiles(job)))["tiles"];
+  EXPECT_EQ(tiles[0]["relmse"], *coordinator->tiles(job)->front().relmse);
 }
 
 TEST(Adaptive, ShuffledDuplicatedAndLostResultsGiveTheSamePixels) {

@@ -44,6 +44,10 @@ class Mailbox {
     mail_.pop_front();
     return first;
   }
+  void wait_a_moment() {
+    std::unique_lock lock(mutex_);
+    arrived_.wait_for(lock, std::chrono::milliseconds(2));
+  }
   bool empty() {
     const std::lock_guard lock(mutex_);
     return mail_.empty();
@@ -85,6 +89,8 @@ class FakeFarm {
   std::function<std::vector<UnitResult>(UnitResult)> tamper = [](UnitResult r) {
     return std::vector{std::move(r)};
   };
+  // Whose pixels are wrong.
+  std::function<bool(int worker, const UnitResult&)> lies = [](int, const UnitResult&) { return false; };
   std::function<void(std::vector<LeaseUnit>&)> reorder = [](auto&) {};
   int results_sent = 0;
   int stop_after = -1;  // results; then run() returns false
@@ -99,26 +105,33 @@ class FakeFarm {
         ADD_FAILURE() << "the farm stands still";
         return false;
       }
-      if (const auto* ack = std::get_if<ResultAck>(&letter->second); ack && ack->refused)
-        refusals.push_back(*ack);
+      note_refusal(letter->second);
       const auto* assign = std::get_if<AssignLease>(&letter->second);
       if (assign && !render(letter->first, *assign)) return false;
     }
     return true;
   }
   bool finish(const JobId& job) {
-    return run([&] {
+    const bool finished = run([&] {
       const auto state = coordinator_.job(job)->state;
       if (state == JobState::failed || state == JobState::cancelled || state == JobState::done) return true;
-      // Everything is rendered: only the final image is missing.
-      if (coordinator_.job(job)->units_done == coordinator_.job(job)->units_total && mail_->empty()) {
-        EXPECT_TRUE(coordinator_.wait(job));
-      }
+      // Everything is rendered: only the final image is missing, or an audit is still to come.
+      const auto all_done = [&] {
+        const auto view = coordinator_.job(job);
+        return view->state == JobState::running && view->units_done == view->units_total && mail_->empty();
+      };
+      while (all_done()) mail_->wait_a_moment();
       return coordinator_.job(job)->state == JobState::done;
     });
+    // A job can be done before the letters of its last units are read; a refusal may be among them.
+    while (!mail_->empty()) note_refusal(mail_->take()->second);
+    return finished;
   }
   std::vector<std::unique_ptr<WorkerSession>>& sessions() { return sessions_; }
 
+  void brief(const AssignLease& assign) {
+    if (assign.brief) briefs_[assign.lease.job] = *assign.brief;
+  }
   UnitResult render_unit(const Lease& lease, const LeaseUnit& unit) {
     const JobBrief& brief = briefs_.at(lease.job);
     const Partial partial =
@@ -133,12 +146,24 @@ class FakeFarm {
   }
 
  private:
+  void note_refusal(const ToWorker& message) {
+    if (const auto* ack = std::get_if<ResultAck>(&message); ack && ack->refused) refusals.push_back(*ack);
+  }
+  void falsify(UnitResult& result, const LeaseUnit& unit) {
+    const JobBrief& brief = briefs_.at(result.unit.job);
+    Partial partial =
+        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
+    partial.sums[0] += 1;
+    result.exr = encode_partial(partial, brief.settings.size).value();
+    result.digest = unit_digest(partial);
+  }
   bool render(int worker, const AssignLease& assign) {
     if (assign.brief) briefs_[assign.lease.job] = *assign.brief;
     auto units = assign.lease.units;
     reorder(units);
     for (const LeaseUnit& unit : units)
       for (UnitResult& result : tamper(render_unit(assign.lease, unit))) {
+        if (lies(worker, result)) falsify(result, unit);
         if (results_sent == stop_after) return false;
         ++results_sent;
         sessions_[static_cast<std::size_t>(worker)]->receive(std::move(result));

@@ -39,6 +39,23 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
   EXPECT_TRUE(view.error_now.has_value());
 }
 
+// Rounds of 2, 2, 4 and 8 samples: half of a tile's units are a quarter of its work.
+TEST(Service, ProgressIsThatOfSamplesNotOfUnits) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  bool seen = false;
+
+  ASSERT_TRUE(farm.run([&] {
+    const JobView view = coordinator->job(job).value();
+    EXPECT_DOUBLE_EQ(view.progress, view.spp_done / 16);
+    seen |= view.progress > 0 && view.progress < 1;
+    return view.units_done == view.units_total;
+  }));
+
+  EXPECT_TRUE(seen);
+}
+
 TEST(Service, ShuffledAndDuplicatedResultsGiveTheSamePixels) {
   TempFolder dir;
   const std::string expected = reference_pixels();

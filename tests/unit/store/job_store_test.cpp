@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "coordinator/limits.h"
 #include "tests/unit/store/sample_job.h"
 #include "tests/unit/store/temp_folder.h"
@@ -14,9 +16,45 @@ TEST(StoredJob, IsTheSameAfterJson) {
   EXPECT_EQ(parse_stored_job(to_json(job)).value(), job);
 }
 
+TEST(StoredJob, OfAVersionBeforeThereWereUsersHasNoOwner) {
+  auto job = sample_job("j-1");
+  std::string text = to_json(job);
+  const std::string field = R"("owner":"anna",)";
+  ASSERT_NE(text.find(field), std::string::npos);
+  text.erase(text.find(field), field.size());
+
+  const auto read = parse_stored_job(text);
+
+  ASSERT_TRUE(read) << read.error().message;
+  job.owner.clear();
+  EXPECT_EQ(*read, job);
+}
+
 TEST(StoredJob, RefusesDamagedJson) {
   EXPECT_FALSE(parse_stored_job("{"));
   EXPECT_FALSE(parse_stored_job("{}"));
+}
+
+TEST(StoredJob, WithASumThatIsInfiniteCanBeReadAgain) {
+  StoredJob job = sample_job("j-1");
+  job.totals.core_seconds = job.totals.time.load = std::numeric_limits<double>::infinity();
+
+  const auto read = parse_stored_job(to_json(job));
+
+  ASSERT_TRUE(read) << read.error().message;
+  job.totals.core_seconds = job.totals.time.load = 0;
+  EXPECT_EQ(*read, job);
+}
+
+TEST(StoredJob, OfAVersionThatWroteSuchASumAsNullIsRead) {
+  std::string text = to_json(sample_job("j-1"));
+  const std::size_t at = text.find("\"core_seconds\":") + 15;
+  text.replace(at, text.find(',', at) - at, "null");
+
+  const auto read = parse_stored_job(text);
+
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->totals.core_seconds, 0);
 }
 
 class JobStores : public testing::TestWithParam<bool> {
@@ -69,6 +107,16 @@ TEST_P(JobStores, KeepsPointsAndLogsByJob) {
   EXPECT_TRUE(store->log({"b"}).value().empty());
 }
 
+TEST_P(JobStores, KeepsBarredWorkersForGoodWithTheFirstEvidence) {
+  const auto store = open();
+  ASSERT_TRUE(store->bar({{"w-2"}, "it rendered tile 3 otherwise"}));
+  ASSERT_TRUE(store->bar({{"w-1"}, "and this one tile 4"}));
+  ASSERT_TRUE(store->bar({{"w-2"}, "again"}));
+
+  EXPECT_EQ(store->barred().value(), (std::vector<BarredWorker>{{{"w-1"}, "and this one tile 4"},
+                                                                {{"w-2"}, "it rendered tile 3 otherwise"}}));
+}
+
 TEST_P(JobStores, CountsUpAndNeverGivesANumberTwice) {
   const auto store = open();
   EXPECT_EQ(store->reserve("events", 100).value(), 0u);
@@ -84,8 +132,10 @@ TEST(SqliteJobStore, RemembersOverReopening) {
     const auto store = open_sqlite_job_store(file).value();
     ASSERT_TRUE(store->put_job(sample_job("j-1")));
     ASSERT_TRUE(store->reserve("events", 7));
+    ASSERT_TRUE(store->bar({{"w-2"}, "evidence"}));
   }
   const auto store = open_sqlite_job_store(file).value();
+  EXPECT_EQ(store->barred().value().size(), 1u);
   EXPECT_EQ(store->jobs().value(), std::vector{sample_job("j-1")});
   EXPECT_EQ(store->reserve("events", 1).value(), 7u);
 }

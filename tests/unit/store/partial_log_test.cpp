@@ -179,5 +179,45 @@ TEST(PartialLog, BeginsANewSegmentWhenOneIsFull) {
   EXPECT_EQ(log->read(log->found().back().place).value(), payload(count - 1, big));
 }
 
+TEST(PartialLog, AFullSegmentIsReadFromItsIndexAndWithoutOneFromItself) {
+  TempFolder dir;
+  const std::size_t big = std::size_t{900} << 10;
+  const auto count = static_cast<std::uint32_t>(limits::kMaxSegmentBytes / big + 3);
+  {
+    auto log = PartialLog::open(dir.path()).value();
+    for (std::uint32_t i = 0; i < count / 2; ++i) ASSERT_TRUE(log->append(record(i), payload(i, big)));
+  }
+  {  // the second half by a later start
+    auto log = PartialLog::open(dir.path()).value();
+    for (std::uint32_t i = count / 2; i < count; ++i) ASSERT_TRUE(log->append(record(i), payload(i, big)));
+  }
+  const auto found = [&] {
+    const auto log = PartialLog::open(dir.path()).value();
+    std::vector<PartialRecord> records;
+    for (const auto& entry : log->found()) {
+      records.push_back(entry.record);
+      EXPECT_EQ(log->read(entry.place).value().size(), big);
+    }
+    return records;
+  };
+  const auto all = found();
+  ASSERT_EQ(all.size(), count);
+  const auto index = dir.path() / "partials-000.idx";
+  ASSERT_TRUE(std::filesystem::exists(index));
+  EXPECT_FALSE(std::filesystem::exists(dir.path() / "partials-001.idx"));
+
+  // The first header of the segment is no longer needed...
+  const auto scribble = [](const std::filesystem::path& path, std::streamoff at) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(at);
+    file.put('!');
+  };
+  scribble(dir.path() / "partials-000.seg", 20);
+  EXPECT_EQ(found(), all);
+  // ...until the index is damaged, too: then what is behind it is left out.
+  scribble(index, 20);
+  EXPECT_EQ(found().size(), 3u);
+}
+
 }  // namespace
 }  // namespace ls::coordinator

@@ -11,6 +11,7 @@ inline StoredJob sample_job(std::string id) {
   StoredJob job;
   job.id.value = std::move(id);
   job.name = "steam.xml";
+  job.owner = "anna";
   job.submitted_unix = 1.7e9 + .25;
   job.scene = sha256("scene");
   job.settings.size = {64, 32};

@@ -1,0 +1,28 @@
+// A corner of a face of an OBJ file, and its place in a table.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ls {
+
+// As written, from 0; -1: none.
+struct Corner {
+  std::int64_t v = -1, vt = -1, vn = -1;
+  bool operator==(const Corner&) const = default;
+};
+
+// Which corners there are is the file's choice: with a secret, it cannot choose such as share a place. What a
+// mesh becomes does not depend on it: vertices are numbered as they appear.
+struct CornerHash {
+  std::uint64_t secret = 0;
+
+  std::size_t operator()(const Corner& c) const {
+    std::uint64_t h = (static_cast<std::uint64_t>(c.v) ^ secret) * 0x9e3779b97f4a7c15u;
+    h = (h ^ (h >> 29) ^ static_cast<std::uint64_t>(c.vt)) * 0xbf58476d1ce4e5b9u + secret;
+    h = (h ^ (h >> 32) ^ static_cast<std::uint64_t>(c.vn)) * 0x94d049bb133111ebu;
+    return h ^ (h >> 31);
+  }
+};
+
+}  // namespace ls

@@ -1,0 +1,157 @@
+#include "coordinator/options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+namespace ls::coordinator {
+namespace {
+
+constexpr int kUsage = 2;
+
+// How the HTTP door treats slow and greedy clients: for the config file, where an operator may need it and
+// tests do.
+void add_limits(CLI::App& app, http::Limits& limits) {
+  const auto hidden = [&app](const char* name, auto& value, double least) {
+    app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
+  };
+  hidden("--http-header-seconds", limits.header_seconds, 0.01);
+  hidden("--http-idle-seconds", limits.idle_seconds, 0.01);
+  hidden("--http-body-grace-seconds", limits.body_grace_seconds, 0.01);
+  hidden("--http-min-rate", limits.min_rate, 1);
+  hidden("--http-heartbeat-seconds", limits.heartbeat_seconds, 0.01);
+  hidden("--http-linger-seconds", limits.linger_seconds, 0);
+  hidden("--http-stop-seconds", limits.stop_seconds, 0);
+  hidden("--http-requests-per-second", limits.requests_per_second, 0);
+  hidden("--http-wrong-tokens-per-minute", limits.wrong_tokens_per_minute, 0);
+  hidden("--http-connections", limits.connections, 1);
+  hidden("--http-event-streams", limits.event_streams, 1);
+  hidden("--http-event-queue", limits.event_queue, 1);
+  hidden("--http-blob-bytes", limits.blob_bytes, 1);
+  hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
+}
+
+// What is lent at once (docs/scheduling.md).
+void add_shares(CLI::App& app, Flags& flags) {
+  const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
+    app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
+  };
+  limit("--workers-per-job", flags.shares.workers_per_job,
+        "at most so many workers on one job; 0: any number");
+  limit("--units-per-job", flags.shares.units_per_job,
+        "at most so many units of one job lent at once; 0: any number");
+  limit("--workers-per-user", flags.shares.workers_per_user, "and on all jobs of one user");
+  limit("--units-per-user", flags.shares.units_per_user, "and of all jobs of one user");
+  app.add_option("--user-priority", flags.limits.user_priority,
+                 "the highest priority that a job handed in with a token of the role 'submit' may have")
+      ->check(CLI::Range(-1'000'000, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--audit-percent", flags.audit_percent,
+                 "of the results that another worker renders again, to find workers whose pixels are wrong")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+}
+
+void add_tls(CLI::App& app, Flags& flags) {
+  app.add_flag("--tls", flags.tls,
+               "speak TLS, to workers with certificates on both sides, with what is made once in DATA/tls: "
+               "ca.pem for users (LIGHTSHAFT_CA); ca.pem, worker.pem and worker.key for workers");
+  app.add_option("--tls-names", flags.tls_names, "host names and addresses that others call this machine by")
+      ->delimiter(',');
+  auto* ca = app.add_option("--tls-ca", flags.tls_ca,
+                            "certificates of your own instead: of whoever signs the workers'");
+  auto* cert = app.add_option("--tls-cert", flags.tls_cert, "of this machine, with its chain (PEM)");
+  auto* key = app.add_option("--tls-key", flags.tls_key, "its key (PEM), readable by its owner only");
+  ca->needs(cert)->needs(key);
+  cert->needs(ca);
+  key->needs(ca);
+}
+
+void add_files(CLI::App& app, Flags& flags) {
+  app.add_option(
+         "--keep-unused-hours", flags.keep_unused_hours,
+         "how long files stay that no job needs, and uploads that nobody goes on with; 24, and with --blobs "
+         "for good")
+      ->check(CLI::Range(1e-4, 87600.0));
+  app.add_option(
+      "--blobs", flags.blobs,
+      "where files of scenes are kept, if not in --data: a folder, or s3://BUCKET/PREFIX?endpoint=URL with "
+      "keys in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY");
+  app.add_flag("--shared", flags.shared,
+               "other coordinators have the same --store and --blobs: each owns whole jobs, and those of one "
+               "that dies "
+               "go to another");
+  app.add_option("--secrets", flags.secrets,
+                 "folder of tokens and of what --tls makes, if not --data: with --shared one that all coordinators "
+                 "reach, so that each knows what another one's users and workers show");
+  app.add_option("--public-http", flags.public_http,
+                 "with --shared: http://HOST:PORT where clients reach this one, if not as --http says");
+  app.add_option("--public-grpc", flags.public_grpc,
+                 "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
+}
+
+// Others must reach what this one writes, or they could take over nothing.
+Result<void> check_shared(const Flags& flags) {
+  if (!flags.shared) return {};
+  if (flags.store == "sqlite" || flags.blobs.empty())
+    return fail(Errc::invalid_argument,
+                "--shared needs a place that all coordinators reach: --store redis://... and "
+                "--blobs (a shared folder, or s3://...)");
+  if (flags.keep_unused_hours)
+    return fail(Errc::invalid_argument,
+                "--shared and --keep-unused-hours do not go together: one coordinator cannot "
+                "know which files the jobs of another one need");
+  if (flags.tls && flags.tls_ca.empty() && flags.secrets.empty())
+    return fail(Errc::invalid_argument,
+                "--shared with --tls: each coordinator would make an authority of its own, which the others' workers and "
+                "users do not know. Give all of them the same --secrets FOLDER, or certificates of one authority "
+                "(deploy/make-certificates.sh; --tls-ca, --tls-cert, --tls-key)");
+  const bool anywhere = flags.http.starts_with("0.0.0.0:") || flags.http.starts_with("[::]:");
+  if (anywhere && flags.public_http.empty())
+    return fail(Errc::invalid_argument,
+                "--shared with --http on all addresses: say with --public-http "
+                "http://HOST:PORT where clients reach this coordinator");
+  return {};
+}
+
+}  // namespace
+
+std::variant<Flags, int> parse_flags(int argc, char** argv) {
+  Flags flags;
+  std::string log_format = "text";
+  CLI::App app("Cuts jobs into units, hands them to workers, and folds what they send into one exact image.",
+               "lightshaft-coordinator");
+  app.add_option("--http", flags.http, "ADDR:PORT of the HTTP interface and the dashboard; port 0: any")
+      ->capture_default_str();
+  app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any")
+      ->capture_default_str();
+  app.add_option("--data", flags.data, "folder for jobs, blobs, images and tokens")->capture_default_str();
+  app.add_option("--store", flags.store,
+                 "where jobs are kept: sqlite, or redis://[USER:PASSWORD@]HOST[:PORT][/DB]")
+      ->capture_default_str();
+  add_tls(app, flags);
+  add_files(app, flags);
+  add_shares(app, flags);
+  app.add_option(
+      "--webhook", flags.webhooks,
+      "address that is told of every change of a job's state (docs/operations.md); may be repeated");
+  app.add_option("--log-format", log_format, "text, or json: an object a line")
+      ->check(CLI::IsMember({"text", "json"}));
+  app.set_config("--config", "", "file with these options, one 'name = value' a line");
+  app.allow_config_extras(false);
+  add_limits(app, flags.limits);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : kUsage;
+  }
+  for (const Result<void>& fits : {check_store(flags.store), check_blobs(flags.blobs), check_shared(flags)}) {
+    if (fits) continue;
+    fmt::print(stderr, "lightshaft-coordinator: error: {}\n", fits.error().message);
+    return kUsage;
+  }
+  flags.log_format = *log_format_of(log_format);
+  return flags;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,236 @@
+#include <fmt/format.h>
+
+#include <random>
+
+#include "common/base/log.h"
+#include "coordinator/store/redis_job_store_impl.h"
+#include "coordinator/store/redis_pull.h"
+
+namespace ls::coordinator {
+namespace {
+// Jobs told in one go: some MB at most.
+constexpr std::size_t kJobsAtOnce = 64;
+}  // namespace
+
+// ---- the thread that tells Redis ----
+void RedisJobStore::tell(const std::stop_token& token) {
+  Duration pause = options_.first_retry;
+  std::unique_lock lock(mutex_);
+  while (!token.stop_requested()) {
+    (void)wake_.wait_for(lock, token, options_.check_every, [&] { return !idle(); });
+    if (token.stop_requested()) break;
+    lock.unlock();
+    const auto told = tell_once();
+    lock.lock();
+    set_trouble(told);
+    if (told) {
+      pause = options_.first_retry;
+      continue;
+    }
+    (void)wake_.wait_for(lock, token, pause, [] { return false; });
+    pause = std::min(pause * 2, options_.longest_retry);
+  }
+  lock.unlock();
+  tell_the_rest();
+}
+
+// At the end; what stays untold is on the disk. Tried twice: a connection that broke unnoticed fails the
+// first.
+void RedisJobStore::tell_the_rest() {
+  int failed = 0;
+  for (bool more = true; more && failed < 2;) {
+    const bool told = tell_once().has_value();
+    if (!told) ++failed;
+    const std::lock_guard lock(mutex_);
+    more = !told || !idle();
+  }
+}
+
+void RedisJobStore::set_trouble(const Result<void>& told) {
+  const std::string before = std::exchange(trouble_, told ? "" : told.error().message);
+  if (before.empty() && !told)
+    log_warn("store=redis",
+             trouble_ + "; jobs go on, kept on this machine's disk, and Redis is told when it is back");
+  if (!before.empty() && told)
+    log_info("store=redis", "Redis answers again and is being told what it missed");
+}
+
+Result<void> RedisJobStore::tell_once() {
+  if (!link_ || link_->broken()) {
+    link_.reset();
+    auto link = RedisLink::connect(options_.address, options_.timeouts);
+    if (!link) return tl::unexpected(link.error());
+    link_ = std::move(*link);
+    memory_.clear();
+  }
+  if (auto same = check_memory(); !same) return same;
+  if (auto all = note_all_behind(); !all) return all;
+  if (auto told = tell_barred(); !told) return told;  // before the jobs: their heir must know
+  if (auto told = tell_counters(); !told) return told;
+  return tell_jobs();
+}
+
+// A word that lives in Redis as long as what else it knows: where it is another than before, Redis has
+// forgotten, or it is another Redis.
+Result<void> RedisJobStore::check_memory() {
+  auto word = link_->run({"GET", kRedisMemory});
+  if (!word) return tl::unexpected(word.error());
+  if (!memory_.empty() && word->text == memory_) return {};
+  if (word->nil) {
+    if (auto set = link_->run({"SET", kRedisMemory, std::to_string(std::random_device()()), "NX"}); !set)
+      return tl::unexpected(set.error());
+    word = link_->run({"GET", kRedisMemory});
+    if (!word) return tl::unexpected(word.error());
+  }
+  memory_ = word->text;
+  const std::lock_guard lock(mutex_);
+  all_due_ = true;
+  return {};
+}
+
+// After that: every job of which Redis has a lower revision, or none, is due whole.
+Result<void> RedisJobStore::note_all_behind() {
+  std::vector<std::pair<JobId, std::uint64_t>> known;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!all_due_) return {};
+    known.assign(revisions_.begin(), revisions_.end());
+  }
+  auto behind = jobs_behind(*link_, known);
+  if (!behind) return tl::unexpected(behind.error());
+  auto jobs = behind->empty() ? Result<std::vector<StoredJob>>() : local_->jobs();
+  if (!jobs) return tl::unexpected(jobs.error());
+  const std::lock_guard lock(mutex_);
+  all_due_ = false;
+  for (const auto& [worker, evidence] : barred_) barred_due_.insert(worker);
+  for (const StoredJob& job : *jobs) {
+    if (job.damaged || !behind->contains(job.id) || !revisions_.contains(job.id)) continue;
+    Due& due = due_[job.id];
+    if (!due.record) due.take(job);
+    due.points = due.log = true;
+  }
+  return {};
+}
+
+Result<void> RedisJobStore::tell_barred() {
+  std::vector<RedisLink::Command> commands;
+  std::set<WorkerId> due;
+  {
+    const std::lock_guard lock(mutex_);
+    due.swap(barred_due_);
+    for (const WorkerId& worker : due) commands.push_back({"HSETNX", kRedisBarred, worker.value, barred_.at(worker)});
+  }
+  if (due.empty()) return {};
+  auto replies = link_->run_all(commands);
+  std::optional<Error> failed;
+  if (!replies) failed = replies.error();
+  for (std::size_t i = 0; replies && i < replies->size() && !failed; ++i)
+    if (!(*replies)[i]) failed = (*replies)[i].error();
+  if (!failed) return {};
+  const std::lock_guard lock(mutex_);
+  barred_due_.merge(due);
+  return tl::unexpected(*failed);
+}
+
+Result<void> RedisJobStore::tell_counters() {
+  std::map<std::string, std::uint64_t> counters;
+  {
+    const std::lock_guard lock(mutex_);
+    counters.swap(counters_);
+  }
+  if (counters.empty() || shared()) return {};  // shared: each has its own
+  RedisLink::Command command{"HSET", kRedisCounters};
+  for (const auto& [name, value] : counters) {
+    command.push_back(name);
+    command.push_back(std::to_string(value));
+  }
+  auto told = link_->run(command);
+  if (told) return {};
+  const std::lock_guard lock(mutex_);
+  for (const auto& [name, value] : counters) counters_[name] = std::max(counters_[name], value);
+  return tl::unexpected(told.error());
+}
+
+Result<void> RedisJobStore::tell_jobs() {
+  std::map<JobId, Due> taken;
+  std::vector<RedisLink::Command> commands;
+  std::vector<JobId> owner;               // of each command
+  std::map<JobId, std::uint64_t> fences;  // under which they are written
+  {
+    const std::lock_guard lock(mutex_);
+    // In turn: one that Redis always refuses keeps no other waiting.
+    while (!due_.empty() && taken.size() < kJobsAtOnce) {
+      auto next = due_.upper_bound(told_last_);
+      if (next == due_.end()) next = due_.begin();
+      told_last_ = next->first;
+      taken.insert(due_.extract(next));
+    }
+    for (const auto& [id, due] : taken)
+      if (const auto fence = fences_.find(id); fence != fences_.end()) fences.insert(*fence);
+  }
+  for (const auto& [id, due] : taken)
+    for (auto& command : commands_of(id, due)) {
+      commands.push_back(std::move(command));
+      owner.push_back(id);
+    }
+  auto replies = link_->run_all(commands);
+  std::optional<Error> failed;
+  std::set<JobId> refused;
+  if (!replies) failed = replies.error();
+  for (std::size_t i = 0; replies && i < replies->size(); ++i) {
+    const auto& reply = (*replies)[i];
+    if (!reply && !failed) failed = reply.error();
+    if (!reply) refused.insert(owner[i]);
+    if (reply && taken.at(owner[i]).removed) continue;
+    if (reply && shared() && reply->number == static_cast<int>(PutAnswer::lost)) {
+      const std::lock_guard lock(mutex_);
+      const auto now = fences_.find(owner[i]), then = fences.find(owner[i]);
+      if (now != fences_.end() && then != fences.end() && now->second == then->second) lose_locked(owner[i]);
+    }
+    if (reply && !shared() && commands[i].front() == "EVAL" &&
+        reply->number != static_cast<int>(PutAnswer::put))
+      log_error(fmt::format("job={}", owner[i].value),
+                "Redis has a later revision of this job: another coordinator writes it; what this one "
+                "knows is kept "
+                "on its disk only");
+  }
+  if (!failed) return {};
+  if (replies) std::erase_if(taken, [&](const auto& job) { return !refused.contains(job.first); });
+  give_back(std::move(taken));
+  return tl::unexpected(*failed);
+}
+
+std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, const Due& due) const {
+  if (due.removed) return remove_commands(id, options_.node);
+  RedisUpdate update{.id = id, .revision = due.revision, .record = due.record, .node = options_.node};
+  update.state = due.state;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = revisions_.find(id);
+    if (known == revisions_.end()) return {};  // removed after it was taken; its removal is due
+    if (!due.record) update.revision = known->second;
+    if (const auto fence = fences_.find(id); fence != fences_.end()) update.fence = fence->second;
+  }
+  if (due.points)
+    if (auto points = local_->points(id)) update.points = points_json(*points);
+  if (due.log)
+    if (auto log = local_->log(id)) update.log = log_json(*log);
+  return {put_command(update)};
+}
+
+void RedisJobStore::give_back(std::map<JobId, Due> taken) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [id, old] : taken) {
+    const auto [now, fresh] = due_.try_emplace(id, old);
+    if (fresh || now->second.removed) continue;
+    if (!now->second.record) {
+      now->second.record = std::move(old.record);
+      now->second.revision = old.revision;
+      now->second.state = old.state;
+    }
+    now->second.points |= old.points;
+    now->second.log |= old.log;
+  }
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,57 @@
+// Blobs in an S3-compatible store, so that they outlive this machine and others reach them: PREFIX/ab/<64 hex
+// digits>. A folder on this machine takes what arrives until it is whole and proven, and keeps what was read:
+// each object comes once, and its digest is checked. A blob counts as there when the store has it.
+#pragma once
+
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+
+#include "coordinator/store/disk_blobs.h"
+#include "coordinator/store/s3_link.h"
+
+namespace ls::coordinator {
+
+class S3Blobs final : public BlobStore {
+ public:
+  // Asks the store for its list first: what is wrong with keys, bucket or address is told at the start.
+  static Result<std::unique_ptr<S3Blobs>> open(S3Options options, std::filesystem::path folder);
+
+  bool has(const Digest& digest) const override { return find(digest).value_or(false); }
+  Result<bool> find(const Digest& digest) const override;
+  Result<std::uint64_t> size(const Digest& digest) const override;
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override;
+  Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override;
+  Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override;
+  std::uint64_t received(const Digest& digest) const override { return local_->received(digest); }
+  Result<std::unique_ptr<Upload>> resume_upload(const Digest& digest, std::uint64_t offset) override;
+  Result<std::vector<Digest>> list(bool unfinished) const override;
+  Result<void> remove(const Digest& digest) override;
+  void remove_unfinished(const Digest& digest) override { local_->remove_unfinished(digest); }
+
+ private:
+  class Passed;
+  S3Blobs(S3Options options, std::unique_ptr<DiskBlobs> local)
+      : link_(std::move(options)), local_(std::move(local)) {}
+  Result<void> send(const Digest& digest);         // from the folder to the store
+  // The other way. Who asks while it is on its way waits for the same.
+  Result<void> fetch(const Digest& digest) const;
+  Result<void> fetch_now(const Digest& digest) const;
+  void note(const Digest& digest) const;
+
+  S3Link link_;
+  std::unique_ptr<DiskBlobs> local_;
+  mutable std::mutex mutex_;
+  mutable std::set<Digest> there_;  // known to be in the store
+  struct Flight {
+    std::condition_variable landed;
+    std::optional<Result<void>> outcome;
+  };
+  mutable std::map<Digest, std::shared_ptr<Flight>> coming_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,76 @@
+// Objects in a bucket of an S3-compatible store; the coordinator's only door to libcurl, which signs the
+// requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe: a
+// connection for each request.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/digest.h"
+#include "common/base/error.h"
+
+namespace ls::coordinator {
+
+// s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME]. The keys come from the environment, as for other tools:
+// AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if they are short-lived, AWS_SESSION_TOKEN; AWS_REGION where
+// the address names none. Without an endpoint: Amazon's of the region.
+struct S3Address {
+  std::string bucket, prefix;  // the prefix without slashes at its ends; may be empty
+  std::string endpoint, region;
+  std::string shown() const;  // for people and logs
+};
+Result<S3Address> parse_s3_url(std::string_view url);
+
+struct S3Keys {
+  std::string id, secret, session;
+};
+// unauthenticated: which variable is missing.
+Result<S3Keys> s3_keys_from_environment();
+
+struct S3Options {
+  S3Address address;
+  S3Keys keys;
+  int attempts = 6;  // of a request whose failure may pass: no answer, 429, 5xx
+  Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
+};
+
+class S3Link {
+ public:
+  explicit S3Link(S3Options options);
+
+  // Bytes of an object; not_found.
+  Result<std::uint64_t> size(const std::string& key) const;
+  using Sink = std::function<Result<void>(std::span<const std::byte>)>;
+  // All of it, in order. `restart` is called before the bytes come from the start again.
+  Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
+                   const Sink& sink) const;
+  // The bytes of a file, whose digest the store checks.
+  Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
+                   const Digest& digest) const;
+  Result<void> remove(const std::string& key) const;  // of a missing one: success
+  Result<std::vector<std::string>> list() const;      // keys under the prefix
+
+  std::string shown() const { return options_.address.shown(); }
+
+  // What one request puts in at most, by the protocol; larger files are refused.
+  static constexpr std::uint64_t kMostBytes = std::uint64_t{5} << 30;
+
+ private:
+  struct Request;
+  struct Answer;
+  Result<Answer> ask(const Request& request) const;
+  Result<Answer> ask_once(const Request& request) const;
+  Error error_of(const Request& request, const Answer& answer) const;
+  std::string url_of(const Request& request) const;
+
+  S3Options options_;
+};
+
+}  // namespace ls::coordinator

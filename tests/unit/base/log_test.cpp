@@ -1,0 +1,48 @@
+#include "common/base/log.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace ls {
+namespace {
+
+// The pattern of the log writes the line's beginning.
+nlohmann::json json_line(std::string_view keys, std::string_view text) {
+  return nlohmann::json::parse("{" + log_line(LogFormat::json, keys, text));
+}
+
+TEST(Log, WritesKeysAndTextOnOneLine) {
+  EXPECT_EQ(log_line(LogFormat::text, "job=j-1 tile=4", "unit accepted"), "job=j-1 tile=4 unit accepted");
+  EXPECT_EQ(log_line(LogFormat::text, "", "stopping"), "stopping");
+}
+
+TEST(Log, WritesKeysAsMembersOfJson) {
+  const auto line = json_line("job=j-1 tile=4 why=a \"quoted\" reason", "unit\naccepted");
+
+  EXPECT_EQ(line,
+            (nlohmann::json{
+                {"job", "j-1"}, {"tile", "4"}, {"why", "a \"quoted\" reason"}, {"text", "unit\naccepted"}}));
+}
+
+TEST(Log, LetsNoTextFromOutsideBeginALineOrAKey) {
+  const std::string name = "evil\n2026-01-01 error job=j-2 stolen";
+
+  EXPECT_EQ(log_line(LogFormat::text, "worker=" + log_value(name), name).find('\n'), std::string::npos);
+  const auto line = json_line("worker=w-1 name=" + log_value(name), "joined");
+  EXPECT_FALSE(line.contains("job"));
+  EXPECT_EQ(line["worker"], "w-1");
+}
+
+TEST(Log, IsJsonWhateverBytesAPathHas) { EXPECT_NO_THROW(json_line("file=\xff\xfe", "cannot read '\xc3'")); }
+
+TEST(Log, KeepsTheFirstOfTwoEqualKeys) { EXPECT_EQ(json_line("job=a job=b", "")["job"], "a"); }
+
+TEST(Log, KnowsItsFormatsByName) {
+  EXPECT_EQ(log_format_of("json"), LogFormat::json);
+  EXPECT_EQ(log_format_of("text"), LogFormat::text);
+  EXPECT_FALSE(log_format_of("xml"));
+}
+
+}  // namespace
+}  // namespace ls

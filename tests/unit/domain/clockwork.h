@@ -1,0 +1,118 @@
+// A rig whose workers take the time that units cost: every render thread is busy until its unit is done.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <queue>
+#include <string>
+#include <vector>
+
+#include "tests/unit/domain/rig.h"
+
+namespace ls::coordinator {
+
+class Clockwork {
+ public:
+  explicit Clockwork(Farm::Options options = {.lease_prefix = "t"}) : rig(std::move(options)) {}
+
+  Rig rig;
+  std::function<double(const UnitKey&)> cost = [](const UnitKey&) { return 0.5; };  // core seconds
+  std::map<std::string, double> slow;  // factors of workers that are slower than others
+  std::map<std::string, double> seconds;  // that each job has had
+  std::map<std::string, std::map<std::string, std::uint64_t>> units;  // by job and worker
+  std::map<UnitKey, Digest> accepted, arrived;  // the first result that came
+  std::map<std::string, double> finished;       // when
+  std::function<Digest(const std::string& worker, const UnitKey&, const SampleRange&)> pixels =
+      [](const std::string&, const UnitKey& unit, const SampleRange& range) { return honest(unit, range); };
+  std::vector<Effect> effects;  // all but folds and assignments
+
+  void join(const std::string& name, int threads, std::uint64_t memory = 0, std::vector<Digest> blobs = {}) {
+    threads_[name] = threads;
+    note(rig.join(name, threads, 1, {}, memory, std::move(blobs)));
+  }
+  // What it has in hand still comes.
+  void lose(const std::string& name) { note(rig.lose(name)); }
+  double now() const { return ls::seconds(rig.now.time_since_epoch()) - begin_; }
+
+  // Until nothing is rendered any more, or so many seconds from now.
+  void run(double for_seconds = 1e9) {
+    const double end = now() + for_seconds;
+    while (now() < end) {
+      begin_units();
+      if (busy_.empty()) {
+        if (idle()) return;
+        note(rig.pass(100ms));
+        continue;
+      }
+      const Busy next = busy_.top();
+      if (next.until > tick_at_) {
+        rig.now = at(tick_at_);
+        tick_at_ += .1;
+        note(rig.send(Tick{}));
+        continue;
+      }
+      busy_.pop();
+      rig.now = std::max(rig.now, at(next.until));
+      finish(next);
+    }
+  }
+  bool idle() const {
+    for (const JobId& job : rig.farm.jobs())
+      if (const auto f = rig.farm.job(job); f->state == JobState::running && rig.farm.why_waiting(job).empty()) return false;
+    return true;
+  }
+  template <class T>
+  std::vector<T> seen() const {
+    return of<T>(effects);
+  }
+
+ private:
+  struct Busy {
+    double until;
+    std::uint64_t order;
+    std::string worker;
+    Rig::Held unit;
+    bool operator<(const Busy& o) const { return std::tie(until, order) > std::tie(o.until, o.order); }
+  };
+  TimePoint at(double t) const { return TimePoint{} + from_seconds(t + begin_); }
+
+  void begin_units() {
+    for (auto& [id, held] : rig.held) {
+      int& busy = working_[id.value];
+      while (!held.empty() && busy < threads_[id.value]) {
+        ++busy;
+        const double factor = slow.contains(id.value) ? slow.at(id.value) : 1;
+        const Rig::Held unit = held.front();
+        held.pop_front();
+        busy_.push({now() + factor * cost(unit.key()), ++order_, id.value, unit});
+      }
+    }
+  }
+  void finish(const Busy& done) {
+    --working_[done.worker];
+    const UnitKey key = done.unit.key();
+    const double cpu = cost(key);
+    seconds[key.job.value] += cpu;
+    ++units[key.job.value][done.worker];
+    const Digest digest = pixels(done.worker, key, done.unit.unit.samples);
+    if (!accepted.contains(key)) arrived[key] = digest;
+    note(rig.send(UnitAccepted{key, done.unit.unit.samples, digest, {done.worker}, cpu}));
+  }
+  void note(std::vector<Effect> come) {
+    for (Effect& e : come) {
+      if (const auto* r = std::get_if<RecordUnit>(&e)) accepted[r->unit] = r->digest;
+      if (const auto* f = std::get_if<JobFinished>(&e)) finished[f->job.value] = now();
+      if (const auto* d = std::get_if<TileDiscarded>(&e))
+        std::erase_if(accepted, [&](const auto& a) { return a.first.job == d->job && a.first.tile == d->tile; });
+      if (!std::holds_alternative<Fold>(e) && !std::holds_alternative<Send>(e)) effects.push_back(std::move(e));
+    }
+  }
+
+  double begin_ = 0, tick_at_ = .1;
+  std::uint64_t order_ = 0;
+  std::priority_queue<Busy> busy_;
+  std::map<std::string, int> threads_, working_;
+};
+
+}  // namespace ls::coordinator

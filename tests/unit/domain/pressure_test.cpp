@@ -1,0 +1,24 @@
+// More results than the coordinator has room for.
+#include "tests/unit/domain/rig.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Behind the result that waits the worker's own words wait, too.
+TEST(Deadline, IsNotPassedWhileTheCoordinatorHasNoRoomForTheWorkersResult) {
+  Rig rig;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 1, 2));
+
+  for (Duration waited{}; waited < 2 * kNoGrowthLimit; waited += 1s) {
+    rig.send(ResultsWait{{"w"}});
+    rig.pass(1s);
+    ASSERT_EQ(rig.job().units_leased, 1u);
+  }
+  rig.pass(kDeadlineSlack + kLoadSlack + 10s);
+
+  EXPECT_EQ(rig.job().units_leased, 0u) << "then it counts again";
+}
+
+}  // namespace
+}  // namespace ls::coordinator

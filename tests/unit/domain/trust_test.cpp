@@ -1,0 +1,398 @@
+// Audits, and what becomes of a worker that renders wrong pixels and of what it has rendered.
+#include "tests/unit/domain/clockwork.h"
+
+namespace ls::coordinator {
+namespace {
+
+Farm::Options audited(double rate) {
+  return {.lease_prefix = "t", .limits = {}, .audit_rate = rate, .audit_seed = 7};
+}
+
+bool all_honest(const Clockwork& work, const JobPlan& plan) {
+  const std::uint64_t rounds = round_count(*plan.spp);
+  std::uint64_t right = 0;
+  for (const auto& [unit, digest] : work.accepted)
+    right += unit.job == plan.brief.job && digest == honest(unit, cut_range(unit.round, *plan.spp));
+  return right == rounds * plan.grid.count();
+}
+
+// Renders each unit that `who` says wrong.
+auto liars(std::set<std::string> who) {
+  return [who = std::move(who)](const std::string& worker, const UnitKey& unit, const SampleRange& range) {
+    return who.contains(worker) ? digest_number(std::hash<std::string>{}(worker) ^ range.s1 ^ (unit.tile << 8))
+                                : honest(unit, range);
+  };
+}
+
+TEST(Audit, EveryResultCanBeRenderedAgainByAnotherBeforeTheJobEnds) {
+  Clockwork work(audited(1));
+  for (const char* name : {"a", "b", "c"}) work.join(name, 1);
+  const JobPlan plan = plan_of("j", 20, 4);
+  work.rig.submit(plan);
+
+  work.run();
+
+  EXPECT_EQ(work.rig.job().state, JobState::done);
+  const AuditFigures figures = work.rig.farm.audits();
+  EXPECT_EQ(figures.asked, 40u);
+  EXPECT_EQ(figures.equal, 40u);
+  EXPECT_EQ(figures.differ + figures.dropped, 0u);
+  EXPECT_TRUE(all_honest(work, plan));
+  EXPECT_EQ(work.seconds["j"], 80 * .5);
+}
+
+TEST(Audit, TakesTheShareAskedFor) {
+  Clockwork work(audited(.01));
+  for (const char* name : {"a", "b", "c"}) work.join(name, 4);
+  work.rig.submit(plan_of("j", 5000, 4));
+
+  work.run();
+
+  // 10,000 draws at 1 %: six standard deviations are 60.
+  EXPECT_NEAR(static_cast<double>(work.rig.farm.audits().asked), 100, 60);
+  EXPECT_EQ(work.rig.farm.audits().equal, work.rig.farm.audits().asked);
+}
+
+TEST(Audit, ALoneWorkerIsNotAudited) {
+  Clockwork work(audited(1));
+  work.join("a", 2);
+  work.rig.submit(plan_of("j", 20, 4));
+
+  work.run();
+
+  EXPECT_EQ(work.rig.job().state, JobState::done);
+  EXPECT_EQ(work.rig.farm.audits().asked, 0u);
+}
+
+TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
+  Clockwork work(audited(1));
+  work.join("a", 1);
+  work.join("b", 1);
+  work.rig.submit(plan_of("j", 20, 4));
+  work.run(3);
+  work.rig.lose("b");
+
+  work.run();
+
+  EXPECT_EQ(work.rig.job().state, JobState::done);
+  EXPECT_GT(work.rig.farm.audits().dropped, 0u);
+}
+
+// One result of `a` is accepted, and being rendered again, when the coordinator dies; what it comes back with.
+JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
+  JobRestored event;
+  event.plan = plan_of("j", tiles, 2);
+  event.state = JobState::running;
+  event.numeric_class = digest_number(1);
+  event.accepted = {{audit.tile, audit.round, {0, 2}, accepted, {"a"}}};
+  event.audits = {std::move(audit)};
+  return event;
+}
+const Digest kRight = honest({{"j"}, 0, 0}, {0, 2}), kWrong = digest_number(5);
+
+TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
+  Rig rig(audited(1));
+  rig.join("a", 1);
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 6, 2));
+  EXPECT_TRUE(rig.farm.take_changed_audits().empty());
+
+  const Rig::Held unit = rig.take("a");
+  rig.result("a", unit);
+
+  EXPECT_EQ(rig.farm.take_changed_audits(), std::vector<JobId>{{"j"}});
+  const std::vector<JobRestored::Audit> open{{unit.unit.tile, unit.unit.round, std::nullopt}};
+  EXPECT_EQ(rig.farm.open_audits({"j"}), open);
+  rig.render_all();
+  EXPECT_EQ(rig.farm.take_changed_audits(), std::vector<JobId>{{"j"}});
+  EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
+}
+
+TEST(Audit, IsGoneOnWithAfterARestart) {
+  Rig rig(audited(0));
+  rig.send(restored(kRight, {0, 0, std::nullopt}));
+  rig.pass(1s);  // no worker is back yet
+  rig.join("a", 1);
+  rig.join("b", 1);
+
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.farm.audits().equal, 1u);
+}
+
+TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
+  Rig rig(audited(0));
+  rig.send(restored(kWrong, {0, 0, std::nullopt}));
+  for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
+
+  const auto effects = rig.render_all();
+
+  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
+  EXPECT_EQ(of<WorkerDistrusted>(effects)[0].worker.value, "a");
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
+  Rig rig(audited(0));
+  rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
+  for (const char* name : {"a", "b"}) rig.join(name, 1);
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::running) << "a third one has to decide";
+  rig.join("c", 1);
+
+  const auto effects = rig.render_all();
+
+  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
+  EXPECT_EQ(of<WorkerDistrusted>(effects)[0].worker.value, "b");
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Audit, OfBeforeTheRestartIsDroppedWhenNobodyComesBackForIt) {
+  Rig rig(audited(0));
+  rig.send(restored(kRight, {0, 0, std::nullopt}, 1));
+  rig.pass(kAuditAfterRestart - 1s);
+  EXPECT_EQ(rig.job().state, JobState::running);
+
+  rig.pass(2s);
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.farm.audits().dropped, 1u);
+}
+
+TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
+  Rig rig(audited(0));
+  JobRestored event = restored(kRight, {0, 0, std::nullopt});
+  event.audits = {{1, 0, std::nullopt}, {7, 0, std::nullopt}, {0, 9, std::nullopt}};
+  rig.send(event);
+
+  EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
+  EXPECT_EQ(rig.farm.audit(), "");
+}
+
+TEST(Liar, IsFoundByAThirdWorkerBarredAndItsTilesAreRenderedAgain) {
+  Clockwork work(audited(.01));
+  for (int i = 0; i < 8; ++i) work.join("w" + std::to_string(i), 2);
+  work.pixels = liars({"w3"});
+  const JobPlan plan = plan_of("j", 400, 64);
+  work.rig.submit(plan);
+
+  work.run();
+
+  EXPECT_EQ(work.rig.job().state, JobState::done);
+  EXPECT_TRUE(all_honest(work, plan));
+  const auto found = work.seen<WorkerDistrusted>();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].worker.value, "w3");
+  EXPECT_THAT(found[0].evidence, testing::HasSubstr("both rendered it to"));
+  EXPECT_FALSE(work.seen<TileDiscarded>().empty());
+  EXPECT_TRUE(work.rig.farm.barred({"w3"}));
+  EXPECT_EQ(work.rig.worker("w3").state, WorkerState::sick);
+  EXPECT_TRUE(work.rig.held[{"w3"}].empty());
+  EXPECT_EQ(work.rig.farm.audits().workers_barred, 1u);
+}
+
+// Takes the unit from the worker that was asked to render it again.
+std::string asked(Rig& rig, const UnitKey& unit) {
+  for (auto& [id, units] : rig.held)
+    for (auto it = units.begin(); it != units.end(); ++it)
+      if (it->key() == unit) {
+        units.erase(it);
+        return id.value;
+      }
+  return "nobody";
+}
+
+std::vector<Effect> says(Rig& rig, const Rig::Held& unit, const std::string& worker, const Digest& digest) {
+  return rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest, {worker}, .1});
+}
+
+TEST(Liar, WhoFoundItFirstDoesNotMatter) {
+  for (const bool lies_first : {false, true}) {
+    Rig rig(audited(1));
+    for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
+    rig.submit(plan_of("j", 6, 2));
+    const Rig::Held unit = rig.take("a");
+    const Digest truth = honest(unit.key(), unit.unit.samples), lie = digest_number(666);
+    says(rig, unit, "a", lies_first ? lie : truth);
+    const std::string second = asked(rig, unit.key());
+    const auto mismatch = says(rig, unit, second, lies_first ? truth : lie);
+    EXPECT_EQ(of<DigestMismatch>(mismatch).size(), 1u);
+    EXPECT_EQ(rig.job().state, JobState::running) << "a third worker is asked";
+
+    const auto verdict = says(rig, unit, asked(rig, unit.key()), truth);
+
+    ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
+    EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, lies_first ? "a" : second);
+    EXPECT_EQ(of<TileDiscarded>(verdict).size(), lies_first ? 1u : 0u);
+    rig.render_all();
+    EXPECT_EQ(rig.job().state, JobState::done);
+    EXPECT_EQ(rig.farm.audit(), "");
+  }
+}
+
+TEST(Liar, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
+  Rig rig(audited(0));
+  for (const char* name : {"h", "c", "d", "x1", "x2"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 6, 2));
+  const Rig::Held unit = rig.take("h");
+  rig.result("h", unit);
+
+  for (const char* liar : {"x1", "x2"})
+    EXPECT_TRUE(of<WorkerDistrusted>(says(rig, unit, liar, digest_number(666))).empty()) << liar;
+  EXPECT_EQ(rig.job().state, JobState::running);
+  const std::string third = asked(rig, unit.key());
+  ASSERT_THAT(third, testing::AnyOf("c", "d")) << "not who accuses";
+
+  const auto verdict = says(rig, unit, third, honest(unit.key(), unit.unit.samples));
+
+  ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
+  EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, "x1");
+  EXPECT_FALSE(rig.farm.barred({"h"}));
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+  EXPECT_EQ(rig.farm.audit(), "");
+}
+
+TEST(Liar, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
+  Rig rig(audited(0));
+  for (const char* name : {"h", "x"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 6, 2));
+  const Rig::Held unit = rig.take("h");
+  rig.result("h", unit);
+
+  says(rig, unit, "x", digest_number(666));
+
+  EXPECT_EQ(rig.job().state, JobState::running);
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Liar, ALateResultCountsSinceItsWorkerWasAsked) {
+  Rig rig(audited(0));
+  for (const char* name : {"h", "x", "c"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 3, 2));
+  const Rig::Held unit = rig.take("x");
+  rig.lose("x");  // its stream breaks, and the unit goes to another
+  rig.join("x", 1);
+  const std::string other = asked(rig, unit.key());
+  ASSERT_THAT(other, testing::AnyOf("h", "c"));
+  rig.result(other, unit);
+
+  says(rig, unit, "x", digest_number(666));
+  const auto verdict = says(rig, unit, asked(rig, unit.key()), honest(unit.key(), unit.unit.samples));
+
+  ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
+  EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, "x");
+}
+
+TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
+  Rig rig(audited(0));
+  for (const char* name : {"a", "b"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 6, 2));
+  const Rig::Held unit = rig.take("a");
+  rig.result("a", unit);
+  ASSERT_FALSE(rig.held[{"a"}].empty());
+
+  const auto effects = rig.send(WorkerBarred{{"a"}, "it rendered wrong pixels of job x"});
+
+  EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
+  EXPECT_TRUE(rig.held[{"a"}].empty());
+  ASSERT_EQ(of<TileDiscarded>(effects).size(), 1u);
+  EXPECT_EQ(of<TileDiscarded>(effects)[0].tile, unit.unit.tile);
+  EXPECT_EQ(rig.farm.audit(), "");
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Liar, OneThatContradictsItselfNeedsNoThirdWorker) {
+  Rig rig(audited(0));
+  rig.join("a", 1);
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 6, 2));
+  const Rig::Held unit = rig.take("a");
+  rig.result("a", unit);
+
+  const auto effects = rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest_number(5), {"a"}, .1});
+
+  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Liar, ThreeDifferentAnswersFailTheJob) {
+  Rig rig(audited(1));
+  for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
+  rig.submit(plan_of("j", 6, 2));
+  const Rig::Held unit = rig.take("a");
+  rig.result("a", unit);
+  says(rig, unit, asked(rig, unit.key()), digest_number(5));
+
+  const auto effects = says(rig, unit, asked(rig, unit.key()), digest_number(6));
+
+  ASSERT_EQ(of<JobFailed>(effects).size(), 1u);
+  EXPECT_THAT(of<JobFailed>(effects)[0].error, testing::HasSubstr("no third one agrees"));
+  EXPECT_TRUE(of<WorkerDistrusted>(effects).empty());
+}
+
+// With a job that another coordinator had, and knew the liar by.
+TEST(Liar, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
+  Rig rig(audited(0));
+  rig.join("a", 1);
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 6, 2));
+  ASSERT_GT(rig.worker("a").units_out, 0u);
+
+  const auto effects = rig.send(WorkerBarred{{"a"}, "barred: it lied"});
+
+  EXPECT_EQ(rig.worker("a").units_out, 0u);
+  EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
+  EXPECT_FALSE(of<WorkerStateChanged>(effects).empty());
+  EXPECT_EQ(rig.farm.audit(), "");
+  rig.held.erase({"a"});
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
+  Rig rig(audited(0));
+  rig.send(WorkerBarred{{"a"}, "it rendered wrong pixels of job x"});
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 6, 2));
+  EXPECT_TRUE(rig.held[{"a"}].empty());
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "a is barred, since it rendered wrong pixels");
+
+  const auto effects = rig.send(UnitAccepted{{{"j"}, 0, 0}, {0, 2}, digest_number(1), {"a"}, .1});
+
+  EXPECT_EQ(of<DropUnwanted>(effects).size(), 1u);
+  EXPECT_TRUE(of<RecordUnit>(effects).empty());
+  EXPECT_EQ(rig.farm.audit(), "");
+}
+
+// Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin again.
+TEST(Liar, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
+  const auto ends = [](bool with_liar) {
+    Clockwork work(audited(with_liar ? .05 : 0));
+    for (int i = 0; i < 5; ++i) work.join("w" + std::to_string(i), 2);
+    if (with_liar) work.pixels = liars({"w2"});
+    JobPlan plan = plan_of("j", 4, 4096);
+    plan.grid = {{4 * 32, 32}, 32};
+    plan.target_error = 1 / 400.;
+    work.rig.rel_error = [&](const UnitKey& unit) {
+      const Digest& pixels = work.arrived.at(unit);
+      const bool wrong = pixels != honest(unit, cut_range(unit.round, 4096));
+      return (wrong ? 100. : 1. + unit.tile) * 3 * 1024 / static_cast<double>(round_range(unit.round).s1);
+    };
+    work.rig.submit(plan);
+    work.run();
+    EXPECT_EQ(work.rig.job().state, JobState::done);
+    EXPECT_EQ(work.seen<WorkerDistrusted>().size(), with_liar ? 1u : 0u);
+    std::vector<RoundIndex> rounds;
+    for (TileIndex t = 0; t < 4; ++t) rounds.push_back(work.rig.farm.tile({"j"}, t)->rounds_folded);
+    return rounds;
+  };
+  EXPECT_EQ(ends(true), ends(false));
+}
+
+}  // namespace
+}  // namespace ls::coordinator

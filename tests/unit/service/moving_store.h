@@ -1,0 +1,54 @@
+// A store of jobs that tells the service what other coordinators have done, as a test says, and fails when it is told to.
+#pragma once
+
+#include <mutex>
+#include <utility>
+
+#include "coordinator/store/job_store.h"
+
+namespace ls::coordinator {
+
+class MovingStore final : public JobStore {
+ public:
+  explicit MovingStore(std::shared_ptr<JobStore> inner = make_memory_job_store()) : inner_(std::move(inner)) {}
+
+  void will_tell(Moved moved) {
+    const std::lock_guard lock(mutex_);
+    next_ = std::move(moved);
+  }
+  std::atomic<bool> refuses_to_bar{false};
+
+  Result<void> put_job(const StoredJob& job) override { return inner_->put_job(job); }
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override { return inner_->put_jobs(jobs); }
+  Result<std::vector<StoredJob>> jobs() const override { return inner_->jobs(); }
+  Result<void> remove_jobs(std::span<const JobId> jobs) override { return inner_->remove_jobs(jobs); }
+  Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
+    return inner_->add_point(job, point);
+  }
+  Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
+    return inner_->set_truth(job, spp, truth);
+  }
+  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override { return inner_->points(job); }
+  Result<void> add_log(const JobId& job, const LogLine& line) override { return inner_->add_log(job, line); }
+  Result<std::vector<LogLine>> log(const JobId& job) const override { return inner_->log(job); }
+  Result<void> bar(const BarredWorker& worker) override {
+    if (refuses_to_bar) return fail(Errc::resource_exhausted, "the disk is full");
+    return inner_->bar(worker);
+  }
+  Result<std::vector<BarredWorker>> barred() const override { return inner_->barred(); }
+  Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
+    return inner_->reserve(counter, amount);
+  }
+  Moved moved() override {
+    const std::lock_guard lock(mutex_);
+    for (const BarredWorker& worker : next_.barred) (void)inner_->bar(worker);  // as a real one does before it tells
+    return std::exchange(next_, {});
+  }
+
+ private:
+  std::shared_ptr<JobStore> inner_;
+  std::mutex mutex_;
+  Moved next_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,108 @@
+// More results than there is room for: they wait in the streams of their workers.
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "coordinator/domain/limits.h"
+#include "coordinator/limits.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Moves by hand; while it is shut nobody but its maker gets past now(), so that no result is checked.
+class Gate final : public Clock {
+ public:
+  TimePoint now() const override {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return !shut_ || std::this_thread::get_id() == maker_; });
+    return at_;
+  }
+  void shut(bool is) {
+    const std::lock_guard lock(mutex_);
+    shut_ = is;
+    changed_.notify_all();
+  }
+  void advance(Duration by) {
+    const std::lock_guard lock(mutex_);
+    at_ += by;
+  }
+
+ private:
+  const std::thread::id maker_ = std::this_thread::get_id();
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  bool shut_ = false;
+  TimePoint at_{std::chrono::hours(1)};
+};
+
+// Tiles of 32 x 32 pixels: 25 KB each as a message, and as much again decoded.
+const std::string kLargeScene = R"(<scene version="3.0.0">
+  <integrator type="volpath"/>
+  <sensor type="perspective">
+    <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="1024"/></film>
+    <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
+  </sensor>
+  <shape type="sphere"/>
+  <emitter type="constant"/>
+</scene>)";
+
+TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
+  TempFolder dir;
+  auto clock = std::make_shared<Gate>();
+  Coordinator::Options options;
+  options.data = dir.path();
+  options.clock = clock;
+  auto coordinator = Coordinator::open(options).value();
+  const JobId job = coordinator->submit({"large.xml", kLargeScene, {}, {}}).value();
+  struct Sink final : WorkerSink {
+    void send(ToWorker message) override {
+      const std::lock_guard lock(mutex);
+      if (auto* lease = std::get_if<AssignLease>(&message)) leases.push_back(*lease);
+    }
+    void close() override {}
+    std::mutex mutex;
+    std::vector<AssignLease> leases;
+  };
+  const auto sink = std::make_shared<Sink>();
+  WorkerHello hello;
+  hello.name = "quick";
+  hello.build = "test";
+  hello.numeric_class = sha256("fake class");
+  auto session = coordinator->connect(hello, sink).value();
+  FakeFarm farm(*coordinator, 0);
+  std::atomic<int> room{0};
+  clock->shut(true);
+
+  int sent = 0;
+  const AssignLease first = sink->leases.at(0);
+  farm.brief(first);
+  // One unit again and again: what it is does not matter to the room it takes.
+  const UnitResult result = farm.render_unit(first.lease, first.lease.units.at(0));
+  while (room == sent) {
+    ++sent;
+    session->receive(UnitResult(result), [&] { ++room; });
+  }
+  const auto bytes = static_cast<std::size_t>(sent) * 2 * result.exr.size();
+  EXPECT_GT(bytes, limits::kMaxResultsWaiting);
+  EXPECT_LE(bytes - 2 * result.exr.size(), limits::kMaxResultsWaiting);
+  EXPECT_EQ(room, sent - 1) << "its stream is not read on";
+
+  for (Duration waited{}; waited < 2 * kNoGrowthLimit; waited += std::chrono::seconds(5)) {
+    clock->advance(std::chrono::seconds(5));
+    coordinator->tick();
+  }
+  EXPECT_EQ(coordinator->figures().units_freed["deadline passed"], 0u);
+
+  clock->shut(false);
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (room < sent && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+  EXPECT_EQ(room, sent);
+  EXPECT_EQ(coordinator->job(job)->units_done, 1u);
+}
+
+}  // namespace
+}  // namespace ls::coordinator

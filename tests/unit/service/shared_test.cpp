@@ -1,0 +1,174 @@
+// Jobs that come from a coordinator that is gone, and jobs that went to another.
+#include <gmock/gmock.h>
+
+#include <condition_variable>
+#include <fstream>
+#include <thread>
+
+#include "coordinator/store/memory_blobs.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/service/moving_store.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Blobs a network away that answers when a test lets it.
+class FarBlobs final : public MemoryBlobs {
+ public:
+  std::atomic<bool> away{false};
+  std::atomic<int> refused{0};
+  Result<bool> find(const Digest& digest) const override {
+    if (!away) return has(digest);
+    ++const_cast<FarBlobs*>(this)->refused;
+    return fail(Errc::unavailable, "S3 does not answer");
+  }
+};
+
+// Moved while the service's threads look at it.
+class SharedClock final : public Clock {
+ public:
+  TimePoint now() const override { return TimePoint{} + Duration{now_.load()}; }
+  void advance(Duration d) { now_ += d.count(); }
+
+ private:
+  std::atomic<Duration::rep> now_{0};
+};
+
+struct Shared : ::testing::Test {
+  TempFolder folder;
+  std::shared_ptr<SharedClock> clock = std::make_shared<SharedClock>();
+  std::shared_ptr<FarBlobs> blobs = std::make_shared<FarBlobs>();
+  std::shared_ptr<MovingStore> store = std::make_shared<MovingStore>();
+  std::unique_ptr<Coordinator> coordinator = open();
+
+  std::unique_ptr<Coordinator> open() {
+    Coordinator::Options options;
+    options.data = folder.path();
+    options.jobs = store;
+    options.blobs = blobs;
+    options.shared = true;
+    options.clock = clock;
+    options.audit_rate = 0;
+    return Coordinator::open(std::move(options)).value();
+  }
+  // A job as another coordinator had it.
+  StoredJob foreign(std::uint64_t spp = 16) {
+    JobSpec spec;
+    spec.spp = spp;
+    const JobId twin = submit(*coordinator, spec);
+    StoredJob job = store->jobs().value().back();
+    EXPECT_TRUE(coordinator->remove(twin));
+    EXPECT_TRUE(coordinator->remove(twin));
+    job.id = {"j-inherited"};
+    job.state = JobState::running;
+    return job;
+  }
+  void inherit(const StoredJob& job) {
+    store->will_tell({.inherited = {{job, "next-door"}}});
+    coordinator->tick();
+  }
+  // Waits for what the keeper's thread brings about.
+  template <class Condition>
+  static bool eventually(Condition condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::yield();
+    }
+    return true;
+  }
+};
+
+TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
+  const StoredJob job = foreign();
+  blobs->away = true;
+  inherit(job);
+  ASSERT_TRUE(eventually([&] { return blobs->refused == 1; }));
+  coordinator->tick();
+  EXPECT_FALSE(coordinator->job(job.id)) << "not failed: it is on its way";
+
+  blobs->away = false;
+  // It is put back after it was refused, and tried again after a pause.
+  ASSERT_TRUE(eventually([&] {
+    clock->advance(std::chrono::seconds(1));
+    coordinator->tick();
+    return coordinator->job(job.id).has_value();
+  }));
+
+  EXPECT_NE(coordinator->job(job.id)->state, JobState::failed) << coordinator->job(job.id)->error;
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job.id));
+  EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(16));
+}
+
+TEST_F(Shared, AFileThatIsNotThereIsStillToldAtOnce) {
+  StoredJob job = foreign();
+  job.assets.push_back({sha256("nowhere"), 3, "fog.vol"});
+  inherit(job);
+
+  ASSERT_TRUE(eventually([&] { return coordinator->job(job.id).has_value(); }));
+  EXPECT_EQ(coordinator->job(job.id)->state, JobState::failed);
+  EXPECT_THAT(coordinator->job(job.id)->error, testing::HasSubstr("fog.vol"));
+}
+
+// What lies here of a job is from when this coordinator had it before; it may be of another numeric class, too.
+TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
+  const StoredJob job = foreign(32);
+  {
+    inherit(job);
+    ASSERT_TRUE(eventually([&] { return coordinator->job(job.id).has_value(); }));
+    FakeFarm lying(*coordinator, 1);
+    lying.lies = [](int, const UnitResult&) { return true; };
+    lying.stop_after = 4;
+    lying.finish(job.id);
+  }
+  ASSERT_TRUE(store->remove_job(job.id));  // as the start after it has gone to another one does
+  coordinator.reset();
+  ASSERT_TRUE(std::filesystem::exists(folder.path() / "jobs" / job.id.value));
+  coordinator = open();
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "jobs" / job.id.value)) << "nobody's";
+
+  std::filesystem::create_directories(folder.path() / "jobs" / job.id.value);
+  std::ofstream(folder.path() / "jobs" / job.id.value / "film.snap") << "of another time";
+  inherit(job);
+  ASSERT_TRUE(eventually([&] { return coordinator->job(job.id).has_value(); }));
+
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "jobs" / job.id.value / "film.snap"));
+  EXPECT_EQ(coordinator->job(job.id)->units_done, 0u);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(job.id));
+  EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(32));
+}
+
+TEST_F(Shared, AJobThatGoesToAnotherIsToldAsMovedNotAsCancelled) {
+  auto request = SubmitRequest{"test.xml", kSceneText, {}, {}};
+  request.owner = "anna";
+  const JobId job = coordinator->submit(std::move(request)).value();
+  std::mutex mutex;
+  std::condition_variable heard;
+  std::vector<std::string> states, owners;
+  const auto listening = coordinator->subscribe(coordinator->last_event_id(), [&](const StreamEvent& event) {
+    if (event.type != "job") return;
+    const std::lock_guard lock(mutex);
+    states.push_back(nlohmann::json::parse(event.data)["state"]);
+    owners.push_back(event.owner);
+    heard.notify_all();
+  });
+  FakeFarm farm(*coordinator, 1);
+  farm.stop_after = 1;
+  farm.finish(job);
+
+  store->will_tell({.lost = {job}});
+  coordinator->tick();
+
+  std::unique_lock lock(mutex);
+  ASSERT_TRUE(heard.wait_for(lock, std::chrono::seconds(20), [&] { return !states.empty() && states.back() == "moved"; }));
+  EXPECT_THAT(states, testing::Not(testing::Contains("cancelled")));
+  EXPECT_EQ(owners.back(), "anna");
+  lock.unlock();
+  EXPECT_FALSE(coordinator->job(job));
+}
+
+}  // namespace
+}  // namespace ls::coordinator

@@ -1,0 +1,304 @@
+// A worker that renders wrong pixels: found, barred, and nothing of it left in the image, also over a restart.
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <thread>
+
+#include "coordinator/store/audit_file.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/service/moving_store.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+std::unique_ptr<Coordinator> open_audited(const std::filesystem::path& data, double rate) {
+  Coordinator::Options options;
+  options.data = data;
+  options.audit_rate = rate;
+  auto opened = Coordinator::open(std::move(options));
+  EXPECT_TRUE(opened) << (opened ? "" : opened.error().message);
+  return std::move(*opened);
+}
+
+JobSpec samples(std::uint64_t spp) {
+  JobSpec spec;
+  spec.spp = spp;
+  return spec;
+}
+
+TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
+  auto coordinator = open_audited({}, 1);
+  const JobId job = submit(*coordinator, samples(64));
+  FakeFarm farm(*coordinator, 4);
+  int lies = 0;
+  farm.lies = [&](int worker, const UnitResult&) { return worker == 2 && ++lies > 3; };
+
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
+  EXPECT_GT(lies, 3);
+  EXPECT_EQ(coordinator->audits().workers_barred, 1u);
+  EXPECT_GT(coordinator->audits().tiles_discarded, 0u);
+  EXPECT_THAT(coordinator->job_log(job).value(), testing::HasSubstr("both rendered it to"));
+  for (const WorkerView& worker : coordinator->workers()) {
+    EXPECT_EQ(worker.state, worker.name == "fake-2" ? "sick" : "connected") << worker.name;
+    if (worker.name == "fake-2") {
+      EXPECT_THAT(worker.activity, testing::HasSubstr("barred: it rendered tile"));
+    }
+  }
+}
+
+TEST(Trust, WhatALiarLeftInTheLogIsNotTakenUpAfterARestart) {
+  const TempFolder folder;
+  JobId job;
+  {
+    auto coordinator = open_audited(folder.path(), 1);
+    job = submit(*coordinator, samples(512));
+    FakeFarm farm(*coordinator, 4);
+    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
+    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+    farm.stop_after = farm.results_sent + 20;
+    farm.finish(job);
+    ASSERT_EQ(coordinator->job(job)->state, JobState::running);
+  }
+
+  auto coordinator = open_audited(folder.path(), 0);
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
+}
+
+TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
+  const TempFolder folder;
+  JobId job;
+  {
+    auto coordinator = open_audited(folder.path(), 1);
+    job = submit(*coordinator, samples(512));
+    FakeFarm farm(*coordinator, 3);
+    int lies = 0;
+    farm.lies = [&](int worker, const UnitResult&) { return worker == 0 && lies++ == 0; };
+    // Nobody renders anything a second time, so that nobody finds out.
+    std::set<UnitKey> seen;
+    farm.tamper = [&](UnitResult r) { return seen.insert(r.unit).second ? std::vector{r} : std::vector<UnitResult>{}; };
+    ASSERT_TRUE(farm.run([&] { return coordinator->audits().asked >= 3; }));
+    ASSERT_EQ(coordinator->audits().workers_barred, 0u);
+    ASSERT_EQ(lies > 0, true);
+    const auto file = folder.path() / "jobs" / job.value / "audits";
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (read_audits(file.parent_path()).size() < 3 && std::chrono::steady_clock::now() < patience)
+      std::this_thread::yield();
+    ASSERT_GE(read_audits(file.parent_path()).size(), 3u);
+  }
+
+  auto coordinator = open_audited(folder.path(), 0);
+  FakeFarm farm(*coordinator, 3);
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_GE(coordinator->audits().equal, 1u);
+  EXPECT_EQ(coordinator->audits().workers_barred, 1u) << "the first result was wrong";
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
+}
+
+TEST(Trust, ABarredWorkerStaysBarredOverARestart) {
+  const TempFolder folder;
+  WorkerId liar;
+  {
+    auto coordinator = open_audited(folder.path(), 1);
+    const JobId job = submit(*coordinator, samples(512));
+    FakeFarm farm(*coordinator, 4);
+    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
+    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+    for (const WorkerView& worker : coordinator->workers())
+      if (worker.name == "fake-2") liar = worker.id;
+  }
+
+  auto coordinator = open_audited(folder.path(), 1);
+  WorkerHello hello;
+  hello.name = "fake-2";
+  hello.numeric_class = sha256("fake class");
+  hello.previous_id = liar;
+  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+
+  ASSERT_TRUE(session);
+  ASSERT_EQ(coordinator->workers().size(), 1u);
+  EXPECT_EQ(coordinator->workers()[0].id, liar);
+  EXPECT_EQ(coordinator->workers()[0].state, "sick");
+  EXPECT_THAT(coordinator->workers()[0].activity, testing::StartsWith("barred: it rendered tile"));
+}
+
+TEST(Trust, ABarredWorkerStaysBarredWhenTheJobThatItWasFoundByIsGone) {
+  const TempFolder folder;
+  WorkerId liar;
+  {
+    auto coordinator = open_audited(folder.path(), 1);
+    const JobId job = submit(*coordinator, samples(512));
+    FakeFarm farm(*coordinator, 4);
+    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
+    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+    for (const WorkerView& worker : coordinator->workers())
+      if (worker.name == "fake-2") liar = worker.id;
+    ASSERT_TRUE(coordinator->remove(job)) << "cancelled";
+    ASSERT_TRUE(coordinator->remove(job)) << "gone";
+  }
+
+  auto coordinator = open_audited(folder.path(), 1);
+  ASSERT_TRUE(coordinator->jobs().empty());
+  WorkerHello hello;
+  hello.name = "fake-2";
+  hello.numeric_class = sha256("fake class");
+  hello.previous_id = liar;
+  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+
+  ASSERT_TRUE(session);
+  EXPECT_EQ(coordinator->workers()[0].id, liar);
+  EXPECT_EQ(coordinator->workers()[0].state, "sick");
+}
+
+struct FoundElsewhere : ::testing::Test {
+  TempFolder folder;
+  std::shared_ptr<MovingStore> store;
+
+  std::unique_ptr<Coordinator> open(bool on_disk = true) {
+    store = std::make_shared<MovingStore>(
+        on_disk ? std::shared_ptr<JobStore>(open_sqlite_job_store(folder.path() / "own.sqlite").value())
+                : std::shared_ptr<JobStore>(make_memory_job_store()));
+    Coordinator::Options options;
+    if (on_disk) options.data = folder.path();
+    options.jobs = store;
+    options.shared = true;
+    options.audit_rate = 0;
+    return Coordinator::open(std::move(options)).value();
+  }
+};
+
+TEST_F(FoundElsewhere, AWorkerHereIsBarredAtOnceAndItsTilesAreRenderedAgain) {
+  auto coordinator = open();
+  const JobId job = submit(*coordinator, samples(64));
+  FakeFarm farm(*coordinator, 2);
+  farm.lies = [&](int worker, const UnitResult&) { return worker == 1; };
+  ASSERT_TRUE(farm.run([&] { return farm.results_sent >= 6; }));
+  const WorkerId liar = coordinator->workers()[1].id;
+  store->will_tell({.barred = {{liar, "it lied to the coordinator next door"}}});
+
+  coordinator->tick();
+
+  EXPECT_EQ(coordinator->workers()[1].state, "sick");
+  EXPECT_EQ(coordinator->workers()[1].activity, "barred: it lied to the coordinator next door");
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
+}
+
+TEST_F(FoundElsewhere, AJobThatNamesALiarBringsItsNameAlong) {
+  auto coordinator = open(false);
+  const JobId known = submit(*coordinator, samples(16));
+  StoredJob job = store->jobs().value().at(0);
+  FakeFarm farm(*coordinator, 2);
+  job.id = {"j-inherited"};
+  job.distrusted = {coordinator->workers()[1].id};
+  store->will_tell({.inherited = {{job, "the one next door"}}});
+
+  coordinator->tick();
+  while (!coordinator->job(job.id)) std::this_thread::yield();
+
+  EXPECT_EQ(coordinator->workers()[1].state, "sick");
+  EXPECT_EQ(coordinator->workers()[0].state, "connected");
+}
+
+// Its image of before stands; but nothing of it goes into a larger one.
+TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
+  for (const bool on_disk : {true, false}) {
+    auto coordinator = open(on_disk);
+    const JobId job = submit(*coordinator, samples(16));
+    {
+      FakeFarm lying(*coordinator, 1);
+      lying.lies = [](int, const UnitResult&) { return true; };
+      ASSERT_TRUE(lying.finish(job));
+      ASSERT_NE(pixels(*coordinator, job), reference_pixels(16));
+      store->will_tell({.barred = {{coordinator->workers()[0].id, "it lied elsewhere"}}});
+      coordinator->tick();
+    }
+    ASSERT_TRUE(coordinator->extend(job, 64));
+    FakeFarm honest(*coordinator, 1);
+    if (on_disk) {  // and also after a restart in the middle of it
+      honest.stop_after = 3;
+      honest.finish(job);
+      coordinator.reset();
+      coordinator = open();
+      FakeFarm more(*coordinator, 1);
+      ASSERT_TRUE(more.finish(job));
+    } else {
+      ASSERT_TRUE(honest.finish(job));
+    }
+    EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64)) << on_disk;
+  }
+}
+
+TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsBarredTheJobsWait) {
+  store = std::make_shared<MovingStore>();
+  Coordinator::Options options;
+  options.jobs = store;
+  options.audit_rate = 1;
+  auto coordinator = Coordinator::open(std::move(options)).value();
+  const JobId job = submit(*coordinator, samples(64));
+  FakeFarm farm(*coordinator, 4);
+  farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
+  store->refuses_to_bar = true;
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+
+  EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
+  EXPECT_THAT(coordinator->job(job)->error, testing::HasSubstr("the disk is full"));
+  EXPECT_FALSE(coordinator->resume(job));
+  store->refuses_to_bar = false;
+  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
+  EXPECT_EQ(store->barred().value().size(), 1u);
+}
+
+TEST(Trust, AbsurdTimesOfAWorkerCountForNothingAndTheRecordStaysReadable) {
+  const TempFolder folder;
+  JobId job;
+  {
+    auto coordinator = open_audited(folder.path(), 0);
+    job = submit(*coordinator, samples(16));
+    FakeFarm farm(*coordinator, 1);
+    farm.tamper = [](UnitResult r) {
+      r.cpu_seconds = 1.7e308;
+      r.times.load = 1.7e308;
+      return std::vector{std::move(r)};
+    };
+    ASSERT_TRUE(farm.finish(job));
+    EXPECT_EQ(coordinator->job(job)->core_seconds, 0);
+  }
+
+  auto coordinator = open_audited(folder.path(), 0);
+
+  EXPECT_EQ(coordinator->job(job)->state, JobState::done) << coordinator->job(job)->error;
+  EXPECT_TRUE(coordinator->image_exr(job));
+}
+
+TEST(Trust, AJobTooLargeForEveryWorkerSaysSoInItsView) {
+  auto coordinator = open_audited({}, 0);
+  JobSpec spec = samples(4);
+  spec.memory = 8ull << 30;
+  spec.max_workers = 3;
+  const JobId job = submit(*coordinator, spec);
+  WorkerHello hello;
+  hello.name = "small";
+  hello.numeric_class = sha256("fake class");
+  hello.memory_bytes = 2ull << 30;
+  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+
+  const JobView view = coordinator->job(job).value();
+
+  EXPECT_EQ(view.error, "small has 2.0 GiB of memory and the job needs at least 8.0 GiB");
+  EXPECT_EQ(view.memory_bytes, 8ull << 30);
+  EXPECT_EQ(view.max_workers, 3u);
+  EXPECT_EQ(coordinator->workers()[0].memory_bytes, 2ull << 30);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
