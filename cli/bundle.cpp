@@ -58,6 +58,9 @@ std::string spec_query(const JobSpec& spec, bool with_priority) {
   if (spec.float_output) query.add("float", "true");
   if (!spec.tags.empty()) query.add("tags", fmt::format("{}", fmt::join(spec.tags, ",")));
   if (spec.frames) query.add("frames", to_string(*spec.frames));
+  query.add("max_workers", spec.max_workers);
+  query.add("max_units", spec.max_units);
+  query.add("memory", spec.memory);
   if (spec.reference) query.add("reference", spec.reference->hex());
   return query.take();
 }

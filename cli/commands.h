@@ -15,6 +15,7 @@ void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
 void add_farm_commands(CLI::App& app,
                        Action& action);  // jobs, show, watch, pause, resume, cancel, extend, fetch, workers
+void add_tokens(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
 void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);

@@ -17,6 +17,9 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxShownBody = 300;
 constexpr std::size_t kDigestsPerQuestion = 10'000;
+// Smaller files are sent again whole where the connection broke, and cost one request instead of two.
+constexpr std::uintmax_t kSentInParts = 1u << 20;
+constexpr int kBarrenAttempts = 8;  // one after the other, after which the coordinator has no byte more
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -135,6 +138,16 @@ FarmApi::Answer<json> FarmApi::patch(const std::string& path, const json& body) 
   return as_json(client_.request("PATCH", path, body.dump()));
 }
 
+FarmApi::Answer<json> FarmApi::post(const std::string& path, const json& body) {
+  return as_json(client_.request("POST", path, body.dump()));
+}
+
+FarmApi::Answer<void> FarmApi::remove(const std::string& path) {
+  const auto response = checked(client_.request("DELETE", path));
+  if (!response) return tl::unexpected(response.error());
+  return {};
+}
+
 FarmApi::Answer<std::string> FarmApi::get_text(const std::string& path) {
   auto response = checked(client_.request("GET", path));
   if (!response) return tl::unexpected(response.error());
@@ -167,9 +180,8 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
       if (found == by_digest.end()) continue;
       const std::string path = "/api/v1/blobs/" + found->first;
       if (found->second) said(fmt::format("sending {}", found->second->path.string()));
-      const auto put = patiently([&] {  // by digest: sending it twice does no harm
-        return checked(found->second ? client_.upload(path, found->second->path)
-                                     : client_.request("PUT", path, scene.text, "application/octet-stream"));
+      const auto put = found->second ? send_file(path, found->second->path) : patiently([&] {
+        return checked(client_.request("PUT", path, scene.text, "application/octet-stream"));
       });
       if (!put) return tl::unexpected(put.error());
     }
@@ -177,16 +189,46 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
   return {};
 }
 
+// By digest: sending twice does no harm.
+FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::file_size(file, error) < kSentInParts || error)
+    return patiently([&] { return checked(client_.upload(path, file)); });
+  Sending sending;
+  while (true) {
+    auto put = send_rest(path, file, sending);
+    if (put || sending.barren > kBarrenAttempts || !sending.patience.again(put.error().error)) return put;
+  }
+}
+
+// What the coordinator has not got yet.
+FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const std::filesystem::path& file,
+                                                 Sending& sending) {
+  auto there = client_.request("HEAD", path);
+  if (!there) return refused(there.error());
+  if (there->status / 100 == 2) return std::move(*there);
+  if (there->status != 404) return checked(std::move(there));
+  const std::uint64_t offset = there->upload_offset.value_or(0);
+  sending.barren = offset > sending.reached ? 0 : sending.barren + 1;
+  sending.reached = std::max(sending.reached, offset);
+  auto put = client_.upload(path, file, offset);
+  sending.patience.answered();
+  // Between question and part came what an earlier connection still brought in.
+  if (put && put->status == 409) return refused({Errc::unavailable, problem_of(*put).error.message});
+  return checked(std::move(put));
+}
+
 FarmApi::Answer<Digest> FarmApi::upload(const std::filesystem::path& file,
-                                       const std::function<void(const std::string&)>& said) {
+                                        const std::function<void(const std::string&)>& said) {
   const auto digest = sha256_file(file);
   if (!digest) return refused({Errc::invalid_argument, digest.error().message});
   const json question{{"digests", {digest->hex()}}};
   const auto answer = as_json(client_.request("POST", "/api/v1/blobs/missing", question.dump()));
   if (!answer) return tl::unexpected(answer.error());
-  if (const auto missing = answer->find("missing"); missing != answer->end() && missing->empty()) return *digest;
+  if (const auto missing = answer->find("missing"); missing != answer->end() && missing->empty())
+    return *digest;
   said(fmt::format("sending {}", file.string()));
-  const auto put = patiently([&] { return checked(client_.upload("/api/v1/blobs/" + digest->hex(), file)); });
+  const auto put = send_file("/api/v1/blobs/" + digest->hex(), file);
   if (!put) return tl::unexpected(put.error());
   return *digest;
 }

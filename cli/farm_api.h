@@ -9,6 +9,7 @@
 
 #include "cli/http_client.h"
 #include "cli/local_scene.h"
+#include "cli/patience.h"
 #include "coordinator/service.h"
 
 namespace ls::cli {
@@ -28,6 +29,8 @@ class FarmApi {
   static Result<FarmApi> open(const FarmOptions& options);
 
   Answer<Json> get(const std::string& path);
+  Answer<Json> post(const std::string& path, const Json& body);
+  Answer<void> remove(const std::string& path);
   Answer<Json> patch(const std::string& path, const Json& body);
   Answer<std::string> get_text(const std::string& path);
   Answer<void> download(const std::string& path, const std::filesystem::path& file);
@@ -46,6 +49,15 @@ class FarmApi {
   explicit FarmApi(HttpClient client) : client_(std::move(client)) {}
   Answer<void> upload_missing(const LocalScene& scene, const JobSpec& spec, const Digest& text,
                               const std::function<void(const std::string&)>& said);
+  // Sends a file, and goes on behind what arrived where the connection breaks.
+  Answer<HttpResponse> send_file(const std::string& path, const std::filesystem::path& file);
+  struct Sending {
+    Patience patience;
+    std::uint64_t reached = 0;  // the most that the coordinator said it has
+    int barren = 0;             // attempts since it had more
+  };
+  Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file, Sending& sending);
+
   HttpClient client_;
 };
 

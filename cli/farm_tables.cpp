@@ -98,6 +98,16 @@ std::string jobs_table(const json& answer) {
   return rows.size() == 1 ? "no jobs" : table(rows);
 }
 
+std::string tokens_table(const json& answer) {
+  std::vector<Row> rows{{"ID", "ROLE", "USER", ""}};
+  for (const json& t : objects(answer, "tokens")) {
+    const bool of_file = t.value("of_file", json()) == json(true);
+    rows.push_back({text(t, "id"), text(t, "role"), text(t, "user"),
+                    of_file ? text(t, "role") == "join" ? "DATA/join-token" : "DATA/token" : ""});
+  }
+  return table(rows);
+}
+
 std::string workers_table(const json& answer) {
   std::vector<Row> rows{{"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "JOB", "ACTIVITY"}};
   for (const json& w : objects(answer, "workers")) {

@@ -7,6 +7,7 @@
 namespace ls::cli {
 
 std::string jobs_table(const nlohmann::json& answer);     // of GET /jobs
+std::string tokens_table(const nlohmann::json& answer);   // of GET /tokens
 std::string workers_table(const nlohmann::json& answer);  // of GET /workers
 std::string job_text(const nlohmann::json& job);          // of GET /jobs/ID
 

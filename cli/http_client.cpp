@@ -3,9 +3,13 @@
 #include <curl/curl.h>
 #include <fmt/format.h>
 
+#include <strings.h>
+
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <mutex>
+#include <vector>
 
 namespace ls::cli {
 namespace {
@@ -13,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr long kConnectSeconds = 15;
-constexpr long kStallSeconds = 60;   // without a byte
+constexpr long kStallSeconds = 60;  // without a byte
+constexpr long kRedirects = 3;
 constexpr long kWorkSeconds = 3600;  // the same while the other side works
 
 struct CloseFile {
@@ -52,6 +57,19 @@ struct Receiver {
   }
 };
 
+std::size_t take_header(char* data, std::size_t size, std::size_t count, void* response_pointer) {
+  constexpr std::string_view kName = "Upload-Offset:";
+  std::string_view line(data, size * count);
+  if (line.size() < kName.size() || ::strncasecmp(line.data(), kName.data(), kName.size()) != 0)
+    return size * count;
+  line.remove_prefix(kName.size());
+  line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+  std::uint64_t offset = 0;
+  if (std::from_chars(line.data(), line.data() + line.size(), offset).ec == std::errc())
+    static_cast<HttpResponse*>(response_pointer)->upload_offset = offset;
+  return size * count;
+}
+
 std::size_t read_file_chunk(char* data, std::size_t size, std::size_t count, void* file) {
   return std::fread(data, 1, size * count, static_cast<std::FILE*>(file));
 }
@@ -71,12 +89,15 @@ Result<void> check_url(const std::string& url) {
 
 struct HttpClient::State {
   Options options;
+  std::vector<std::string> urls;
+  std::size_t current = 0;  // of them: the one that answered last
   CURL* curl = nullptr;
   long stall_seconds = kStallSeconds;
   ~State() { curl_easy_cleanup(curl); }
 
   Result<HttpResponse> perform(const std::string& path, const Headers& headers, std::FILE* save);
-  Result<HttpResponse> send(const std::string& path, const fs::path& file, std::string_view content_type);
+  Result<HttpResponse> send(const std::string& path, const fs::path& file, std::string_view content_type,
+                            std::optional<std::uint64_t> offset = std::nullopt);
   void set_common(const std::string& url, const Headers& headers);
   Headers headers() const {
     Headers list;
@@ -86,8 +107,15 @@ struct HttpClient::State {
 };
 
 Result<HttpClient> HttpClient::open(Options options) {
-  while (options.url.ends_with('/')) options.url.pop_back();
-  if (auto ok = check_url(options.url); !ok) return tl::unexpected(ok.error());
+  std::vector<std::string> urls;
+  for (std::size_t at = 0; at <= options.url.size();) {
+    const std::size_t comma = std::min(options.url.find(',', at), options.url.size());
+    std::string url = options.url.substr(at, comma - at);
+    while (url.ends_with('/')) url.pop_back();
+    if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
+    urls.push_back(std::move(url));
+    at = comma + 1;
+  }
   if (std::any_of(options.token.begin(), options.token.end(),
                   [](unsigned char c) { return c <= ' ' || c >= 0x7f; }))
     return fail(Errc::invalid_argument, "the token has characters that a token cannot have");
@@ -98,6 +126,7 @@ Result<HttpClient> HttpClient::open(Options options) {
   std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
   auto state = std::make_unique<State>();
   state->options = std::move(options);
+  state->urls = std::move(urls);
   state->curl = curl_easy_init();
   if (!state->curl) return fail(Errc::internal, "libcurl cannot be started");
   return HttpClient(std::move(state));
@@ -113,6 +142,12 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
   curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
   curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+  // A coordinator sends us to the one that has a job; both are of the farm that we were given the token for.
+  // But what was to go by TLS goes nowhere without.
+  curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 1L);
+  curl_easy_setopt(curl, CURLOPT_MAXREDIRS, kRedirects);
+  curl_easy_setopt(curl, CURLOPT_REDIR_PROTOCOLS_STR, url.starts_with("https:") ? "https" : "http,https");
+  curl_easy_setopt(curl, CURLOPT_UNRESTRICTED_AUTH, 1L);
   curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
   curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
   curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, stall_seconds);
@@ -122,15 +157,21 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
 
 Result<HttpResponse> HttpClient::State::perform(const std::string& path, const Headers& headers,
                                                 std::FILE* save) {
-  const std::string url = options.url + path;
   HttpResponse response;
   Receiver receiver{curl, &response, save};
   char problem[CURL_ERROR_SIZE] = "";
-  set_common(url, headers);
   curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, &Receiver::receive);
   curl_easy_setopt(curl, CURLOPT_WRITEDATA, &receiver);
+  curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, &take_header);
+  curl_easy_setopt(curl, CURLOPT_HEADERDATA, &response);
   curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, problem);
-  const CURLcode code = curl_easy_perform(curl);
+  CURLcode code = CURLE_OK;
+  for (std::size_t tried = 0; tried < urls.size(); ++tried) {
+    set_common(urls[current] + path, headers);
+    code = curl_easy_perform(curl);
+    if (code != CURLE_COULDNT_CONNECT || urls.size() == 1) break;
+    current = (current + 1) % urls.size();  // nothing was sent
+  }
   long status = 0;
   char* type = nullptr;
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
@@ -146,8 +187,17 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
     return fail(Errc::resource_exhausted, "the answer cannot be written: is the disk full?");
   // An upload that was refused midway: the answer says more than the broken connection.
   if (code == CURLE_SEND_ERROR && status >= 400) return response;
-  return fail(Errc::unavailable, fmt::format("{} cannot be reached: {}", options.url,
-                                             *problem ? problem : curl_easy_strerror(code)));
+  const std::string asked = urls[current];
+  if (code == CURLE_UNSUPPORTED_PROTOCOL)
+    return fail(Errc::unavailable,
+                fmt::format("{} sends this on to an address that is not https: no token goes there; let the "
+                            "coordinators name each other by https (--public-http)",
+                            asked));
+  if (code != CURLE_COULDNT_CONNECT) current = (current + 1) % urls.size();
+  return fail(Errc::unavailable,
+              fmt::format("{} cannot be reached: {}",
+                          urls.size() > 1 && code == CURLE_COULDNT_CONNECT ? options.url : asked,
+                          *problem ? problem : curl_easy_strerror(code)));
 }
 
 Result<HttpResponse> HttpClient::request(std::string_view method, const std::string& path,
@@ -155,7 +205,9 @@ Result<HttpResponse> HttpClient::request(std::string_view method, const std::str
   Headers headers = state_->headers();
   const std::string verb(method);
   CURL* curl = state_->curl;
-  if (verb != "GET") {
+  if (verb == "HEAD") {
+    curl_easy_setopt(curl, CURLOPT_NOBODY, 1L);
+  } else if (verb != "GET") {
     add(headers, fmt::format("Content-Type: {}", content_type));
     curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body.size()));
     curl_easy_setopt(curl, CURLOPT_COPYPOSTFIELDS, body.empty() ? "" : body.data());
@@ -166,22 +218,30 @@ Result<HttpResponse> HttpClient::request(std::string_view method, const std::str
 
 // With PUT, unless another method is set.
 Result<HttpResponse> HttpClient::State::send(const std::string& path, const fs::path& file,
-                                             std::string_view content_type) {
+                                             std::string_view content_type,
+                                             std::optional<std::uint64_t> offset) {
   const FilePtr source(std::fopen(file.c_str(), "rbe"));
   std::error_code error;
   const auto bytes = fs::file_size(file, error);
   if (!source || error) return fail(Errc::not_found, fmt::format("{} cannot be read", file.string()));
+  const std::uint64_t from = offset.value_or(0);
+  if (from > bytes || ::fseeko(source.get(), static_cast<off_t>(from), SEEK_SET) != 0)
+    return fail(Errc::not_found, fmt::format("{} has no byte {}: has it changed?", file.string(), from));
   Headers list = headers();
   add(list, fmt::format("Content-Type: {}", content_type));
+  if (offset)
+    add(list, from < bytes ? fmt::format("Content-Range: bytes {}-{}/{}", from, bytes - 1, bytes)
+                           : fmt::format("Content-Range: bytes */{}", bytes));
   curl_easy_setopt(curl, CURLOPT_UPLOAD, 1L);
-  curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes));
+  curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes - from));
   curl_easy_setopt(curl, CURLOPT_READFUNCTION, &read_file_chunk);
   curl_easy_setopt(curl, CURLOPT_READDATA, source.get());
   return perform(path, list, nullptr);
 }
 
-Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file) {
-  return state_->send(path, file, "application/octet-stream");
+Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file,
+                                        std::optional<std::uint64_t> offset) {
+  return state_->send(path, file, "application/octet-stream", offset);
 }
 
 Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::path& file,

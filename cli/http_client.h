@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,12 +16,15 @@ struct HttpResponse {
   int status = 0;
   std::string content_type;
   std::string body;
+  std::optional<std::uint64_t> upload_offset;  // its header of this name
 };
 
 class HttpClient {
  public:
   struct Options {
-    std::string url;    // "https://farm.example:8080"; http or https, with or without a path before /api
+    // "https://farm.example:8080"; http or https, with or without a path before /api. Several, separated by commas,
+    // where several coordinators share a farm: what one does not answer the next one is asked.
+    std::string url;
     std::string token;  // sent as a bearer token; may be empty
     std::string ca;     // file of certificates to trust instead of the system's; may be empty
   };
@@ -34,8 +38,10 @@ class HttpClient {
   // response.
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
-  // PUTs the bytes of a file, without holding them in memory.
-  Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file);
+  // PUTs the bytes of a file, without holding them in memory; with an offset those behind it, as a part of the whole
+  // that the other side keeps if the connection breaks.
+  Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
+                              std::optional<std::uint64_t> offset = std::nullopt);
   // POSTs them; the coordinator may take up to an hour to answer, as it unpacks them first.
   Result<HttpResponse> post_file(const std::string& path, const std::filesystem::path& file,
                                  std::string_view content_type);

@@ -5,10 +5,10 @@
 
 #include "cli/commands.h"
 #include "cli/inspection.h"
-#include "cli/instructions.h"
 #include "cli/job_options.h"
 #include "cli/local_world.h"
 #include "cli/say.h"
+#include "cli/variants.h"
 #include "worker/machine.h"
 #include "worker/render/counters_list.h"
 
@@ -37,21 +37,14 @@ tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const Local
   spec.size = small(full);
   const auto built = build_local_world(scene, spec, worker::usable_cpus());
   if (!built) return tl::unexpected(built.error());
-  VariantBitsList out;
-  const auto counter = InstructionCounter::open();
-  if (!counter) out.uncounted = counter.error().message;
-  const auto now = [&] { return counter ? counter->read().value_or(0) : 0; };
   const PixelRect all{0, 0, spec.size->width, spec.size->height};
   const double paths =
       static_cast<double>(all.pixels()) * static_cast<double>(kSmallSamples.s1 - kSmallSamples.s0);
-  for (const std::string& name : render::covering_variants(*built->world)) {
-    const std::uint64_t before = now();
-    const auto tile = render::render_tile_as(*built->world, name, all, kSmallSamples);
-    const std::uint64_t executed = now() - before;
-    out.all.push_back({name, sha256(std::as_bytes(std::span(tile.sums))),
-                       executed > 0 ? std::optional(static_cast<double>(executed) / paths) : std::nullopt});
-  }
-  return out;
+  return measure_variants(render::covering_variants(*built->world), paths, InstructionCounter::open(),
+                          [&](const std::string& name) {
+                            const auto tile = render::render_tile_as(*built->world, name, all, kSmallSamples);
+                            return sha256(std::as_bytes(std::span(tile.sums)));
+                          });
 }
 
 // What a small image takes, by kind.

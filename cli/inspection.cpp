@@ -142,11 +142,14 @@ std::string memory(const ordered_json& j) {
   return table.text() + fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
-// What the parts that are left out would cost.
-std::string instructions(double per_path, double cheapest) {
-  const std::string more =
-      per_path == cheapest ? "" : fmt::format(", {:+.1f} %", 100 * (per_path / cheapest - 1));
-  return fmt::format("{:.0f} instructions a path{}", per_path, more);
+// What the parts that are left out would cost. Either is null where it could not be counted.
+std::string instructions(const ordered_json& per_path, const ordered_json& cheapest) {
+  if (per_path.is_null()) return "";
+  const double n = per_path;
+  const std::string more = cheapest.is_null() || cheapest == per_path
+                               ? ""
+                               : fmt::format(", {:+.1f} %", 100 * (n / cheapest.get<double>() - 1));
+  return fmt::format("{:.0f} instructions a path{}", n, more);
 }
 
 std::string variants(const ordered_json& j) {
@@ -154,13 +157,12 @@ std::string variants(const ordered_json& j) {
   if (rendered == j.end()) return "";
   Table table("every instantiation that covers the scene, on a small image");
   const auto& first = rendered->front().at("instructions_per_path");
-  for (const auto& v : *rendered) {
-    const auto& n = v.at("instructions_per_path");
+  for (const auto& v : *rendered)
     table.add({text_at(v, "variant"), text_at(v, "sums_sha256"),
-               n.is_null() ? "" : instructions(n.get<double>(), first.get<double>())});
-  }
+               instructions(v.at("instructions_per_path"), first)});
   const std::string uncounted =
-      first.is_null() ? fmt::format("instructions are not counted: {}\n", text_at(j, "uncounted")) : "";
+      j.contains("uncounted") ? fmt::format("instructions are not counted: {}\n", text_at(j, "uncounted"))
+                              : "";
   return table.text() + (j.at("variants_agree") ? "the same bits\n" : "DIFFERENT BITS: this is a bug\n") +
          uncounted;
 }

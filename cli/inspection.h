@@ -3,25 +3,12 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "cli/local_world.h"
+#include "cli/variants.h"
 
 namespace ls::cli {
-
-// Of a small rendering by one of the integrator's instantiations.
-struct VariantBits {
-  std::string name;
-  Digest sums;
-  std::optional<double> instructions;  // a path; nothing where they cannot be counted
-};
-// By every one that covers the scene, the cheapest first, which is the one that it is rendered with.
-struct VariantBitsList {
-  std::vector<VariantBits> all;  // empty: not asked for
-  std::string uncounted;         // why there are no instructions
-};
 
 nlohmann::ordered_json inspection(const LocalScene& scene, const LocalWorld& built,
                                   const VariantBitsList& variants);

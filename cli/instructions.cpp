@@ -17,8 +17,7 @@ std::string why(int error) {
     case EACCES:
     case EPERM:
       return "the system keeps the processor's counters from its users: kernel.perf_event_paranoid of 2 or "
-             "less "
-             "allows them";
+             "less allows them";
     case ENOENT:
     case ENODEV:
     case EOPNOTSUPP:
@@ -30,16 +29,21 @@ std::string why(int error) {
 
 }  // namespace
 
-Result<InstructionCounter> InstructionCounter::open() {
+int InstructionCounter::of_this_thread() {
   perf_event_attr what{};
   what.size = sizeof what;
   what.type = PERF_TYPE_HARDWARE;
   what.config = PERF_COUNT_HW_INSTRUCTIONS;
   what.exclude_kernel = 1;
   what.exclude_hv = 1;
+  what.inherit = 1;
   constexpr int kThisThread = 0, kAnyCpu = -1, kNoGroup = -1;
-  const auto fd = static_cast<int>(
+  return static_cast<int>(
       syscall(SYS_perf_event_open, &what, kThisThread, kAnyCpu, kNoGroup, PERF_FLAG_FD_CLOEXEC));
+}
+
+Result<InstructionCounter> InstructionCounter::open(int (*opener)()) {
+  const int fd = opener();
   if (fd < 0) return fail(Errc::unavailable, why(errno));
   return InstructionCounter(fd);
 }

@@ -58,6 +58,18 @@ Result<std::uint64_t> parse_whole(const std::string& what, const std::string& te
   return *value;
 }
 
+Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text) {
+  const std::string_view units = "KMGT";
+  const std::size_t unit = text.empty() ? std::string_view::npos : units.find(text.back());
+  const bool scaled = unit != std::string_view::npos;
+  const auto value = number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
+  const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
+  if (!value || *value == 0 || *value > kMaxMemory >> shift)
+    return wrong(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T", what, text,
+                             kMaxMemory >> 40));
+  return *value << shift;
+}
+
 Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
   const auto value = number<double>(text);
   if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
@@ -131,12 +143,16 @@ Result<JobSpec> JobOptions::parse() const {
     return [=](const std::string& text) { return parse_positive(name, text, most); };
   };
   std::optional<int> priority_value;
+  std::optional<std::uint64_t> workers, units;
   for (const auto& taken :
        {take(spp, spec.spp, whole("--spp", 1, kMaxSpp)),
         take(target_error, spec.target_error, positive("--target-error", kMaxTargetError)),
         take(time, spec.time, positive("--time", kMaxSeconds)),
         take(seed, spec.seed, whole("--seed", 0, ~std::uint64_t{0})), take(size, spec.size, parse_size),
-        take(priority, priority_value, parse_priority)})
+        take(priority, priority_value, parse_priority),
+        take(max_workers, workers, whole("--max-workers", 1, kMaxAtOnce)),
+        take(max_units, units, whole("--max-units", 1, kMaxAtOnce)),
+        take(memory, spec.memory, [](const std::string& text) { return parse_bytes("--memory", text); })})
     if (!taken) return tl::unexpected(taken.error());
   if (!integrator.empty()) spec.integrator = integrator;
   auto values = parse_defines(defines);
@@ -154,6 +170,8 @@ Result<JobSpec> JobOptions::parse() const {
   spec.priority = priority_value.value_or(0);
   spec.float_output = float_output;
   spec.tags = tags;
+  if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
+  if (units) spec.max_units = static_cast<std::uint32_t>(*units);
   return spec;
 }
 

@@ -15,6 +15,7 @@ namespace ls::cli {
 // Numbers are kept as text until parse(), so that the messages are ours.
 struct JobOptions {
   std::string spp, target_error, time, seed, size, integrator, priority, frames;
+  std::string max_workers, max_units, memory;
   std::vector<std::string> aov, defines, tags;
   bool float_output = false;
   bool strict = false;
@@ -27,6 +28,7 @@ struct JobOptions {
 // "--spp 64" and the like. `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);
+Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);  // "8G": powers of 1024
 Result<double> parse_positive(const std::string& what, const std::string& text, double most);
 Result<FrameSize> parse_size(const std::string& text);             // "640x360"
 Result<std::pair<int, int>> parse_pixel(const std::string& text);  // "12,34"

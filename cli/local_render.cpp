@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "cli/html_report.h"
+#include "cli/instructions.h"
 #include "cli/interrupt.h"
 #include "cli/local_farm.h"
 #include "cli/local_world.h"
@@ -32,9 +33,7 @@ struct Keepers {
   std::mutex mutex;
   std::optional<Error> trouble;  // the first; guarded by mutex
 
-  Result<void> add(const UnitResult& result) {
-    return partials ? partials->keep(result) : Result<void>{};
-  }
+  Result<void> add(const UnitResult& result) { return partials ? partials->keep(result) : Result<void>{}; }
 };
 
 Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
@@ -104,8 +103,7 @@ class LocalRender {
     for (const std::string& warning : view->warnings)
       fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
     if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
-    if (const auto opened = open_keepers(keepers_, options_); !opened)
-      return say_error(opened.error());
+    if (const auto opened = open_keepers(keepers_, options_); !opened) return say_error(opened.error());
     if (const auto started = start(); !started) return say_error(started.error());
     wait_with_progress(farm_->coordinator(), job_, options_.quiet);
     farm_->stop();
@@ -168,7 +166,8 @@ class LocalRender {
       if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
     const auto told = coordinator.report_json(job_);
     if (!told) return tl::unexpected(told.error());
-    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut};
+    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut,
+                     counter_.and_then([](const InstructionCounter& c) { return c.read(); })};
     const auto report = local_report(*told, facts);
     if (!report) return tl::unexpected(report.error());
     if (options_.report)
@@ -186,6 +185,7 @@ class LocalRender {
   const LocalScene& scene_;
   const LocalRenderOptions& options_;
   Interrupt interrupt_;  // before anything that has threads
+  Result<InstructionCounter> counter_ = InstructionCounter::open();
   Keepers keepers_;
   std::unique_ptr<LocalFarm> farm_;
   JobId job_;

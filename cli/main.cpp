@@ -43,6 +43,7 @@ int main(int argc, char** argv) {
   add_convert(app, action);
   add_submit(app, action);
   add_farm_commands(app, action);
+  add_tokens(app, action);
   add_merge(app, action);
   add_validate(app, action);
   add_verify(app, action);

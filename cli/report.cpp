@@ -42,6 +42,13 @@ Result<std::string> local_report(const std::string& report, const LocalFacts& fa
   j["peak_rss_bytes"] = facts.peak_rss_bytes;
   j["threads"] = facts.threads;
   if (facts.interrupted) j["stopped"] = "user";
+  if (facts.instructions) {
+    const double samples = number(j, "samples");
+    j["instructions"] = {{"count", *facts.instructions}};
+    if (samples > 0) j["instructions"]["per_sample"] = static_cast<double>(*facts.instructions) / samples;
+  } else {
+    j["instructions"] = {{"uncounted", facts.instructions.error().message}};
+  }
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

@@ -15,6 +15,7 @@ struct LocalFacts {
   std::uint64_t peak_rss_bytes = 0;
   int threads = 1;
   bool interrupted = false;
+  Result<std::uint64_t> instructions = 0;  // of the whole process; an error: why they were not counted
 };
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
 

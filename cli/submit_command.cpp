@@ -119,6 +119,10 @@ void add_submit(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("A,B");
+  submit->add_option("--max-workers", flags->job.max_workers, "at most so many workers at once")->type_name("N");
+  submit->add_option("--max-units", flags->job.max_units, "at most so many units lent to workers at once")
+      ->type_name("N");
+  submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")->type_name("BYTES");
   submit
       ->add_option("--reference", flags->reference,
                    "the right image: every checkpoint is compared with it. Of another seed than the job's")

@@ -138,4 +138,28 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
   return m;
 }
 
+Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
+                                std::uint64_t seed, int threads, std::uint64_t frames) {
+  Measured all;
+  std::array<double, 4> squares{};  // of deviations from the mean so far (Welford)
+  for (std::uint64_t i = 0; i < frames; ++i) {
+    const auto frame = measure(scene, files, paths / frames, seed + i * 0x9e3779b97f4a7c15ull, threads);
+    if (!frame) return tl::unexpected(frame.error());
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double before = frame->mean[k] - all.mean[k];
+      all.mean[k] += before / static_cast<double>(i + 1);
+      squares[k] += before * (frame->mean[k] - all.mean[k]);
+    }
+    add(all.health, frame->health);
+    all.paths += frame->paths;
+    all.seconds += frame->seconds;
+  }
+  const auto n = static_cast<double>(frames);
+  for (std::size_t k = 0; k < 4; ++k) {
+    all.standard_error[k] = std::sqrt(squares[k] / (n * (n - 1)));
+    all.freedom[k] = n - 1;
+  }
+  return all;
+}
+
 }  // namespace ls::cli

@@ -35,4 +35,9 @@ struct Measured {
 Result<Measured> measure(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                          std::uint64_t seed, int threads);
 
+// The mean of that many (2 or more) such frames, each with seeds of its own and its share of the paths; the
+// error is that of a mean of independent figures, with one degree of freedom less than there are.
+Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
+                                std::uint64_t seed, int threads, std::uint64_t frames);
+
 }  // namespace ls::cli

@@ -60,24 +60,35 @@ Result<void> check_same(const SealedImage& image, const LocalScene& scene, const
   return {};
 }
 
+// Tiles that were not rendered are neither right nor wrong.
+struct Tally {
+  std::size_t right = 0, wrong = 0, stopped = 0;
+};
+Tally tally_of(const std::vector<VerifiedTile>& tiles) {
+  Tally t;
+  for (const VerifiedTile& v : tiles) ++(v.stopped ? t.stopped : v.wrong() ? t.wrong : t.right);
+  return t;
+}
+
+std::string verdict_of(const VerifiedTile& t) { return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass"; }
+
 nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, std::uint64_t seed) {
   nlohmann::ordered_json j{{"seed", seed}, {"tiles", nlohmann::ordered_json::array()}};
-  std::size_t wrong = 0;
   for (const VerifiedTile& t : tiles) {
-    wrong += t.problem.empty() ? 0 : 1;
     j["tiles"].push_back({{"tile", t.tile},
                           {"rect", {t.rect.x0, t.rect.y0, t.rect.x1, t.rect.y1}},
                           {"spp", t.spp},
-                          {"verdict", t.problem.empty() ? "pass" : "fail"},
+                          {"verdict", verdict_of(t)},
                           {"problem", t.problem}});
   }
-  j["verdict"] = wrong == 0 ? "pass" : "fail";
+  const Tally tally = tally_of(tiles);
+  j["verdict"] = tally.wrong > 0 ? "fail" : tally.stopped > 0 ? "stopped" : "pass";
   return j;
 }
 
 std::string line_of(const VerifiedTile& t) {
   return fmt::format("tile {} [{},{} to {},{}), {} samples: {}", t.tile, t.rect.x0, t.rect.y0, t.rect.x1,
-                     t.rect.y1, t.spp, t.problem.empty() ? "as sealed" : t.problem);
+                     t.rect.y1, t.spp, t.wrong() ? t.problem : "as sealed");
 }
 
 // One tile per thread at a time.
@@ -91,7 +102,7 @@ std::vector<VerifiedTile> verify_all(const render::World& world, const SealedIma
     for (std::size_t i = next++; i < tiles.size(); i = next++) {
       out[i] = verify_tile(world, image, tiles[i], stop);
       const std::lock_guard lock(printing);
-      if (!quiet) print(line_of(out[i]));
+      if (!quiet && !out[i].stopped) print(line_of(out[i]));
     }
   };
   std::vector<std::jthread> team;
@@ -152,13 +163,13 @@ int run(const Flags& flags) {
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
   const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
   if (flags.json) print(to_json(verified, numbers->seed).dump(2));
-  const auto wrong =
-      std::count_if(verified.begin(), verified.end(), [](const auto& t) { return !t.problem.empty(); });
+  const Tally tally = tally_of(verified);
   if (!flags.json)
-    print(fmt::format("{} of {} tiles are as sealed ({} in the image; the same choice again: --seed {})",
-                      verified.size() - static_cast<std::size_t>(wrong), verified.size(),
+    print(fmt::format("{} of {} tiles are as sealed{} ({} in the image; the same choice again: --seed {})",
+                      tally.right, verified.size(),
+                      tally.stopped > 0 ? fmt::format(", {} were not rendered: stopped", tally.stopped) : "",
                       image->grid().count(), numbers->seed));
-  return wrong > 0 ? kFailed : kOk;
+  return tally.right < verified.size() ? kFailed : kOk;
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uin
 
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop) {
-  VerifiedTile out{tile, image.grid().rect(tile), 0, {}};
+  VerifiedTile out{tile, image.grid().rect(tile), 0, false, {}};
   const auto spp = tile_samples(image, tile);
   if (!spp) {
     out.problem = spp.error().message;
@@ -38,7 +38,7 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
     const SampleRange samples = cut_range(k, *spp);
     render::TileResult rendered = render::render_tile(world, out.rect, samples, &stop, nullptr);
     if (rendered.stopped) {
-      out.problem = "told to stop before it was rendered";
+      out.stopped = true;
       return out;
     }
     const Partial partial{

@@ -17,7 +17,10 @@ struct VerifiedTile {
   TileIndex tile = 0;
   PixelRect rect;
   std::uint64_t spp = 0;
-  std::string problem;  // empty: digest and pixels are what they should be
+  bool stopped = false;  // before it was rendered: nothing is known of it
+  std::string problem;   // empty: digest and pixels are what they should be
+
+  bool wrong() const { return !problem.empty(); }
 };
 
 // `count` different tiles out of all, or all if there are no more; a function of the seed, in order of

@@ -24,6 +24,15 @@ struct LocalJob {
   std::map<Digest, std::filesystem::path> assets;  // by digest
 };
 
+// Which world it is rendered in. The job's id is not enough: a coordinator whose data were replaced may give
+// it to another job.
+struct WorldKey {
+  JobId job;
+  Digest scene, settings;
+  auto operator<=>(const WorldKey&) const = default;
+};
+inline WorldKey key_of(const JobBrief& brief) { return {brief.job, brief.scene, brief.settings_digest}; }
+
 struct RenderedUnit {
   Partial partial;
   double cpu_seconds = 0;
@@ -41,7 +50,7 @@ class RenderBackend {
   virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
   virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                          const std::atomic<bool>& stop) = 0;
-  virtual void forget(const JobId& job) = 0;
+  virtual void forget(const JobId& job) = 0;  // all that had this id
   virtual std::uint64_t rss_bytes() const = 0;
   // Why it cannot render anything any more, whatever it is asked: the worker ends with this. The failures of
   // units that come with it are not the units' fault.

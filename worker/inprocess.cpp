@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <mutex>
+#include <vector>
 
 #include "common/base/clock.h"
 #include "common/scene/integrators.h"
@@ -59,7 +60,7 @@ class InProcessBackend final : public LocalBackend {
   Digest numeric_class() const override { return render::numeric_class(); }
 
   tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
-    if (world(job.brief.job)) return {};
+    if (world(job.brief)) return {};
     const auto text = read_file(job.scene);
     if (!text) return failed(text.error());
     const auto scene = deserialize_scene(*text);
@@ -68,14 +69,14 @@ class InProcessBackend final : public LocalBackend {
     auto built = render::build_world(*scene, job.brief.settings, job.assets, threads_);
     if (!built) return failed(built.error());
     const std::lock_guard lock(mutex_);
-    worlds_[job.brief.job] = std::move(*built);
+    worlds_[key_of(job.brief)] = std::move(*built);
     return {};
   }
 
   tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                         const std::atomic<bool>& stop,
                                                         render::Breadcrumb* where) override {
-    const auto ready = world(job.brief.job);
+    const auto ready = world(job.brief);
     if (!ready) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "the job was not prepared"});
     const double start = thread_cpu_seconds();
     const TimePoint begin = clock_.now();
@@ -96,27 +97,28 @@ class InProcessBackend final : public LocalBackend {
   }
 
   void forget(const JobId& job) override {
-    std::shared_ptr<const render::World> last;  // freed outside the lock
+    std::vector<std::shared_ptr<const render::World>> last;  // freed outside the lock
     const std::lock_guard lock(mutex_);
-    const auto it = worlds_.find(job);
-    if (it == worlds_.end()) return;
-    last = std::move(it->second);
-    worlds_.erase(it);
+    std::erase_if(worlds_, [&](auto& entry) {
+      const bool gone = entry.first.job == job;
+      if (gone) last.push_back(std::move(entry.second));
+      return gone;
+    });
   }
 
   std::uint64_t rss_bytes() const override { return resident_bytes(::getpid()); }
 
  private:
-  std::shared_ptr<const render::World> world(const JobId& job) const {
+  std::shared_ptr<const render::World> world(const JobBrief& brief) const {
     const std::lock_guard lock(mutex_);
-    const auto it = worlds_.find(job);
+    const auto it = worlds_.find(key_of(brief));
     return it == worlds_.end() ? nullptr : it->second;
   }
 
   const int threads_;
   const SystemClock clock_;
   mutable std::mutex mutex_;
-  std::map<JobId, std::shared_ptr<const render::World>> worlds_;
+  std::map<WorldKey, std::shared_ptr<const render::World>> worlds_;
 };
 
 }  // namespace

@@ -10,7 +10,9 @@
 
 #include "common/base/log.h"
 #include "worker/agent/agent.h"
+#include "worker/agent/link_ring.h"
 #include "worker/cache/cache.h"
+#include "worker/child/cage.h"
 #include "worker/child/child.h"
 #include "worker/child/serve.h"
 #include "worker/client/client.h"
@@ -34,6 +36,13 @@ std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& optio
 
 int run_child(const worker::Options& options) {
   worker::child::confine(options.memory_limit);
+  const auto caged = worker::child::shut_in({options.cache});
+  if (!caged.calls || !caged.files)
+    log_warn("", fmt::format("this kernel cannot keep the renderer from {}: take care whose scenes it renders",
+                             caged.files ? "opening sockets" : "files that are not a scene's"));
+  else if (!caged.sizes)
+    log_warn("", "this kernel (before Linux 6.2) cannot keep the renderer from cutting cached files short: take "
+                 "care whose scenes it renders");
 #ifdef LIGHTSHAFT_RENDERER
   const auto limit = render::limit_threads(options.threads);
 #endif
@@ -55,20 +64,35 @@ void obey_signals(worker::Agent& agent, const sigset_t& signals) {
   }
 }
 
+std::optional<worker::LinkTls> tls_of(const worker::Options& options) {
+  if (options.tls_ca.empty()) return std::nullopt;
+  return worker::LinkTls{options.tls_ca, options.tls_cert, options.tls_key};
+}
+
+std::unique_ptr<worker::CoordinatorLink> link_to(const worker::Options& options) {
+  std::vector<std::unique_ptr<worker::CoordinatorLink>> links;
+  for (const auto& address : options.coordinators)
+    links.push_back(worker::make_grpc_link(address, options.join_token, tls_of(options)));
+  if (links.size() == 1) return std::move(links.front());
+  return std::make_unique<worker::LinkRing>(std::move(links), std::hash<std::string>()(options.name));
+}
+
 int run_worker(const worker::Options& options, const sigset_t& signals) {
   worker::raise_file_limit();
-  worker::ChildOptions child_options{.arguments = child_arguments(options),
-                                     .slots = options.threads,
-                                     .hang_limit = from_seconds(options.hang_seconds)};
-  auto backend = worker::make_child_backend(std::move(child_options));
-  if (!backend) return failed(backend.error());
-  const auto link = worker::make_grpc_link(options.coordinator, options.join_token);
+  const auto link = link_to(options);
   auto cache = worker::BlobCache::open(
       options.cache, options.cache_limit,
       [&link](const Digest& digest, std::uint64_t offset, const worker::BlobCache::Sink& sink) {
         return link->fetch_blob(digest, offset, sink);
       });
   if (!cache) return failed(cache.error());
+  // After the cache: its folder is what the child may read, so it must be there.
+  worker::ChildOptions child_options{.arguments = child_arguments(options),
+                                     .slots = options.threads,
+                                     .hang_limit = from_seconds(options.hang_seconds),
+                                     .prepare_limit = from_seconds(options.build_seconds)};
+  auto backend = worker::make_child_backend(std::move(child_options));
+  if (!backend) return failed(backend.error());
 
   worker::AgentOptions agent_options;
   agent_options.threads = options.threads;
@@ -92,6 +116,7 @@ int main(int argc, char** argv) {
   const auto parsed = ls::worker::parse_options(argc, argv);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& options = std::get<ls::worker::Options>(parsed);
+  log_format(options.log_format);
   if (options.render_child) return run_child(options);
   // Blocked before any thread starts (gRPC's included), so that only obey_signals sees them.
   sigset_t signals;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdlib>
 #include <iostream>
 
@@ -19,8 +20,14 @@ constexpr const char* kBuild = "lightshaft-worker " LIGHTSHAFT_VERSION;
 // rest.
 constexpr double kMemoryShare = 0.9;
 
-void describe(CLI::App& app, Options& o, std::string& token_file) {
-  app.add_option("--coordinator", o.coordinator, "HOST:PORT where the coordinator listens for workers");
+struct Files {
+  std::string token, tls_ca, tls_cert, tls_key;
+};
+
+void describe(CLI::App& app, Options& o, Files& files) {
+  app.add_option("--coordinator", o.coordinators,
+                 "HOST:PORT where the coordinator listens for workers; several that share a farm, separated by commas")
+      ->delimiter(',');
   app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")
       ->check(CLI::Range(1, kMostChildThreads));
   app.add_option("--cache", o.cache, "Folder for scenes and assets, may be shared by workers");
@@ -32,9 +39,22 @@ void describe(CLI::App& app, Options& o, std::string& token_file) {
   app.add_option("--hang-after", o.hang_seconds,
                  "Seconds without a finished sample after which the renderer is restarted")
       ->check(CLI::PositiveNumber);
+  app.add_option("--build-limit", o.build_seconds,
+                 "Seconds that reading a scene's files and building its world may take; no other scene is "
+                 "built meanwhile; default: 1800")
+      ->check(CLI::PositiveNumber);
   app.add_option("--name", o.name, "Name shown to people; default: the host's");
   app.add_option("--tags", o.tags, "What jobs may ask for, separated by commas")->delimiter(',');
-  app.add_option("--token-file", token_file, "File with the farm's join token (or LIGHTSHAFT_JOIN_TOKEN)");
+  app.add_option("--token-file", files.token, "File with the farm's join token (or LIGHTSHAFT_JOIN_TOKEN)");
+  app.add_option("--log-format", "text, or json: an object a line")->check(CLI::IsMember({"text", "json"}));
+  auto* ca = app.add_option("--tls-ca", files.tls_ca,
+                            "Speak TLS, with a coordinator whose certificate is of this authority (its "
+                            "DATA/tls/ca.pem)");
+  auto* cert = app.add_option("--tls-cert", files.tls_cert, "This worker's certificate (DATA/tls/worker.pem)");
+  auto* key = app.add_option("--tls-key", files.tls_key, "Its key (DATA/tls/worker.key)");
+  ca->needs(cert)->needs(key);
+  cert->needs(ca);
+  key->needs(ca);
   app.add_flag("--fake", o.fake, "Render no scene: give pixels that are a pure function of the unit");
   app.add_flag("--render-child", o.render_child)->group("");
   app.add_option("--fake-delay", "Milliseconds that a fake unit takes")->group("");
@@ -47,6 +67,18 @@ Result<std::string> join_token(const std::string& file) {
   if (!file.empty()) return read_secret(file);
   const char* token = std::getenv("LIGHTSHAFT_JOIN_TOKEN");
   return token ? token : "";
+}
+
+Result<void> read_tls(const Files& files, Options& o) {
+  const std::pair<const std::string&, std::string&> all[] = {
+      {files.tls_ca, o.tls_ca}, {files.tls_cert, o.tls_cert}, {files.tls_key, o.tls_key}};
+  for (const auto& [file, text] : all) {
+    if (file.empty()) continue;
+    auto pem = read_pem(file);
+    if (!pem) return tl::unexpected(pem.error());
+    text = std::move(*pem);
+  }
+  return {};
 }
 
 int usage(const std::string& message) {
@@ -62,9 +94,9 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   o.name = host_name();
   o.cache = default_cache();
   o.memory_limit = static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(usable_memory_bytes()));
-  std::string token_file;
+  Files files;
   CLI::App app("Renders units for a Lightshaft coordinator.", "lightshaft-worker");
-  describe(app, o, token_file);
+  describe(app, o, files);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -75,18 +107,23 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
     if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay is a number of milliseconds");
     o.fake_options.delay = from_seconds(ms * 1e-3);
   }
+  if (const auto* format = app.get_option("--log-format"); format->count() > 0)
+    o.log_format = *log_format_of(format->as<std::string>());
   const auto fault = parse_fake_fault(o.fake_fault_text);
   if (!fault) return usage("--fake-fault: " + fault.error().message);
   o.fake_options.fault = *fault;
   if (!o.fake_class.empty()) o.fake_options.numeric_class = sha256(o.fake_class);
   if (o.render_child) return o;
-  if (o.coordinator.empty() || o.coordinator.find(':') == std::string::npos)
+  const bool addresses = std::all_of(o.coordinators.begin(), o.coordinators.end(),
+                                     [](const auto& a) { return a.find(':') != std::string::npos; });
+  if (o.coordinators.empty() || !addresses)
     return usage("--coordinator HOST:PORT is needed, e.g. --coordinator localhost:50051");
-  const auto token = join_token(token_file);
+  const auto token = join_token(files.token);
   if (!token) return usage("--token-file: " + token.error().message);
   if (token->size() > limits::kTokenBytes)
     return usage(fmt::format("the join token has more than {} characters", limits::kTokenBytes));
   o.join_token = *token;
+  if (const auto read = read_tls(files, o); !read) return usage(read.error().message);
 #ifndef LIGHTSHAFT_RENDERER
   if (!o.fake)
     return usage("this program was built without the renderer (LIGHTSHAFT_RENDERER=OFF); only --fake works");
@@ -97,6 +134,8 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
 std::vector<std::string> child_arguments(const Options& o) {
   std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads),
                                         "--memory-limit", std::to_string(o.memory_limit)};
+  if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});  // what it may read
+  if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");
   arguments.insert(arguments.end(), {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3)});
   if (!o.fake_fault_text.empty()) arguments.insert(arguments.end(), {"--fake-fault", o.fake_fault_text});

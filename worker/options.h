@@ -7,24 +7,28 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/log.h"
 #include "worker/fake/fake.h"
 
 namespace ls::worker {
 
 struct Options {
-  std::string coordinator;  // HOST:PORT
+  std::vector<std::string> coordinators;  // HOST:PORT
   int threads = 1;
   std::filesystem::path cache;
   std::uint64_t cache_limit = 0;   // bytes; 0: none
   std::uint64_t memory_limit = 0;  // bytes, of the render child; 0: none
   double hang_seconds = 300;
+  double build_seconds = 1800;
   std::string name;
   std::vector<std::string> tags;
   std::string join_token;
+  std::string tls_ca, tls_cert, tls_key;  // PEM texts; empty: nothing is encrypted
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;
   std::string fake_class;     // another numeric class, named by the SHA-256 of this; empty: the usual one
+  LogFormat log_format = LogFormat::text;
   bool render_child = false;  // this process is one; started by a worker only
 };
 

@@ -91,7 +91,7 @@ void plates(Table& table, int m) {
   const double r = .04, t = (1 - r) / (1 + (2 * m - 1) * r);
   table.mean(fmt::format("N42-{}-plates-of-glass", m), "N42 7.6g",
              "A thousand interfaces at normal incidence: T = 1 - R = (1 - r) / (1 + (2 m - 1) r) = 3 / 128.",
-             kit, grey(t), {.band = .1, .complement = true, .slow = true});
+             kit, grey(t), {.band = .12, .complement = true, .slow = true});
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ const std::vector<Elsewhere>& answered_elsewhere() {
        "Directions, KeepTheirLengthOverAHundredThousandScatterings"},
       // There are no tabulated phase functions.
       {"N21", "tests/system/test_validation_table.py", "test_tabulated_phase_functions_are_refused_by_name"},
-      {"N30", "tests/unit/render/envmap_test.cpp",
+      {"N30", "tests/unit/render/envmap_sampling_test.cpp",
        "EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight"},
       {"N31", "tests/unit/render/lights_tree_test.cpp",
        "LightTree, CopesWithLightsInOnePlaceAndWithExtremes"},

@@ -41,7 +41,7 @@ void stacks(Table& t) {
   for (const int m : {1, 10, 100})
     t.mean(fmt::format("N42-plates-{}", m), "N42 7.6g",
            "A stack of m plates lets (1 - r) / (1 + (2 m - 1) r) pass.", [=] { return plates(m); },
-           grey((1 - r) / (1 + (2 * m - 1) * r)), {.band = m < 100 ? .003 : .01, .slow = m > 1});
+           grey((1 - r) / (1 + (2 * m - 1) * r)), {.band = m < 100 ? .003 : .02, .slow = m > 1});
   t.same(
       "N42-null-interfaces", "N42",
       "A thousand boundaries of nothing change nothing but that each moves a ray aside by 16 last places, a "

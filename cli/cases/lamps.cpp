@@ -88,7 +88,7 @@ void through_a_lamp(Table& t) {
              return kit;
            },
            grey(kSigma / (4 * kPi) * std::exp(-3 * kSigma) * angles),
-           {.band = .02, .slack = 1e-3, .slow = true});
+           {.band = .02, .slack = 1e-3, .slow = true, .frames = 64});
   }
 }
 

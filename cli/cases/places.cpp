@@ -63,6 +63,46 @@ void faces_on_each_other(Table& t) {
   }
 }
 
+// A pane that takes half the light, in the face of a box of a medium: shadow rays meet either, and take both.
+void panes_on_faces(Table& t) {
+  for (const Way& way : both_media())
+    for (const bool first : {false, true})
+      t.exact(fmt::format("N41-pane-{}-the-box-it-lies-on{}", first ? "before" : "after", way.name()), "N41",
+              "A mask of 1/2 on the face of a medium: light takes both, whichever of them comes first in the "
+              "scene.",
+              [=](const Bench& b) {
+                SceneKit kit = lit_floor();
+                const BsdfIndex mask = kit.bsdf(MaskBsdf{kit.texture(rgb(.5)), kit.diffuse(0)});
+                const Transform top = translate({0, 0, 2});
+                if (first) kit.shape(RectangleShape{}, top, mask);
+                add_box(kit, way.medium(kit, rgb(kDepth), rgb(0), 0, box({-1, -1, 1}, {1, 1, 2})),
+                        {-1, -1, 1}, {1, 1, 2});
+                if (!first) kit.shape(RectangleShape{}, top, mask);
+                return every_value(b, kit, 16, grey(.5 * lit(kDepth)[0]), 4e-6);
+              });
+}
+
+// L + rho L + rho^2 L ...: directions that meet the wall find the light on it, too.
+void lights_on_walls(Table& t) {
+  for (const bool first : {false, true})
+    t.mean(
+        fmt::format("N41-light-{}-the-wall-it-lies-on", first ? "before" : "after"), "N41 N27",
+        "A room of reflectance 1/2 whose walls are lit by a light without a material, in the same place: 2.",
+        [=] {
+          SceneKit kit;
+          const BsdfIndex wall = kit.diffuse(.5), null = kit.null();
+          const TextureIndex radiance = kit.texture(rgb(1));
+          for (const bool light : {first, !first}) {
+            Shape& s = kit.shape(CubeShape{}, {}, light ? null : wall);
+            s.flip_normals = true;
+            if (light) s.emitter = AreaEmitter{radiance};
+          }
+          kit.look({.1, .2, -.3}, {1, .3, .4}, 60);
+          return kit;
+        },
+        grey(2));
+}
+
 // Light given off per length, without extinction, seen from both sides of the face and on it.
 void cameras_at_a_boundary(Table& t) {
   for (const Way& way : both_media())
@@ -136,6 +176,8 @@ void out_of_focus(Table& t) {
 
 void add_places(Table& t) {
   faces_on_each_other(t);
+  panes_on_faces(t);
+  lights_on_walls(t);
   cameras_at_a_boundary(t);
   on_lights(t);
   out_of_focus(t);

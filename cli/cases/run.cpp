@@ -68,6 +68,8 @@ class Runner {
 
   Result<Measured> look(const Maker& make, std::uint64_t paths, std::uint64_t seed) const {
     const SceneKit kit = make();
+    if (case_->options.frames > 0)
+      return cli::measure_frames(kit.scene, kit.files, paths, seed, options_.threads, case_->options.frames);
     return cli::measure(kit.scene, kit.files, paths, seed, options_.threads);
   }
 

@@ -45,7 +45,7 @@ void semi_infinite(Table& t) {
            kit.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
            return kit;
          },
-         grey(.336428 - 4. / 3 * k * k / 257.42089 / kPi), {.slack = 1e-5, .slow = true});
+         grey(.336428 - 4. / 3 * k * k / 257.42089 / kPi), {.band = .01, .slack = 1e-5, .slow = true});
 }
 
 struct Row {
@@ -85,7 +85,8 @@ void isotropic(Table& t) {
 // A white plate (1/2) in the column above the slab sees it under the cosine: with R and T the slab's for
 // diffuse light and the sky below, the plate is lit by B = T + R B / 2, and shows B / 2; where it shines 1
 // itself and all is dark below, B = R (1 + B / 2), and it shows 1 + B / 2.
-SceneKit plate_above(const Way& way, const Slab& slab, bool transmitted) {
+SceneKit plate_above(const Way& way, Slab slab, bool transmitted) {
+  slab.wall = .5;  // a wide plate that shines would mostly be sampled far away
   SceneKit kit = column(way, slab, transmitted);
   Shape& end = kit.scene.shapes.back();  // black, behind what is looked at from above
   const BsdfIndex white = kit.diffuse(.5);
@@ -94,10 +95,10 @@ SceneKit plate_above(const Way& way, const Slab& slab, bool transmitted) {
   } else {
     kit.scene.emitters.clear();
     const TextureIndex light = kit.texture(rgb(1));
-    kit.shape(RectangleShape{}, translate({0, 0, slab.tau + 2}) * scale(.6), white).emitter =
+    kit.shape(RectangleShape{}, translate({0, 0, slab.tau + 2}) * scale(slab.reach()), white).emitter =
         AreaEmitter{light};
   }
-  kit.scene.shapes.back().to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(.6);
+  kit.scene.shapes.back().to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(slab.reach());
   kit.look({.1, .15, slab.tau + 1}, {.1, .15, slab.tau + 2}, 1e-3, {0, 1, 0});
   return kit;
 }

@@ -89,15 +89,16 @@ SceneKit column(const Way& way, const Slab& slab, bool transmitted) {
       way.medium(kit, rgb(1), rgb(slab.albedo), slab.g, box({-40, -40, -1}, {40, 40, slab.tau + 1}));
   const BsdfIndex mirror = kit.mirror(), black = kit.diffuse(0), null = kit.null();
   const BsdfIndex face = slab.ior == 1 ? null : kit.glass(slab.ior);
-  for (const double x : {-.5, .5}) {
-    kit.shape(RectangleShape{}, translate({x, 0, middle}) * rotate_y(90) * scale(half, .6, 1), mirror);
-    kit.shape(RectangleShape{}, translate({0, x, middle}) * rotate_x(90) * scale(.6, half, 1), mirror);
+  const double reach = slab.reach();
+  for (const double x : {-slab.wall, slab.wall}) {
+    kit.shape(RectangleShape{}, translate({x, 0, middle}) * rotate_y(90) * scale(half, reach, 1), mirror);
+    kit.shape(RectangleShape{}, translate({0, x, middle}) * rotate_x(90) * scale(reach, half, 1), mirror);
   }
-  kit.container(RectangleShape{}, translate({0, 0, slab.tau}) * scale(.6), face, m);
-  kit.container(RectangleShape{}, rotate_x(180) * scale(.6), face, m);
+  kit.container(RectangleShape{}, translate({0, 0, slab.tau}) * scale(reach), face, m);
+  kit.container(RectangleShape{}, rotate_x(180) * scale(reach), face, m);
   if (slab.split)
-    kit.container(RectangleShape{}, translate({0, 0, slab.tau / 3}) * scale(.6), null, m).exterior = m;
-  kit.shape(RectangleShape{}, translate({0, 0, transmitted ? slab.tau + 2 : -1}) * scale(.6), black);
+    kit.container(RectangleShape{}, translate({0, 0, slab.tau / 3}) * scale(reach), null, m).exterior = m;
+  kit.shape(RectangleShape{}, translate({0, 0, transmitted ? slab.tau + 2 : -1}) * scale(reach), black);
   kit.environment();
   kit.look({.1, .15, slab.tau + 1}, {.1, .15, 0}, 1e-3, {0, 1, 0});
   return kit;

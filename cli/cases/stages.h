@@ -39,6 +39,9 @@ struct Slab {  // [0, tau] in z, extinction 1; endless by a column of mirrors ar
   double albedo = 1, g = 0, tau = 1;
   double ior = 1;      // of the slab; 1: matched boundaries
   bool split = false;  // by a boundary that changes nothing
+  // Of the column, from its middle, below 39: changes nothing but how often paths meet it.
+  double wall = 24;
+  double reach() const { return wall + .1; }  // past the walls
 };
 // Seen straight down from above, in a sky of radiance 1 above (reflected) or below (transmitted).
 SceneKit column(const Way& way, const Slab& slab, bool transmitted);

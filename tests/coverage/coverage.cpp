@@ -40,14 +40,14 @@ T checked(Result<T> result) {
   return std::move(*result);
 }
 
-std::vector<CoverageJob> run_jobs(const CoverageScene& scene, int jobs, int threads) {
+std::vector<CoverageJob> run_jobs(const CoverageScene& scene, int jobs, int threads, std::uint64_t first) {
   const Scene description = parsed(scene);
   std::vector<CoverageJob> out(static_cast<std::size_t>(jobs));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i; (i = next++) < out.size();)
-      out[i] =
-          scene.target > 0 ? run_adaptive_job(scene, i + 1) : run_plain_job(description, scene.spp, i + 1);
+      out[i] = scene.target > 0 ? run_adaptive_job(scene, first + i)
+                                : run_plain_job(description, scene.spp, first + i);
   };
   std::vector<std::jthread> pool;
   for (int i = 0; i < threads; ++i) pool.emplace_back(work);
@@ -124,8 +124,8 @@ Ratio Quotient::ratio() const {
   return {r, std::sqrt(squares) / b};
 }
 
-Coverage measure_coverage(const CoverageScene& scene, int count, int threads) {
-  const std::vector<CoverageJob> jobs = run_jobs(scene, count, threads);
+Coverage measure_coverage(const CoverageScene& scene, int count, int threads, std::uint64_t first) {
+  const std::vector<CoverageJob> jobs = run_jobs(scene, count, threads, first);
   const Truth truth = truth_of(jobs);
   Coverage out;
   out.jobs = count;

@@ -39,8 +39,9 @@ struct Coverage {
   double heavy_tail = 0;          // share of jobs that say "don't trust yet"
 };
 
-// Jobs with the seeds 1 to `jobs` (job.h). Throws std::runtime_error on a scene that cannot be read.
-Coverage measure_coverage(const CoverageScene& scene, int jobs, int threads);
+// `jobs` of them, with seeds from `first` on (job.h). Throws std::runtime_error on a scene that cannot be
+// read.
+Coverage measure_coverage(const CoverageScene& scene, int jobs, int threads, std::uint64_t first = 1);
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c);  // for tables
 

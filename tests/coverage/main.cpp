@@ -1,5 +1,5 @@
-// error_coverage [JOBS] [THREADS] [NAME]: the tables of docs/error.md, or those rows of the first whose name
-// begins so.
+// error_coverage [JOBS] [THREADS] [NAME] [SEED]: the tables of docs/error.md, or those rows of the first
+// whose name begins so; with JOBS seeds from SEED on (1).
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -14,8 +14,9 @@
 int main(int argc, char** argv) {
   const int jobs = argc > 1 ? std::atoi(argv[1]) : 1000, threads = argc > 2 ? std::atoi(argv[2]) : 2;
   const std::string wanted = argc > 3 ? argv[3] : "";
-  if (jobs < 2 || threads < 1) {
-    fmt::print(stderr, "usage: error_coverage [JOBS] [THREADS] [NAME]\n");
+  const long long first = argc > 4 ? std::atoll(argv[4]) : 1;
+  if (jobs < 2 || threads < 1 || first < 0) {
+    fmt::print(stderr, "usage: error_coverage [JOBS] [THREADS] [NAME] [SEED]\n");
     return 2;
   }
   ls::log_level(ls::LogLevel::off);
@@ -25,7 +26,8 @@ int main(int argc, char** argv) {
   try {
     for (const auto& scene : ls::test::coverage_scenes()) {
       if (!scene.name.starts_with(wanted)) continue;
-      fmt::print("{}\n", coverage_line(scene, ls::test::measure_coverage(scene, jobs, threads)));
+      fmt::print("{}\n", coverage_line(scene, ls::test::measure_coverage(scene, jobs, threads,
+                                                                         static_cast<std::uint64_t>(first))));
       std::fflush(stdout);
     }
     if (!wanted.empty()) return 0;

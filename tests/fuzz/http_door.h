@@ -27,9 +27,10 @@ class HttpDoor {
   http::Api& api() { return *api_; }
 
  private:
-  http::Response answer(const http::Request& request);
+  http::Response answer(http::Request request);
 
   std::unique_ptr<coordinator::Coordinator> coordinator_;
+  http::TokenBook tokens_{kToken};
   std::unique_ptr<http::Api> api_;
   std::string job_;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "common/base/log.h"
+#include "common/base/step.h"
 #include "common/base/overloaded.h"
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
@@ -44,7 +45,11 @@ Result<void> Agent::Impl::run() {
       connection_ended({Errc::unavailable, "the coordinator did not answer the hello"});
     }
     if (connection == Connection::down && clock.now() >= connection_timer && !ended) open_connection();
-    for (FromWorker& message : due_messages()) link.send(std::move(message));
+    for (FromWorker& message : due_messages()) {
+      const bool result = std::holds_alternative<UnitResult>(message);
+      link.send(std::move(message));
+      if (result) step("result-sent");
+    }
     if (!ended) ended = verdict();
   }
   end_threads();
@@ -93,6 +98,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                      log_warn(fmt::format("job={} tile={} round={}", ack.unit.job.value, ack.unit.tile,
                                           ack.unit.round),
                               "result refused: " + ack.refused->message);
+                   step("acknowledged-seen");
                    const std::lock_guard lock(mutex);
                    outbox.acknowledge(ack.unit);
                    book.acknowledged(ack.unit, ack.refused.has_value());
@@ -139,6 +145,7 @@ void Agent::Impl::open_connection() {
 }
 
 void Agent::Impl::accept_lease(AssignLease& assign) {
+  step("lease-received");
   const std::lock_guard lock(mutex);
   const JobId& id = assign.lease.job;
   if (assign.brief) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/protocol/limits.h"
+#include "common/base/step.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
@@ -114,6 +115,7 @@ std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::sto
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
                            tl::expected<UnitResult, UnitFailure> outcome) {
+  step("unit-rendered");
   const bool innocent = !outcome && backend.broken();
   {
     const std::lock_guard lock(mutex);

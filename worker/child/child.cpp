@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <condition_variable>
 #include <csignal>
 #include <map>
 #include <mutex>
@@ -31,6 +32,8 @@ std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
   return static_cast<std::size_t>(unit.rect.pixels()) *
          (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
 }
+// New children in a row that end by themselves before they are ready.
+constexpr int kUnreadyChildren = 5;
 constexpr Duration kStopLimit = std::chrono::seconds(10);  // from the stop flag to its obedience
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
@@ -65,6 +68,7 @@ class ChildBackend final : public RenderBackend {
     bool innocent = false;  // the child died, of something else
   };
   Result<std::shared_ptr<Process>> living_process();
+  Result<std::shared_ptr<Process>> spawn_greeted();
   Result<void> greet(Process& process);
   tl::unexpected<Error> broken_by(std::string why);
   bool tell_forgotten(Process& process);
@@ -75,7 +79,7 @@ class ChildBackend final : public RenderBackend {
   Attempt attempt(Process& process, int index, std::uint64_t number, const LocalJob& job,
                   const LeaseUnit& unit, const std::atomic<bool>& stop);
   Attempt judge_death(Process& process, int index);
-  std::uint64_t number_of(const JobId& job);
+  std::uint64_t number_of(const JobBrief& brief);
 
   const ChildOptions options_;
   const SystemClock clock_;
@@ -83,11 +87,12 @@ class ChildBackend final : public RenderBackend {
   std::mutex control_mutex_;  // one request at a time on the control channel; also who respawns
   mutable std::mutex mutex_;
   std::shared_ptr<Process> process_;  // guarded by mutex_, like all below
-  std::map<JobId, std::uint64_t> numbers_;
+  std::map<WorldKey, std::uint64_t> numbers_;
   std::vector<std::uint64_t> forgotten_;  // told to the child before the next world is built
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
   bool shut_down_ = false;
+  std::condition_variable ending_;  // it is set
   std::optional<Error> broken_;
 };
 
@@ -98,9 +103,8 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
     if (shut_down_) return fail(Errc::unavailable, "the worker is ending");
     if (process_ && process_->alive()) return process_;
   }
-  auto process = Process::spawn(options_);
+  auto process = spawn_greeted();
   if (!process) return process;
-  if (auto ok = greet(**process); !ok) return tl::unexpected<Error>(ok.error());
   const std::lock_guard lock(mutex_);
   if (shut_down_) return fail(Errc::unavailable, "the worker is ending");
   process_ = *process;
@@ -108,6 +112,24 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   return process;
 }
 
+// What a new child lacks at the moment (address space, descriptors) it may have a little later.
+Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
+  Duration pause = options_.respawn_pause;
+  for (int tries = 1;; ++tries, pause *= 2) {
+    auto process = Process::spawn(options_);
+    if (!process) return process;
+    const auto ok = greet(**process);
+    if (ok) return process;
+    if (ok.error().code != Errc::unavailable) return tl::unexpected<Error>(ok.error());
+    if (tries == kUnreadyChildren) return broken_by(ok.error().message);
+    log_warn("", ok.error().message);
+    std::unique_lock lock(mutex_);
+    if (ending_.wait_for(lock, pause, [&] { return shut_down_; }))
+      return fail(Errc::unavailable, "the worker is ending");
+  }
+}
+
+// unavailable: it ended by itself, unlike the first one.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + options_.start_limit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
@@ -118,8 +140,7 @@ Result<void> ChildBackend::greet(Process& process) {
     std::string why = fmt::format("the render child {} before it was ready", end.text);
     const bool first = numeric_class_ == Digest{};
     if (first) why += "; run the worker with --fake to see whether the renderer is the cause";
-    // A signal may be the system's lack of memory, which passes.
-    return first || end.signal ? fail(Errc::internal, std::move(why)) : broken_by(std::move(why));
+    return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
   if (numeric_class_ == Digest{})
     numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
@@ -147,9 +168,9 @@ std::optional<Error> ChildBackend::broken() const {
   return broken_;
 }
 
-std::uint64_t ChildBackend::number_of(const JobId& job) {
+std::uint64_t ChildBackend::number_of(const JobBrief& brief) {
   const std::lock_guard lock(mutex_);
-  const auto [it, is_new] = numbers_.try_emplace(job, next_number_);
+  const auto [it, is_new] = numbers_.try_emplace(key_of(brief), next_number_);
   if (is_new) ++next_number_;
   return it->second;
 }
@@ -163,7 +184,7 @@ tl::expected<void, UnitFailure> ChildBackend::prepare(const LocalJob& job) {
 
 tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(const LocalJob& job,
                                                                                 std::uint64_t& number) {
-  number = number_of(job.brief.job);
+  number = number_of(job.brief);
   const auto knows = [&](Process& process) {
     const std::lock_guard lock(process.prepared_mutex);
     return process.prepared.contains(number);
@@ -347,10 +368,10 @@ ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
 
 void ChildBackend::forget(const JobId& job) {
   const std::lock_guard lock(mutex_);
-  const auto it = numbers_.find(job);
-  if (it == numbers_.end()) return;
-  forgotten_.push_back(it->second);
-  numbers_.erase(it);
+  std::erase_if(numbers_, [&](const auto& entry) {
+    if (entry.first.job == job) forgotten_.push_back(entry.second);
+    return entry.first.job == job;
+  });
 }
 
 std::uint64_t ChildBackend::rss_bytes() const {
@@ -361,6 +382,7 @@ std::uint64_t ChildBackend::rss_bytes() const {
 void ChildBackend::shutdown() {
   const std::lock_guard lock(mutex_);
   shut_down_ = true;
+  ending_.notify_all();
   if (process_) process_->kill();
 }
 

@@ -26,9 +26,11 @@ struct ChildOptions {
   std::vector<std::string> arguments;                 // that make it serve(): see worker/main.cpp
   int slots = 1;                                      // units rendered at once; the caller's threads
   Duration hang_limit = std::chrono::minutes(5);      // without finishing a sample
-  Duration prepare_limit = std::chrono::minutes(60);  // to build one world
+  Duration prepare_limit = std::chrono::minutes(30);  // to build one world
   Duration forget_limit = std::chrono::minutes(1);    // to free one
   Duration start_limit = std::chrono::minutes(2);     // until the child says hello (its numeric battery)
+  // Before a new child takes the place of one that ended by itself before it was ready; twice as long each time.
+  Duration respawn_pause = std::chrono::seconds(1);
 };
 
 // Starts the first child; its failure to start is the error.

@@ -20,7 +20,16 @@ constexpr int kKeepaliveMs = 20'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+std::shared_ptr<grpc::ChannelCredentials> credentials(const std::optional<LinkTls>& tls) {
+  if (!tls) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = tls->ca;
+  options.pem_cert_chain = tls->cert;
+  options.pem_private_key = tls->key;
+  return grpc::SslCredentials(options);
+}
+
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const std::optional<LinkTls>& tls) {
   grpc::ChannelArguments args;
   args.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
   args.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
@@ -34,14 +43,14 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   args.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   args.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   args.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), args);
+  return grpc::CreateCustomChannel(address, credentials(tls), args);
 }
 
 class GrpcLink final : public CoordinatorLink {
  public:
-  GrpcLink(const std::string& address, std::string join_token)
+  GrpcLink(const std::string& address, std::string join_token, const std::optional<LinkTls>& tls)
       : join_token_(std::move(join_token)),
-        channel_(make_channel(address)),
+        channel_(make_channel(address, tls)),
         stub_(pb::Farm::NewStub(channel_)) {}
   ~GrpcLink() override { close(); }
 
@@ -114,8 +123,9 @@ class GrpcLink final : public CoordinatorLink {
 
 }  // namespace
 
-std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token) {
-  return std::make_unique<GrpcLink>(address, join_token);
+std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token,
+                                                const std::optional<LinkTls>& tls) {
+  return std::make_unique<GrpcLink>(address, join_token, tls);
 }
 
 }  // namespace ls::worker

@@ -51,16 +51,14 @@ double shape_distance(const void* user, unsigned prim, const RTCRay& ray) {
 // A trace that stops nowhere and keeps all it meets: its context is this one, and has a filter.
 struct Collecting {
   RTCIntersectContext context;
-  struct Met {
-    unsigned geometry, primitive, instance;
-  };
-  std::array<Met, Together::kMost> met;
+  std::array<RTCHit, Together::kMost> met;  // only the ids are set
   std::size_t count = 0;
 
   static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
     static_assert(offsetof(Collecting, context) == 0);
     auto& c = *reinterpret_cast<Collecting*>(context);
-    if (c.count < c.met.size()) c.met[c.count++] = {geometry, primitive, instance};
+    if (c.count < c.met.size())
+      c.met[c.count++] = {.primID = primitive, .geomID = geometry, .instID = {instance}};
   }
 };
 void collect_callback(const RTCFilterFunctionNArguments* args) {
@@ -95,13 +93,15 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
 }
 
 // Geometry ids, the same in every scene they are attached to: kind + side * kKinds, side 0 of what is opaque,
-// 1 of what light passes; from kFirstInstance on the instances in their order.
+// 1 of what light passes; in the scenes of groups kInGroup higher, so that a hit's id alone tells what stands
+// in the world by itself. In the world's scenes the instances follow from kFirstInstance on, in their order.
 enum : unsigned {
   kTriangles = 0,
   kSpheres = 1,
   kDisks = 2,
   kCylinders = 3,
   kKinds = 4,
+  kInGroup = 2 * kKinds,
   kFirstInstance = 2 * kKinds
 };
 
@@ -124,7 +124,7 @@ bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 time
 // The scenes over one set of primitives. all == opaque where there is nothing that light passes.
 struct Scenes {
   RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
-  std::uint32_t base[2][kKinds] = {};  // first index of each kind, by side
+  std::uint32_t base[2 * kKinds] = {};  // first index of each kind on each side
   ShapeSet<Sphere> spheres[2];
   ShapeSet<Disk> disks[2];
   ShapeSet<Cylinder> cylinders[2];
@@ -194,18 +194,20 @@ RTCScene new_scene(RTCDevice device, bool coincident) {
 
 void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes& to, int side,
             std::initializer_list<RTCScene> scenes) {
+  const unsigned first_id = static_cast<unsigned>(side) * kKinds;
   const auto add = [&](RTCGeometry geom, unsigned kind) {
-    for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, kind + static_cast<unsigned>(side) * kKinds);
+    const unsigned id = first_id + kind + (&set == &g.own ? 0u : kInGroup);
+    for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, id);
     rtcReleaseGeometry(geom);
   };
   const auto add_shapes = [&](const auto& all, const PrimitiveRange& range, auto& part, unsigned kind) {
     const Side s = side_of(range, side);
-    to.base[side][kind] = s.first;
+    to.base[first_id + kind] = s.first;
     part.shapes = std::span(all).subspan(s.first, s.count());
     if (s.count() > 0) add(shape_geometry(device, part), kind);
   };
   const Side triangles = side_of(set.triangles, side);
-  to.base[side][kTriangles] = triangles.first;
+  to.base[first_id + kTriangles] = triangles.first;
   if (triangles.count() > 0)
     add(triangle_geometry(device, g, triangles.first, triangles.count()), kTriangles);
   add_shapes(g.spheres, set.spheres, to.spheres[side], kSpheres);
@@ -271,20 +273,25 @@ void attach_instances(const Geometry& g, Accel::State& st) {
   }
 }
 
-inline PrimitiveId primitive_of(const Accel::State& st, unsigned geometry, unsigned primitive,
-                                unsigned instance_id) {
-  const unsigned side = geometry / kKinds, kind = geometry % kKinds;
-  const Scenes* in = &*st.own;
-  std::uint32_t instance = kNone;
-  if (kBuilt.instances && instance_id != RTC_INVALID_GEOMETRY_ID) {
-    instance = instance_id - kFirstInstance;
-    in = &st.groups[st.group_of[instance]];
-  }
-  return {static_cast<PrimitiveId::Kind>(kind), in->base[side][kind] + primitive, instance};
+PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive, std::uint32_t instance) {
+  return {static_cast<PrimitiveId::Kind>(geometry % kKinds), in.base[geometry] + primitive, instance};
+}
+// What a hit on the group of an instance was on: out of the way of what stands in the world by itself.
+[[gnu::noinline]] PrimitiveId instanced(const Accel::State& st, const RTCHit& hit) {
+  const std::uint32_t instance = hit.instID[0] - kFirstInstance;
+  return primitive_in(st.groups[st.group_of[instance]], hit.geomID - kInGroup, hit.primID, instance);
+}
+// Nothing: of a ray that hit nothing.
+[[gnu::always_inline]] inline std::optional<PrimitiveId> primitive_of(const Accel::State& st,
+                                                                      const RTCHit& hit) {
+  static_assert(RTC_INVALID_GEOMETRY_ID >= kInGroup);
+  if (hit.geomID < kInGroup) return primitive_in(*st.own, hit.geomID, hit.primID, kNone);
+  if (!kBuilt.instances || hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return instanced(st, hit);
 }
 
-std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V3& o, const V3& d,
-                                 float t_max) {
+[[gnu::always_inline]] inline std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene,
+                                                               const V3& o, const V3& d, float t_max) {
   if (!near_enough(o) || !is_finite(d)) return std::nullopt;
   RTCRayHit rh;
   set_ray(rh.ray, o, d, t_max);
@@ -292,8 +299,7 @@ std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene, const V
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene, &context, &rh);
-  if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return primitive_of(st, rh.hit.geomID, rh.hit.primID, rh.hit.instID[0]);
+  return primitive_of(st, rh.hit);
 }
 
 }  // namespace
@@ -357,8 +363,7 @@ Together Accel::between(const V3& a, const V3& b) const {
   rtcInitIntersectContext(&all.context);
   all.context.filter = collect_callback;
   rtcIntersect1(state_->own->all, &all.context, &rh);
-  for (std::size_t i = 0; i < all.count; ++i)
-    together.ids[i] = primitive_of(*state_, all.met[i].geometry, all.met[i].primitive, all.met[i].instance);
+  for (std::size_t i = 0; i < all.count; ++i) together.ids[i] = *primitive_of(*state_, all.met[i]);
   // A triangle is found in every leaf that has a part of it.
   const auto first = together.ids.begin(), last = first + static_cast<std::ptrdiff_t>(all.count);
   std::sort(first, last, [](const PrimitiveId& x, const PrimitiveId& y) {

@@ -83,7 +83,7 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   const SampleStream stream(world_.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
                             sample);
   const CameraRay ray = camera_ray(world_, stream, x, y);
-  const auto first = PathTracer<Features{}>(world_, stream).first_surface(ray);
+  const auto first = PathTracer<Features{.passing = true}>(world_, stream).first_surface(ray);
   if (first) add_surface(*first, stream, ray);
 }
 

@@ -16,7 +16,6 @@ namespace ls::render {
 struct Built {
   Features features = kEverything;
   bool boundaries = true;       // index-matched surfaces
-  bool coincident = true;       // of these, such as lie on other surfaces
   bool veils = true;            // masks, thin sheets
   bool textures = true;         // anything but constants
   bool user_geometries = true;  // spheres, disks, cylinders
@@ -46,7 +45,6 @@ constexpr Built built_without(std::string_view list) {
                  {"emission", b.features.emission},
                  {"overlaps", b.features.overlaps},
                  {"boundaries", b.boundaries},
-                 {"coincident", b.coincident},
                  {"veils", b.veils},
                  {"textures", b.textures},
                  {"user_geometries", b.user_geometries},

@@ -33,6 +33,7 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   far_ = static_cast<float>(s.far_clip * scale);
   lens_x_ = V3(axis_x_ * scale);
   lens_y_ = V3(axis_y_ * scale);
+  pinhole_ = projection_ == Projection::perspective && !(aperture_ > 0);
   if (s.aperture_scale) {
     textures_ = textures;
     aperture_scale_ = *s.aperture_scale;
@@ -52,11 +53,11 @@ bool Camera::usable() const {
 }
 
 CameraRay Camera::ray(double fx, double fy, V2 lens) const {
-  if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
   const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;
+  if (pinhole_) return perspective_ray(origin_, {x, y, 1});
+  if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
   if (projection_ == Projection::orthographic) return orthographic_ray(x, y);
-  return perspective_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_,
-                         lens);
+  return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
 }
 
 // The mean of the map's channels; between 0 and 1 for every texture.
@@ -65,16 +66,16 @@ float Camera::aperture_at(double u, double v) const {
   return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);
 }
 
-CameraRay Camera::perspective_ray(double x, double y, float aperture, V2 lens) const {
-  V3d local(x, y, 1);
-  V3 o = origin_;
-  if (kBuilt.lenses && aperture > 0) {
-    LS_COUNT(lens);
-    const V2 p = concentric_disk(lens) * aperture;
-    // The point in focus is unmoved by the choice of the lens point.
-    local = V3d(x * focus_ - p.x, y * focus_ - p.y, focus_);
-    o = origin_ + lens_x_ * p.x + lens_y_ * p.y;
-  }
+CameraRay Camera::lens_ray(double x, double y, float aperture, V2 lens) const {
+  if (!kBuilt.lenses || !(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
+  LS_COUNT(lens);
+  const V2 p = concentric_disk(lens) * aperture;
+  // The point in focus is unmoved by the choice of the lens point.
+  return perspective_ray(origin_ + lens_x_ * p.x + lens_y_ * p.y,
+                         {x * focus_ - p.x, y * focus_ - p.y, focus_});
+}
+
+CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
   const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
   const double length = along.length();
   const V3 d(along * (1 / length));

@@ -34,12 +34,14 @@ class Camera {
   Projection projection() const { return projection_; }
 
  private:
-  CameraRay perspective_ray(double x, double y, float aperture, V2 lens) const;
+  CameraRay perspective_ray(const V3& o, const V3d& local) const;  // from o, along this in camera space
+  CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
   CameraRay orthographic_ray(double x, double y) const;
   CameraRay spherical_ray(double u, double v) const;
   float aperture_at(double u, double v) const;
 
   Projection projection_ = Projection::perspective;
+  bool pinhole_ = true;           // perspective, without a lens
   V3d axis_x_, axis_y_, axis_z_;  // of the camera, in the world; columns of to_world, lengths as given
   V3 origin_;
   V3 lens_x_, lens_y_;  // the same axes in world units

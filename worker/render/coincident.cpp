@@ -51,14 +51,11 @@ class Finder {
     for (const Cylinder& c : g.cylinders) shapes_[c.surface].cylinder = &c;
   }
 
-  bool run() {
-    const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
-    if (null.empty()) return false;
-    const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
-    for (const SurfaceBox& n : null)
-      for (const SurfaceBox& o : all) compare(n, o);
-    return std::any_of(g_.surfaces.begin(), g_.surfaces.end(),
-                       [](const SurfaceInfo& s) { return s.together > 0; });
+  Coincidence run() {
+    search();
+    const bool any = std::any_of(g_.surfaces.begin(), g_.surfaces.end(),
+                                 [](const SurfaceInfo& s) { return s.together > 0; });
+    return {any, marks_};
   }
 
  private:
@@ -77,7 +74,20 @@ class Finder {
     return {d.center - d.u - d.v, d.center + d.u + d.v, d.center + (d.u - d.v) * side};
   }
 
+  // Until there is too much to compare.
+  void search() {
+    const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
+    const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
+    if (!null || !all) return mark_all();
+    for (const SurfaceBox& n : *null)
+      for (const SurfaceBox& o : *all) {
+        if (spent_) return;
+        compare(n, o);
+      }
+  }
+
   void mark(std::uint32_t surface, double reach, bool own = true) {
+    ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.together = std::max(s.together, static_cast<float>(reach));
     if (!own) return;  // hits on instances have reaches of their own
@@ -88,14 +98,17 @@ class Finder {
     s.reach = std::max(s.reach, s.together);
   }
   bool spent(std::uint64_t pairs) {
-    if ((pairs_ += pairs) <= kMaxPairs) return false;
+    if (!spent_ && (pairs_ += pairs) > kMaxPairs) mark_all();
+    return spent_;
+  }
+  void mark_all() {
+    spent_ = true;
     for (SurfaceInfo& s : g_.surfaces) s.together = 1;
     const PrimitiveSet& own = g_.own;
     for (std::uint32_t i = own.triangles.first; i < own.triangles.last; ++i) mark(g_.triangle_surface[i], 1);
     for (std::uint32_t i = own.spheres.first; i < own.spheres.last; ++i) mark(g_.spheres[i].surface, 1);
     for (std::uint32_t i = own.disks.first; i < own.disks.last; ++i) mark(g_.disks[i].surface, 1);
     for (std::uint32_t i = own.cylinders.first; i < own.cylinders.last; ++i) mark(g_.cylinders[i].surface, 1);
-    return true;
   }
 
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
@@ -173,15 +186,16 @@ class Finder {
 
   Geometry& g_;
   std::vector<Parts> shapes_;
-  std::uint64_t pairs_ = 0;
+  std::uint64_t pairs_ = 0, marks_ = 0;
+  bool spent_ = false;  // everything is marked
 };
 
 }  // namespace
 
-bool find_coincident(Geometry& g) {
+Coincidence find_coincident(Geometry& g) {
   const bool any_null =
       std::any_of(g.surfaces.begin(), g.surfaces.end(), [](const SurfaceInfo& s) { return s.null; });
-  return any_null && Finder(g).run();
+  return any_null ? Finder(g).run() : Coincidence{};
 }
 
 }  // namespace ls::render

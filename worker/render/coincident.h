@@ -7,9 +7,14 @@
 
 namespace ls::render {
 
-// Sets SurfaceInfo::together; true if any do. Compared are triangles and disks in one plane, spheres, and
+struct Coincidence {
+  bool any = false;         // some do
+  std::uint64_t marks = 0;  // how often a surface was found to
+};
+
+// Sets SurfaceInfo::together. Compared are triangles and disks in one plane, spheres, and
 // cylinders. Instances that touch something count as if they coincided with it, and so does everything where
 // there are too many pairs to compare: that costs time when rendering, and changes nothing else.
-bool find_coincident(Geometry& g);
+Coincidence find_coincident(Geometry& g);
 
 }  // namespace ls::render

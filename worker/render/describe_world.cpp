@@ -64,12 +64,13 @@ WorldReport describe(const World& w) {
   feature(w.need.grids, "density grids, majorants and their trackers");
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
   feature(w.need.emission, "light given off by media");
-  feature(w.need.overlaps, "media within or across each other");
+  feature(w.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null ones");
   feature(w.need.split, "AOVs of light");
   const bool angles =
       w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
-  feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points, "equi-angular sampling about lights");
+  feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points,
+          "equi-angular sampling about lights");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");

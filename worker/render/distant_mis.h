@@ -33,8 +33,10 @@ template <Features F>
 class SegmentLight {
  public:
   struct Plan {
-    Stretch stretch;
+    StretchIn<F> stretch;
     bool angles = false;  // the stretch has an end to propose points by angle
+
+    static bool matters() { return true; }
   };
   struct Vertex {  // default-constructed: not in a medium
     bool by_depth = true, by_angle = false;
@@ -53,13 +55,13 @@ class SegmentLight {
   };
 
   template <class Path>
-  static Plan ahead(Path& path, const Medium& medium, const Segment& segment, bool may_scatter) {
-    Plan plan{Stretch(medium, path.start_, path.d_, segment.length)};
-    const Stretch& s = plan.stretch;
+  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
+    Plan plan{StretchIn<F>(medium, path.start_, path.d_, segment.length)};
+    const StretchIn<F>& s = plan.stretch;
     plan.angles =
         path.world_.distance != DistanceSampling::exponential && std::isfinite(s.to()) && s.to() > s.from();
     const Lights& lights = path.world_.lights;
-    if (!may_scatter || !lights.can_sample() || !(s.total() > 0)) return plan;
+    if (!path.may_scatter() || !lights.can_sample() || !(s.total() > 0)) return plan;
     if (path.world_.distance == DistanceSampling::mis || !plan.angles) {
       const Group g = path.stream_.group(path.segment_, Purpose::distance);
       const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
@@ -101,12 +103,13 @@ class SegmentLight {
   static float depth_pdf(const Path& path, const Medium& medium, const Plan& plan, float x) {
     const float total = plan.stretch.total();
     return over_channels(path, medium, [&](float sigma) {
-      return medium.grid ? mixed_depth_pdf(sigma, total, x) : truncated_pdf(sigma, total, x);
+      return F.grids && medium.grid ? mixed_depth_pdf(sigma, total, x) : truncated_pdf(sigma, total, x);
     });
   }
   static float depth_sample(const Medium& medium, const Plan& plan, int hero, std::uint32_t bits) {
     const float total = plan.stretch.total();
-    if (!medium.grid) return truncated_sample(medium.sigma_t[hero], total, (bits + .5) * 0x1p-32);
+    if (!(F.grids && medium.grid))
+      return truncated_sample(medium.sigma_t[hero], total, (bits + .5) * 0x1p-32);
     return mixed_depth_sample(medium.sigma_t[hero], total, bits);
   }
 
@@ -139,7 +142,7 @@ class SegmentLight {
   template <class Path>
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
                       const LightChoice& choice, bool by_angle, std::uint32_t bits) {
-    const Stretch& s = plan.stretch;
+    const StretchIn<F>& s = plan.stretch;
     const V3 pivot = choice.has_place ? path.world_.lights.pivot(choice) : V3(0);
     Stretch::Spot spot;
     V3 p;

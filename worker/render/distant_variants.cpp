@@ -7,8 +7,9 @@ namespace ls::render {
 std::span<const Variant> distant_variants() {
   static constexpr Variant kVariants[] = {
       variant<Features{}>("surfaces"),
-      variant<Features{.media = true}, SegmentLight>("homogeneous grey media"),
-      variant<Features{.media = true, .grids = true}, SegmentLight>("grey grids"),
+      variant<Features{.passing = true}>("surfaces that light passes"),
+      variant<Features{.media = true, .passing = true}, SegmentLight>("homogeneous grey media"),
+      variant<Features{.media = true, .grids = true, .passing = true}, SegmentLight>("grey grids"),
       variant<kEveryScene, SegmentLight>("everything"),
   };
   static_assert(std::end(kVariants)[-1].covers == kEveryScene);

@@ -9,22 +9,24 @@ struct Features {
   bool grids = false;      // heterogeneous media
   bool chromatic = false;  // extinction that differs between channels
   bool emission = false;   // media that give off light
-  bool overlaps = false;   // media within or across each other (media_state.h)
+  bool overlaps = false;   // media within or across each other (media_state.h), surfaces on each other, one
+                           // of them null (coincident.h)
+  bool passing = false;    // surfaces that light passes straight on: index-matched ones, masks, thin sheets
   bool split = false;      // AOVs of light: each sample's radiance in its parts (light_split.h)
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
-           (emission || !need.emission) && (overlaps || !need.overlaps) && (split || !need.split);
+           (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
+           (split || !need.split);
   }
 };
 inline constexpr Features kEveryScene{
-    .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true};
-inline constexpr Features kEverything{.media = true,
-                                      .grids = true,
-                                      .chromatic = true,
-                                      .emission = true,
-                                      .overlaps = true,
-                                      .split = true};
+    .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
+inline constexpr Features kEverything = [] {
+  Features all = kEveryScene;
+  all.split = true;
+  return all;
+}();
 
 }  // namespace ls::render

@@ -43,12 +43,15 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
   b.v = lv + v * k;
 }
 
-bool complete_triangle(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& d, SurfaceHit& hit) {
+// The ray as it is where the triangle lies: in the world in single precision, in a group's space in double.
+template <class V>
+[[gnu::always_inline]] inline bool complete_triangle(const Geometry& g, std::uint32_t i, const V& o,
+                                                     const V& d, SurfaceHit& hit) {
   const std::uint32_t* idx = &g.indices[3 * i];
   const V3d v0(g.positions[idx[0]]), v1(g.positions[idx[1]]), v2(g.positions[idx[2]]);
   const V3d e1 = v1 - v0, e2 = v2 - v0;
   Barycentric b;
-  if (!meet_triangle(v0, e1, e2, o, d, b)) return false;
+  if (!meet_triangle(v0, e1, e2, V3d(o), V3d(d), b)) return false;
   const V3d n = e1.cross(e2);
   const double twice_area = n.length();
   hit.surface = g.triangle_surface[i];
@@ -194,19 +197,31 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
 
 V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)); }
 
+namespace {
+
+// A triangle that stands in the world by itself: what most hits are on, told by one test.
+bool is_usual(const PrimitiveId& id) {
+  static_assert(PrimitiveId::Kind::triangle == PrimitiveId::Kind{0} && kNone == ~0u);
+  const auto kind = static_cast<std::uint32_t>(id.kind);
+  return ((kBuilt.user_geometries ? kind : 0) | (kBuilt.instances ? ~id.instance : 0)) == 0;
+}
+
+}  // namespace
+
 bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-  if (kBuilt.instances && id.instance != kNone) [[unlikely]]
-    return complete_instanced(id, o, d, hit);
-  if (!kBuilt.user_geometries || id.kind == PrimitiveId::Kind::triangle) {
-    hit.primitive = id;
-    return complete_triangle(*this, id.index, V3d(o), V3d(d), hit);
-  }
+  if (!is_usual(id)) [[unlikely]]
+    return complete_unusual(id, o, d, hit);
+  hit.primitive = id;
+  return complete_triangle(*this, id.index, o, d, hit);
+}
+
+bool Geometry::complete_unusual(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+  if (id.instance != kNone) return complete_instanced(id, o, d, hit);
   return complete_local(id, V3d(o), V3d(d), hit);
 }
 
 bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const {
   hit.primitive = id;
-  if (!kBuilt.user_geometries) return complete_triangle(*this, id.index, o, d, hit);
   switch (id.kind) {
     case PrimitiveId::Kind::triangle:
       return complete_triangle(*this, id.index, o, d, hit);
@@ -323,7 +338,8 @@ std::uint64_t Geometry::bytes() const {
   return positions.size() * sizeof(V3) + normals.size() * sizeof(V3) + uvs.size() * sizeof(V2) +
          indices.size() * sizeof(std::uint32_t) + triangle_surface.size() * sizeof(std::uint32_t) +
          spheres.size() * sizeof(Sphere) + disks.size() * sizeof(Disk) + cylinders.size() * sizeof(Cylinder) +
-         instances.size() * sizeof(PlacedInstance) + attributes.bytes() + surfaces.size() * sizeof(SurfaceInfo);
+         instances.size() * sizeof(PlacedInstance) + attributes.bytes() +
+         surfaces.size() * sizeof(SurfaceInfo);
 }
 
 }  // namespace ls::render

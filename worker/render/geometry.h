@@ -26,11 +26,13 @@ struct SurfaceInfo {  // one per scene shape
   std::uint32_t light = kNone;                       // index into Lights
   std::uint32_t interior = kNone, exterior = kNone;  // media
   bool transition = false;                           // crossing it changes the medium
-  bool crossed = false;                              // some light gets to its other side
-  bool sheet = false;                                // not closed: has an edge, or bounds a body with others
-  bool null = false;                                 // index-matched: rays pass
-  bool veil = false;                                 // a share of the light passes (BsdfTable::veil)
-  bool normals = false, uvs = false;                 // triangles: per-vertex data
+  bool borders = false;                              // that, or it lies on one that does (`together`)
+  bool plain = false;                 // neither shines nor lets light pass: what most hits are on
+  bool crossed = false;               // some light gets to its other side
+  bool sheet = false;                 // not closed: has an edge, or bounds a body with others
+  bool null = false;                  // index-matched: rays pass
+  bool veil = false;                  // a share of the light passes (BsdfTable::veil)
+  bool normals = false, uvs = false;  // triangles: per-vertex data
   // Whether anything on it reads uv, or a direction along it (anisotropy): else hits carry (0, 0) and any
   // frame.
   bool wants_uv = true, wants_tangent = true;
@@ -161,6 +163,7 @@ class Geometry {
   float reach_of(std::uint32_t triangle) const;
 
  private:
+  [[gnu::noinline]] bool complete_unusual(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
   bool complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const;
   bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
 };

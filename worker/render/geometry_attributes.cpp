@@ -79,24 +79,22 @@ Result<void> check_attributes(const MeshData& mesh, std::string_view file, const
 SurfaceAttributes attributes_of(const Scene& scene) {
   SurfaceAttributes all;
   for (const Texture& t : scene.textures) {
-    const auto* a = std::get_if<MeshAttributeTexture>(&t);
-    if (a && std::find(all.names.begin(), all.names.end(), a->name) == all.names.end())
-      all.names.push_back(a->name);
+    if (const auto* a = std::get_if<MeshAttributeTexture>(&t))
+      all.names.try_emplace(a->name, static_cast<std::uint32_t>(all.names.size()));
   }
-  all.surfaces = scene.shapes.size();
-  all.channel_of.assign(all.names.size() * all.surfaces, SurfaceAttributes::kNoChannel);
+  all.first_of.assign(scene.shapes.size(), SurfaceAttributes::kNoChannel);
   return all;
 }
 
 void add_channel(SurfaceAttributes& all, const MeshAttribute& a, std::uint32_t surface, std::uint32_t base,
                  const std::vector<std::uint32_t>& kept) {
-  const auto name =
-      static_cast<std::size_t>(std::find(all.names.begin(), all.names.end(), a.name) - all.names.begin());
-  if (name == all.names.size()) return;
-  all.channel_of[name * all.surfaces + surface] = static_cast<std::uint32_t>(all.channels.size());
+  const auto name = all.names.find(a.name);
+  if (name == all.names.end()) return;
   const bool faces = per_face(a.name);
   const std::size_t count = faces ? kept.size() : a.values.size() / a.components;
-  all.channels.push_back({faces, base, static_cast<std::uint32_t>(count), all.values.size()});
+  all.channels.push_back({faces, base, static_cast<std::uint32_t>(count), all.values.size(), name->second,
+                          all.first_of[surface]});
+  all.first_of[surface] = static_cast<std::uint32_t>(all.channels.size() - 1);
   for (std::size_t i = 0; i < count; ++i) {
     const float* v = &a.values[(faces ? kept[i] : i) * a.components];
     C3 c = a.components == 3 ? C3(v[0], v[1], v[2]) : C3(v[0]);

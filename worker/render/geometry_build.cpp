@@ -233,8 +233,10 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   Parts parts;
   parts.groups.resize(scene.groups.size());
   std::uint64_t vertices = 0;
+  const bool attributes = scene::any_attribute(scene);
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    const auto uses = scene::attribute_uses(scene, scene.shapes[i]);
+    std::vector<scene::AttributeUse> uses;
+    if (attributes) uses = scene::attribute_uses(scene, scene.shapes[i]);
     auto p = place(scene.shapes[i], files, uses);
     if (!p) return fail(p.error().code, fmt::format("shape {}: {}", i + 1, p.error().message));
     vertices += p->mesh.positions.size();
@@ -262,8 +264,8 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   return parts;
 }
 
-// Those of one space, the opaque ones first.
-PrimitiveSet append_all(Geometry& g, const Scene& scene, const Parts& parts, std::optional<GroupIndex> group,
+// The shapes of one space, the opaque ones first. `shapes`: which they are, in order.
+PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, const Parts& parts,
                         const Space& space) {
   PrimitiveSet set;
   const auto note = [&](std::uint32_t PrimitiveRange::*edge) {
@@ -275,9 +277,8 @@ PrimitiveSet append_all(Geometry& g, const Scene& scene, const Parts& parts, std
   note(&PrimitiveRange::first);
   for (const bool passes : {false, true}) {
     note(&PrimitiveRange::passing);
-    for (std::uint32_t i = 0; i < parts.shapes.size(); ++i)
-      if (scene.shapes[i].group == group && (g.surfaces[i].null || g.surfaces[i].veil) == passes)
-        append(g, parts.shapes[i], i, space);
+    for (const std::uint32_t i : shapes)
+      if ((g.surfaces[i].null || g.surfaces[i].veil) == passes) append(g, parts.shapes[i], i, space);
   }
   note(&PrimitiveRange::last);
   return set;
@@ -338,11 +339,16 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
               aside = (parts->world.hi + parts->world.lo) * .5 - g.center;
     g.radius = static_cast<float>((half.length() + aside.length()) * g.scale);
   }
-  g.own = append_all(g, scene, *parts, std::nullopt, world);
+  std::vector<std::uint32_t> own;
+  std::vector<std::vector<std::uint32_t>> of_group(scene.groups.size());
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    const auto& group = scene.shapes[i].group;
+    (group ? of_group[group->value] : own).push_back(i);
+  }
+  g.own = append_all(g, own, *parts, world);
   std::vector<Space> spaces;
-  for (std::uint32_t i = 0; i < scene.groups.size(); ++i)
-    g.groups.push_back(
-        append_all(g, scene, *parts, GroupIndex{i}, spaces.emplace_back(unit_space(parts->groups[i]))));
+  for (std::size_t i = 0; i < of_group.size(); ++i)
+    g.groups.push_back(append_all(g, of_group[i], *parts, spaces.emplace_back(unit_space(parts->groups[i]))));
   g.instances.reserve(scene.instances.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     auto placed = place_instance(scene.instances[i], g, spaces[scene.instances[i].group.value]);
@@ -350,6 +356,7 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
       return fail(placed.error().code, fmt::format("instance {}: {}", i + 1, placed.error().message));
     g.instances.push_back(*placed);
   }
+  g.attributes.find_means();
   // The BVH loads 16 bytes for a vertex of 12: the last one must not end at the end of its allocation.
   g.positions.reserve(g.positions.size() + 2);
   if (!g.normals.empty()) g.normals.resize(g.positions.size());

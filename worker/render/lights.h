@@ -59,7 +59,7 @@ class Lights {
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
   // For the point x of a surface of normal n, or of a medium (n = 0): of many lights, by a tree.
   LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
-    return chosen(numbers, by_tree(n) ? draw(numbers.light, x, n) : draw(numbers.light));
+    return chosen(numbers, alone_ ? only_one() : draw(numbers.light, x, n));
   }
   // Only of a light with a place.
   V3 pivot(const LightChoice& choice) const;
@@ -124,10 +124,11 @@ class Lights {
   struct Light {
     Kind kind = Kind::point;
     C3 value;  // intensity (point, spot), irradiance (directional; projector: of a texture of 1 on
-               // the plane at distance 1), radiance (sun)
+               // the plane at distance 1), radiance (sun; area lights that are uniform)
     TextureIndex radiance;  // area lights; spot, projector: projected texture
     bool textured = false;
-    bool beam = false;  // area lights: radiance depends on the angle
+    bool beam = false;     // area lights: radiance depends on the angle
+    bool uniform = false;  // area lights: neither
     V3 position, axis_u, axis_v,
         normal;          // parallelogram: corner and edges; disk: centre and axes; directional: travel
     V2 uv0, uv_u, uv_v;  // parallelogram: uv at the corner and along the edges
@@ -173,12 +174,11 @@ class Lights {
   bool by_tree(const V3& n) const {
     return kBuilt.light_trees && !tree_.empty() && (tree_in_media_ || dot(n, n) > 0);
   }
-  Drawn draw(std::uint32_t word) const {
-    const std::uint32_t i = last_.size() == 1 ? 0 : by_table(word);
-    return {i, lights_[i].probability};
-  }
-  std::uint32_t by_table(std::uint32_t word) const;
+  Drawn only_one() const { return {0, lights_.front().probability}; }
+  Drawn draw(std::uint32_t word) const { return alone_ ? only_one() : by_table(word); }
   Drawn draw(std::uint32_t word, const V3& x, const V3& n) const;
+  Drawn by_table(std::uint32_t word) const;
+  Drawn from_tree(std::uint32_t word, const V3& x, const V3& n) const;
   float probability_at(std::uint32_t light, const V3& x, const V3& n) const;
   std::uint64_t table_words(std::uint32_t light) const;
   LightChoice chosen(const LightNumbers& numbers, const Drawn& drawn) const {
@@ -198,9 +198,9 @@ class Lights {
   C3 projected(const Light& light, const V3& towards) const;
   // Towards a viewer at an angle of this cosine > 0 from the normal.
   C3 area_radiance(const Light& light, V2 uv, const FacePoint* face, float cosine) const {
-    const C3 value = textures_->eval(light.radiance, uv, face);
-    return light.beam ? value * beam_share(light, cosine) : value;
+    return light.uniform ? light.value : varying_radiance(light, uv, face, cosine);
   }
+  C3 varying_radiance(const Light& light, V2 uv, const FacePoint* face, float cosine) const;
   static float beam_share(const Light& light, float cosine);
   static double beam_flux(const Light& light);  // per radiance and area; pi without a beam
 
@@ -208,6 +208,7 @@ class Lights {
   std::vector<std::uint32_t> suns_;  // those of that kind
   // Light i is chosen by the words above last_[i - 1] up to last_[i]: its probability is exactly their share.
   std::vector<std::uint32_t> last_;
+  bool alone_ = false;  // a single light: there is nothing to choose
   const Geometry* geometry_ = nullptr;
   const TextureTable* textures_ = nullptr;
   C3 environment_{0, 0, 0};

@@ -37,6 +37,8 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
   l.textured = !textures_->is_constant(l.radiance);
   l.sign = g.surfaces[shape].orientation;
   set_beam(l, *s.emitter);
+  l.uniform = !l.textured && !l.beam;
+  if (l.uniform) l.value = textures_->constant(l.radiance);
   const Range triangles = primitives.triangles[shape], spheres = primitives.spheres[shape],
               disks = primitives.disks[shape], cylinders = primitives.cylinders[shape];
   if (spheres.count > 0) {
@@ -87,6 +89,8 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
   }
   const LightBounds box = shape_bounds(l);
   l.reach = std::max(largest(box.low), largest(box.high));
+  // One without a material, on a wall: shadow rays end in front of both.
+  if (g.surfaces[shape].null) l.reach = std::max(l.reach, g.surfaces[shape].together);
   g.surfaces[shape].light = static_cast<std::uint32_t>(lights_.size());
   lights_.push_back(std::move(l));
 }
@@ -240,6 +244,7 @@ void Lights::set_probabilities(float radius) {
   std::vector<double> p;
   double sum = 0;
   for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l, radius)));
+  alone_ = p.size() == 1;
   const double uniform = .5 / static_cast<double>(p.size());
   double acc = 0;
   std::uint64_t before = 0;

@@ -132,8 +132,10 @@ std::uint64_t Lights::table_bytes() const {
   return n;
 }
 
-std::uint32_t Lights::by_table(std::uint32_t word) const {
-  return static_cast<std::uint32_t>(std::lower_bound(last_.begin(), last_.end() - 1, word) - last_.begin());
+Lights::Drawn Lights::by_table(std::uint32_t word) const {
+  const auto i =
+      static_cast<std::uint32_t>(std::lower_bound(last_.begin(), last_.end() - 1, word) - last_.begin());
+  return {i, lights_[i].probability};
 }
 
 // Of the words below table_words_, w stands for the table's word kTableShare w.
@@ -143,6 +145,10 @@ std::uint64_t Lights::table_words(std::uint32_t i) const {
 }
 
 Lights::Drawn Lights::draw(std::uint32_t word, const V3& x, const V3& n) const {
+  return by_tree(n) ? from_tree(word, x, n) : by_table(word);
+}
+
+Lights::Drawn Lights::from_tree(std::uint32_t word, const V3& x, const V3& n) const {
   if (word >= tree_words_) return draw(word);
   const std::uint64_t words = tree_words_ - table_words_;
   if (word >= table_words_) {

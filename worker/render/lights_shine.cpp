@@ -32,6 +32,11 @@ C3 Lights::projected(const Light& l, const V3& towards) const {
   return l.value * textures_->eval(l.radiance, {.5f - .5f * x, .5f - .5f * y}) / (z * z * z);
 }
 
+C3 Lights::varying_radiance(const Light& l, V2 uv, const FacePoint* face, float cosine) const {
+  const C3 value = textures_->eval(l.radiance, uv, face);
+  return l.beam ? value * beam_share(l, cosine) : value;
+}
+
 float Lights::beam_share(const Light& l, float cosine) {
   if (cosine >= l.cos_beam) return 1;
   if (!(cosine > l.cos_cutoff)) return 0;

@@ -62,7 +62,8 @@ bool media_may_overlap(const World& w) {
     if (s.transition) ambiences.insert(s.exterior);
   for (const std::uint32_t m : ambiences)
     if (stands_in_ambience(g, m)) return true;
-  return any_touch(surface_boxes(g, [](const SurfaceInfo& s) { return s.transition && s.crossed; }));
+  auto boxes = surface_boxes(g, [](const SurfaceInfo& s) { return s.transition && s.crossed; });
+  return !boxes || any_touch(std::move(*boxes));
 }
 
 MediaState camera_media(const World& w) {

@@ -31,8 +31,12 @@ inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // What a medium's light is measured by: length, or absorption.
 enum class Glow : std::uint8_t { none, per_length, per_absorption, black_body };
 
+// About which lights segments through a medium are sampled equi-angularly, too (vertex_light.h).
+enum class Focus : std::uint8_t { none, points, places };
+
 struct Medium {
   bool grid = false;
+  Focus focus = Focus::none;
   // Homogeneous: extinction and scattering [1/world unit]. Grid: extinction per unit of density; scattering
   // is albedo times it.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};

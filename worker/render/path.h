@@ -6,9 +6,10 @@
 // and by next-event estimation, combined by the balance heuristic. At surfaces next-event estimation starts
 // from the path's own vertices. What it does in media is a strategy, `Light` (vertex_light.h: the default;
 // distant_mis.h), which has
-//   Plan ahead(path, medium, segment, may_scatter)  before each flight through a medium: light scattered
+//   Plan ahead(path, medium, segment)               before each flight through a medium: light scattered
 //                                                   once, anywhere on the way;
-//   Vertex vertex(path, medium, plan, t)            what a vertex that the flight made at t keeps of it;
+//   Plan::matters()                                 whether vertices of the flight keep anything of it;
+//   Vertex vertex(path, medium, plan, t)            what one that the flight made at t keeps;
 //   void at_vertex(path, medium, p, d)              light scattered at that vertex;
 //   Vertex::found_as_light(), (pivot)               the density of all that next-event estimation, over the
 //                                                   flight's: of lights without a place, of those with this
@@ -23,22 +24,13 @@
 #include "worker/render/built.h"
 #include "worker/render/light_split.h"
 #include "worker/render/media_state.h"
+#include "worker/render/path_end.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
 #include "worker/render/vertex_light.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
-
-// A scene that stacks more null boundaries than this in one path is cut off there, counted as a rejected
-// sample.
-inline constexpr int kMaxSegments = 1 << 16;
-// Beyond this depth roulette may end even paths that lost nothing: a closed white room has no other end. Its
-// variance is finite only while fewer paths live on by nature than by q: after n scatterings in a white slab
-// of optical depth tau a share exp(-n pi^2 / (3 (tau + 1.42)^2)) is still inside, so that .9998 is good to
-// tau = 127 (and .97 would only be to 9).
-inline constexpr int kForcedRouletteDepth = 1024;
-inline constexpr float kForcedSurvival = .9998f;
 
 struct SampleOutcome {
   C3 radiance{0, 0, 0};
@@ -49,11 +41,7 @@ struct SampleOutcome {
     if (cut_off == HealthCause::none) cut_off = cause;
   }
 };
-
-struct FirstSurface {
-  SurfaceHit hit;
-  float not_passed = 1;  // 1 over the share of light that the surface does not let pass straight on
-};
+struct FirstSurface;  // path_first.h
 
 template <Features F, template <Features> class Light = VertexLight>
 class PathTracer {
@@ -87,26 +75,29 @@ class PathTracer {
   void add_glow(const Medium& medium, float t_max);
   std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
+  bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
   // Whether a segment is left after so many scatterings and as many boundaries and veils passed.
   bool may_go_on(int scatterings, int passed) const {
     return world_.depth_allows(scatterings + (world_.passing_counts ? passed : 0));
   }
-  void pass_boundary(const SurfaceHit& hit);
+  void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
   void light_surface(const SurfaceHit& hit, const V3& wo);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
-  C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left, Within medium,
-                        RandomStream stream);
+  [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
+                                                      float left, Within medium, RandomStream stream);
   C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
   Within start_medium() const;
-  [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const V3& w, const V3& from,
-                                              Within in) const;
+  // `surface`: the hit's.
+  [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
+                                              const V3& from, Within in) const;
   void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
   Together others_at(const SurfaceHit& hit, const V3& from, const V3& w) const;
   [[gnu::noinline]] Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
-  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit) const;
+  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
+  [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
 
   // `ahead`: of light that is scattered once more than the path so far, in the medium ahead of it.
@@ -131,7 +122,7 @@ class PathTracer {
   }
   // Where a ray is sent from that is scattered at t of a segment: as far from the surfaces at both ends as
   // rays that leave them. Rounding must not put it on the other side, where the medium has no end.
-  V3 clear_of_ends(V3 p, const Segment& s, float t) const {
+  V3 clear_of_ends(V3 p, Segment s, float t) const {
     if (s.lead > 0) p += clear_of(o_ - start_, t);
     const V3 from_end = s.end ? clear_of(offset_point(*s.end, -d_) - s.end->p, s.length - t) : V3(0);
     p += from_end;
@@ -140,7 +131,7 @@ class PathTracer {
     return p;
   }
   // At a vertex of a medium.
-  void stand_at(const Segment& s, float t) {
+  void stand_at(Segment s, float t) {
     const V3 p = start_ + d_ * t;
     last_.p = clear_of_ends(p, s, t);
     start_ = p;
@@ -195,7 +186,9 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(o_, d_, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, o_, d_, hit);
-    if (kBuilt.coincident && met && world_.coincident) prefer_scatterer(hit);
+    if constexpr (F.overlaps) {
+      if (met && world_.coincident) prefer_scatterer(hit, o_, d_, kInfinity);
+    }
     if constexpr (F.media) {
       if (medium_.any()) {
         if (const auto u = scatter_in_media(met ? &hit : nullptr)) {
@@ -214,12 +207,19 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
       break;
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (kBuilt.found_lights && surface.light != kNone) add_emission(hit);
-    if ((kBuilt.boundaries && surface.null) || (kBuilt.veils && surface.veil && passes_veil(hit))) {
-      if (!may_go_on(depth_, ++passed_)) break;
-      pass_boundary(hit);
-      if (is_black(beta_)) break;
-      continue;
+    if constexpr (kBuilt.found_lights && F.overlaps) {
+      if (world_.lights_on_others && surface.together > 0) add_emission_of_others(hit);
+    }
+    if (!surface.plain) {
+      if (kBuilt.found_lights && surface.light != kNone) add_emission(hit);
+      if constexpr (F.passing) {
+        if ((kBuilt.boundaries && surface.null) || (kBuilt.veils && surface.veil && passes_veil(hit))) {
+          if (!may_go_on(depth_, ++passed_)) break;
+          pass_boundary(hit, surface);
+          if (is_black(beta_)) break;
+          continue;
+        }
+      }
     }
     const auto u = scatter_on_surface(hit);
     if (!u || !survives(*u)) break;
@@ -238,8 +238,7 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
   const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
   const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow(medium, t_max);
-  const bool may_scatter = world_.depth_allows(depth_ + 1);
-  const auto plan = Light<F>::ahead(*this, medium, segment, may_scatter);
+  const auto plan = Light<F>::ahead(*this, medium, segment);
   const Group numbers = stream_.group(segment_, Purpose::flight);
   const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], start_, d_, t_max,
                                        stream_.stream(segment_, Purpose::track_flight), counters_);
@@ -247,13 +246,13 @@ std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& mediu
     apply(flight);
     return std::nullopt;
   }
-  if (!may_scatter) {
+  if (!may_scatter()) {
     beta_ = C3(0);
     return std::nullopt;
   }
   last_ = Vertex{};
   last_.delta = false;
-  last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
+  if (plan.matters()) last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
   stand_at(segment, flight.t);
   apply(flight);
   if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
@@ -283,7 +282,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (is_black(f.f_cos)) return;
   const float weight = !kBuilt.found_lights || light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
   const V3 p = offset_point(hit, light->direction);
-  const Within medium = beyond(hit, light->direction, d_, medium_);
+  const Within medium = beyond(hit, surface, light->direction, d_, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
 }
@@ -293,11 +292,11 @@ template <Features F, template <Features> class Light>
 std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) {
   if (!may_go_on(depth_ + 1, passed_)) return std::nullopt;
   ++depth_;
+  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   const V3 wo = hit.shading.to_local(-d_);
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
-  const auto s = world_.bsdfs.sample(world_.geometry.surfaces[hit.surface].bsdf, hit.uv_point(), wo, g.u(2),
-                                     {g.u(0), g.u(1)});
+  const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
   if (!s) return std::nullopt;
   const V3 w = normalize(hit.shading.to_world(s->wi));
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return std::nullopt;  // through the true surface: no such light
@@ -310,7 +309,7 @@ std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& 
   last_.delta = s->delta;
   // Reflected rays too: what lies on either side of a surface is the scene's word (as for next-event
   // estimation).
-  if constexpr (F.media) medium_ = beyond(hit, w, d_, medium_);
+  if constexpr (F.media) medium_ = beyond(hit, surface, w, d_, medium_);
   start_ = hit.p;
   o_ = offset_point(hit, w);
   d_ = w;
@@ -336,10 +335,10 @@ bool PathTracer<F, Light>::passes_veil(const SurfaceHit& hit) {
 }
 
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit) {
+void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit, [[maybe_unused]] const SurfaceInfo& surface) {
   start_ = hit.p;
   o_ = offset_point(hit, d_);
-  if constexpr (F.media) medium_ = beyond(hit, d_, d_, medium_);
+  if constexpr (F.media) medium_ = beyond(hit, surface, d_, d_, medium_);
 }
 
 template <Features F, template <Features> class Light>
@@ -370,8 +369,7 @@ bool PathTracer<F, Light>::survives(float u) {
   if (depth_ < world_.rr_depth) return true;
   float size = max_component(beta_) * eta_scale_;
   if constexpr (F.chromatic) size /= mean(density_);
-  float q = std::min(1.f, size);
-  if (depth_ >= kForcedRouletteDepth) q = std::min(q, kForcedSurvival);
+  const float q = std::min(size, forced_survival(depth_));
   if (q >= 1) return true;
   if (!(u < q)) return false;
   beta_ /= q;

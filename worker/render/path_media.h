@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "worker/render/built.h"
 #include "worker/render/world.h"
 
 namespace ls::render {
@@ -10,7 +11,6 @@ namespace ls::render {
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::start_medium() const -> Within {
   Within in;
-  if (!world_.use_media) return in;
   if constexpr (F.overlaps) {
     if (world_.overlaps) return world_.camera_media;
   }
@@ -19,26 +19,28 @@ auto PathTracer<F, Light>::start_medium() const -> Within {
 }
 
 // The media on the side of w, for a path that travels along `from` and is in `in`. Everything that lets all
-// light pass and lies where the surface does is crossed with it.
+// light pass and lies where the surface does is crossed with it. Scenes in which something does are a matter
+// of F.overlaps, so that no other ever asks.
 template <Features F, template <Features> class Light>
-auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
-    -> Within {
+auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
+                                  const V3& from, Within in) const -> Within {
   if constexpr (F.media) {
-    if (!world_.use_media) return in;
-    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (!surface.transition && !(surface.together > 0)) return in;
-    const bool outside = dot(w, hit.ng) > 0, through = outside == (dot(from, hit.ng) > 0);
-    if (surface.together > 0 && through) return through_all(hit, w, from, in);
-    stand(surface, outside, through, in);
+    if (!(F.overlaps ? surface.borders : surface.transition)) return in;
+    const bool outside = dot(w, hit.ng) > 0;
+    if constexpr (F.overlaps) {
+      const bool through = outside == (dot(from, hit.ng) > 0);
+      if (surface.together > 0 && through) return through_all(hit, w, from, in);
+      stand(surface, outside, through, in);
+    } else {
+      in.only(outside ? surface.exterior : surface.interior);
+    }
   }
   return in;
 }
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const {
-  if constexpr (F.overlaps) {
-    if (world_.overlaps) return in.stand(s, outside, through, world_.media);
-  }
+  if (world_.overlaps) return in.stand(s, outside, through, world_.media);
   if (s.transition) in.only(outside ? s.exterior : s.interior);
 }
 
@@ -82,20 +84,35 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
   return in;
 }
 
-// Of surfaces on each other the one that scatters light is met, whichever the ray found: else fog on a floor
-// would let light through the floor.
+// Of surfaces on each other the one that scatters light is met, whichever the ray from o along d found: else
+// fog on a floor would let light through the floor, and a pane on a boundary would take nothing of it. Shadow
+// rays end at t_max, in front of what their light is on.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit) const {
+void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
   if (!s.null || !(s.together > 0)) return;
-  const Together others = others_at(hit, d_, d_);
+  const Together others = others_at(hit, d, d);
   for (int i = 0; i < others.count; ++i) {
     SurfaceHit other;
     const PrimitiveId id = others.ids[static_cast<std::size_t>(i)];
-    if (!world_.geometry.complete(id, o_, d_, other) || world_.geometry.surfaces[other.surface].null)
+    if (!world_.geometry.complete(id, o, d, other) || world_.geometry.surfaces[other.surface].null ||
+        other.t > t_max)
       continue;
     hit = other;
     return;
+  }
+}
+
+// A light that lets all light pass shines on from where another surface lies, whichever the ray found:
+// next-event estimation, which its share of the light is weighted against, finds it there as well.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
+  const Together others = others_at(hit, d_, d_);
+  for (int i = 0; i < others.count; ++i) {
+    SurfaceHit other;
+    if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], o_, d_, other)) continue;
+    const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
+    if (s.null && s.light != kNone) add_emission(other);
   }
 }
 

@@ -15,7 +15,6 @@ std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) 
   const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
   const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow_among(t_max);
-  const bool may_scatter = world_.depth_allows(depth_ + 1);
   RandomStream streams = stream_.stream(segment_, Purpose::overlap);
   const Medium* met = nullptr;
   std::size_t winner = 0;
@@ -35,7 +34,7 @@ std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) 
   for (std::size_t i = 0; i < media.size(); ++i)
     if (!met || i != winner) apply(passed(world_.media[media[i]], hero_, start_, d_, flight.t));
   if (!met) return std::nullopt;
-  if (!may_scatter) {
+  if (!may_scatter()) {
     beta_ = C3(0);
     return std::nullopt;
   }

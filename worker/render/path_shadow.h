@@ -25,8 +25,8 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
   }
   LS_COUNT(shadow_rays);
   if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
-  bool walk = kBuilt.veils && world_.veils;
-  if constexpr (F.media) walk = walk || (world_.use_media && (medium.any() || world_.accel.has_boundaries()));
+  bool walk = F.passing && world_.shadows_walk;
+  if constexpr (F.media) walk = walk || medium.any();
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
 
@@ -36,11 +36,14 @@ template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {
   V3 from = start, o = p;
-  for (int i = 0; i < kMaxSegments; ++i) {
+  for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
     LS_COUNT(boundary_rays);
     const auto primitive = world_.accel.nearest_boundary(o, d, left);
     const bool met = primitive && world_.geometry.complete(*primitive, o, d, hit);
+    if constexpr (F.overlaps) {
+      if (met && world_.coincident) prefer_scatterer(hit, o, d, left);
+    }
     if constexpr (F.media) {
       if (medium.any()) {
         const float t =
@@ -56,7 +59,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
       value *= world_.bsdfs.veil(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
       if (is_black(value)) return value;
     }
-    if constexpr (F.media) medium = beyond(hit, d, d, medium);
+    if constexpr (F.media) medium = beyond(hit, surface, d, d, medium);
     if constexpr (F.overlaps) {
       if (medium.overflowed()) {
         outcome_.reject(HealthCause::nested_media);

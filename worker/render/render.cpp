@@ -28,10 +28,11 @@ class FlushDenormals {
 // Cheapest first; the last covers every scene.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
-    variant<Features{.media = true}>("homogeneous grey media"),
-    variant<Features{.media = true, .chromatic = true}>("homogeneous chromatic media"),
-    variant<Features{.media = true, .grids = true}>("grey grids"),
-    variant<Features{.media = true, .grids = true, .chromatic = true}>("chromatic grids"),
+    variant<Features{.passing = true}>("surfaces that light passes"),
+    variant<Features{.media = true, .passing = true}>("homogeneous grey media"),
+    variant<Features{.media = true, .chromatic = true, .passing = true}>("homogeneous chromatic media"),
+    variant<Features{.media = true, .grids = true, .passing = true}>("grey grids"),
+    variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
     variant<kEveryScene>("everything"),
 };
 static_assert(std::end(kVariants)[-1].covers == kEveryScene);

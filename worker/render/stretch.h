@@ -4,6 +4,9 @@
 // the cells are walked anew for every question (a few nanoseconds a cell), nothing is stored.
 #pragma once
 
+#include <type_traits>
+
+#include "worker/render/features.h"
 #include "worker/render/medium.h"
 
 namespace ls::render {
@@ -47,5 +50,23 @@ class Stretch {
   V3 o_, d_;
   float t_max_, from_ = 0, to_, total_;
 };
+
+// The same of a medium that is known to be homogeneous, where nothing is to be measured.
+class PlainStretch {
+ public:
+  PlainStretch(const Medium& m, const V3&, const V3&, float t_max) : sigma_s_(m.sigma_s), t_max_(t_max) {}
+  static float from() { return 0; }
+  float to() const { return t_max_; }
+  float total() const { return t_max_; }
+  static Stretch::Spot at(float t) { return {t, t, 1, {0, 0, 0}}; }
+  static Stretch::Spot after(float x) { return {x, x, 1, {0, 0, 0}}; }
+  C3 scattering(const Stretch::Spot&, const V3&) const { return sigma_s_; }
+
+ private:
+  C3 sigma_s_;
+  float t_max_;
+};
+template <Features F>
+using StretchIn = std::conditional_t<F.grids, Stretch, PlainStretch>;
 
 }  // namespace ls::render

@@ -7,6 +7,8 @@
 namespace ls::render {
 namespace {
 
+constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // 300 MB
+
 struct Grown : Box {
   Grown()
       : Box{V3d(std::numeric_limits<double>::infinity()), V3d(-std::numeric_limits<double>::infinity())} {}
@@ -59,18 +61,23 @@ std::vector<std::uint32_t> groups_of(const Geometry& g) {
 
 }  // namespace
 
-std::vector<SurfaceBox> surface_boxes(const Geometry& g,
-                                      const std::function<bool(const SurfaceInfo&)>& wanted) {
+std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
+                                                     const std::function<bool(const SurfaceInfo&)>& wanted) {
   std::vector<bool> want;
   for (const SurfaceInfo& s : g.surfaces) want.push_back(wanted(s));
   const std::vector<Grown> own = own_boxes(g, want);
   const std::vector<std::uint32_t> group = groups_of(g);
+  std::vector<std::vector<std::uint32_t>> instances(g.groups.size());
+  for (std::uint32_t k = 0; k < g.instances.size(); ++k) instances[g.instances[k].group].push_back(k);
   std::vector<SurfaceBox> boxes;
   for (std::uint32_t i = 0; i < own.size(); ++i) {
     if (!want[i] || own[i].empty()) continue;
-    if (group[i] == kNone) boxes.push_back({i, kNone, V3(own[i].lo), V3(own[i].hi)});
-    for (std::uint32_t k = 0; k < g.instances.size() && group[i] != kNone; ++k) {
-      if (g.instances[k].group != group[i]) continue;
+    if (group[i] == kNone) {
+      boxes.push_back({i, kNone, V3(own[i].lo), V3(own[i].hi)});
+      continue;
+    }
+    if (boxes.size() + instances[group[i]].size() > kMaxBoxes) return std::nullopt;
+    for (const std::uint32_t k : instances[group[i]]) {
       const Grown b = moved(own[i], g.instances[k].to_world);
       boxes.push_back({i, k, V3(b.lo), V3(b.hi)});
     }

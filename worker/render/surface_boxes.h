@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "worker/render/geometry.h"
@@ -21,8 +22,9 @@ struct SurfaceBox {
   }
 };
 
-// Of those that are wanted and have any primitives, in the world.
-std::vector<SurfaceBox> surface_boxes(const Geometry& g,
-                                      const std::function<bool(const SurfaceInfo&)>& wanted);
+// Of those that are wanted and have any primitives, in the world. Nothing where instances make more of them
+// than a list can be worth.
+std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
+                                                     const std::function<bool(const SurfaceInfo&)>& wanted);
 
 }  // namespace ls::render

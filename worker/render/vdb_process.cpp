@@ -111,7 +111,8 @@ bool sound(const LsVdbGrid& grid, std::uint64_t count) {
 VdbFile::VdbFile(VdbFile&& from) noexcept
     : grid_(std::exchange(from.grid_, {})),
       mapped_(std::exchange(from.mapped_, nullptr)),
-      mapped_bytes_(from.mapped_bytes_) {}
+      mapped_bytes_(from.mapped_bytes_),
+      taken_(std::move(from.taken_)) {}
 
 VdbFile::~VdbFile() {
   if (mapped_) ::munmap(mapped_, mapped_bytes_);
@@ -126,8 +127,10 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
                               std::uint64_t max_values, const std::filesystem::path& program) {
   const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC));
   if (reply.fd < 0) return no_program("memfd_create", errno);
-  const auto status =
-      run(program, {program.string(), path.string(), grid_name, std::to_string(max_values)}, reply.fd);
+  const auto status = run(
+      program,
+      {program.string(), path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())},
+      reply.fd);
   if (!status) return tl::unexpected(status.error());
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
@@ -141,6 +144,7 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, reply.fd, 0);
   if (mapped == MAP_FAILED) return no_program("mmap", errno);
   file.mapped_ = mapped;
+  file.taken_ = DataTaken(bytes);
   VdbReply said;
   std::memcpy(&said, mapped, sizeof said);
   said.error[sizeof said.error - 1] = 0;

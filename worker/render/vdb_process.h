@@ -1,7 +1,8 @@
 // Grids of .vdb and .nvdb files, read by a program of their own, lightshaft-vdb, which stands beside the
 // executable. OpenVDB trusts the files that it reads: one that is damaged, or made to harm, may crash it,
 // keep it busy or make it write where it must not. Here that costs a process without anything in it and gives
-// an error with a text. Nor is OpenVDB ever mapped (30 ms, 29 MB) by what renders.
+// an error with a text; its memory and its reply count towards the limit of who reads. Nor is OpenVDB ever
+// mapped (30 ms, 29 MB) by what renders.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <string>
 
 #include "common/base/error.h"
+#include "worker/render/vdb_limit.h"
 #include "worker/render/vdb_module.h"
 
 namespace ls::render {
@@ -34,6 +36,7 @@ class VdbFile {
   LsVdbGrid grid_{};
   void* mapped_ = nullptr;
   std::uint64_t mapped_bytes_ = 0;
+  DataTaken taken_;
 };
 
 }  // namespace ls::render

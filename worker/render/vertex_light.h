@@ -38,16 +38,19 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Stre
 template <Features F>
 class VertexLight {
  public:
-  struct Plan {  // of a segment that is sampled equi-angularly, too
-    bool focused = false, points_only = false;
-    float length = 0;
+  struct Plan {
+    float length = 0;  // of a segment that is sampled equi-angularly, too; else 0
+
+    bool matters() const { return kBuilt.equiangular && length > 0; }
   };
   struct Vertex {  // of such a segment: of the part that has a medium
     bool focused = false, points_only = false;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
 
-    bool focuses(bool is_point) const { return focused && (is_point || !points_only); }
+    bool focuses(bool is_point) const {
+      return kBuilt.equiangular && focused && (is_point || !(F.grids && points_only));
+    }
     // e / f for a light with this pivot, where it focuses on such.
     float focus(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf; }
     // Of a light that was hit: no point.
@@ -56,25 +59,18 @@ class VertexLight {
   };
 
   template <class Path>
-  static Plan ahead(Path& path, const Medium& medium, const Segment& segment, bool may_scatter) {
-    Plan plan;
-    if (!kBuilt.equiangular || !may_scatter) return plan;
-    if constexpr (F.grids) {
-      plan.points_only = medium.grid;
-      plan.focused = medium.grid && path.world_.equiangular_points;
-    }
-    plan.focused = plan.focused || (!medium.grid && path.world_.equiangular && std::isfinite(segment.length));
-    plan.length = segment.length;
-    if (plan.focused) focus_on_light(path, medium, segment, plan);
-    return plan;
+  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
+    if (!kBuilt.equiangular || medium.focus == Focus::none) return {};
+    if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
+    focus_on_light(path, medium, segment);
+    return {segment.length};
   }
 
   template <class Path>
   static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
     Vertex v;
-    if (!plan.focused) return v;
-    const Stretch stretch(medium, path.start_, path.d_, plan.length);
-    v.points_only = plan.points_only;
+    const StretchIn<F> stretch(medium, path.start_, path.d_, plan.length);
+    v.points_only = points_only(medium);
     v.o = path.start_ + path.d_ * stretch.from();
     v.d = path.d_;
     v.length = stretch.to() - stretch.from();
@@ -96,24 +92,26 @@ class VertexLight {
     const float phase = medium.phase.value(d, light->direction);
     const Vertex& v = path.last_.in_medium;
     const float with_focus =
-        choice.has_place && v.focuses(choice.is_point) ? 1 + v.focus(lights.pivot(choice)) : 1.f;
+        v.focuses(choice.is_point) && choice.has_place ? 1 + v.focus(lights.pivot(choice)) : 1.f;
     const float weight = !kBuilt.found_lights || light->delta
                              ? 1 / with_focus
                              : light->pdf / (light->pdf * with_focus + phase);
-    const C3 arriving =
-        path.unoccluded(path.start_, p, *light, path.medium_, path.stream_.stream(path.depth_, Purpose::track_shadow));
+    const C3 arriving = path.unoccluded(path.start_, p, *light, path.medium_,
+                                        path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
   }
 
  private:
-  // Strategy (3): light scattered once, from a vertex near the light.
+  static bool points_only(const Medium& medium) { return F.grids && medium.focus == Focus::points; }
+
+  // Strategy (3): light scattered once, from a vertex near the light. Out of the way of media without one.
   template <class Path>
-  static void focus_on_light(Path& path, const Medium& medium, const Segment& segment, const Plan& plan) {
+  [[gnu::noinline]] static void focus_on_light(Path& path, const Medium& medium, Segment segment) {
     const Lights& lights = path.world_.lights;
     const Group g = path.stream_.group(path.segment_, Purpose::segment);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
-    if (!choice.has_place || (plan.points_only && !choice.is_point)) return;
-    const Stretch stretch(medium, path.start_, path.d_, plan.length);
+    if (!choice.has_place || (points_only(medium) && !choice.is_point)) return;
+    const StretchIn<F> stretch(medium, path.start_, path.d_, segment.length);
     const float length = stretch.to() - stretch.from();
     if (!(length > 0)) return;
     const V3 o = path.start_ + path.d_ * stretch.from();

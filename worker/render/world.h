@@ -41,11 +41,13 @@ class World {
   bool overlaps = false;    // media may lie within or across each other: paths keep a MediaState,
   MediaState camera_media;  // which begins as this
   bool coincident = false;  // surfaces lie on each other, one of them null (coincident.h)
+  bool lights_on_others = false;  // null ones that shine are among them
   Features need;
   bool use_media = true;     // false: the integrator `path`, which sees no media
   bool equiangular = false;  // homogeneous media and lights with a place: segments are sampled about them too
   bool equiangular_points = false;  // the same in grids, if points shine in them
   bool veils = false;               // some surface lets a share of the light pass: shadow rays collect it
+  bool shadows_walk = false;        // for that, or because they may cross media
   bool distant_mis = false;         // the integrator `volpath_distant_mis` (distant_mis.h), and its choices
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;

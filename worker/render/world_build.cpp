@@ -17,12 +17,19 @@ namespace {
 
 // What the scene's needs ask of the integrator.
 Features features_of(const scene::Needs& n) {
-  return {.media = n.media, .grids = n.grids, .chromatic = n.chromatic, .emission = n.emission};
+  return {.media = n.media,
+          .grids = n.grids,
+          .chromatic = n.chromatic,
+          .emission = n.emission,
+          .passing = n.boundaries || n.veils};
 }
 
 // What the world that was made of it asks: never more.
 Features found_in(const World& w) {
   Features f;
+  const auto& surfaces = w.geometry.surfaces;
+  f.passing =
+      std::any_of(surfaces.begin(), surfaces.end(), [](const SurfaceInfo& s) { return s.null || s.veil; });
   if (!w.use_media) return f;
   const auto use = [&](std::uint32_t i) {
     if (i == kNone) return;
@@ -35,7 +42,7 @@ Features found_in(const World& w) {
     f.chromatic = f.chromatic || m.chromatic();
   };
   use(w.camera_medium);
-  for (const SurfaceInfo& s : w.geometry.surfaces) {
+  for (const SurfaceInfo& s : surfaces) {
     if (!s.transition) continue;
     use(s.interior);
     use(s.exterior);
@@ -109,8 +116,7 @@ void place_camera(const Scene& scene, const RenderSettings& settings, World& w) 
 // A build without some parts, for experiments, renders what it can render and nothing else.
 Result<void> check_built(const World& w) {
   const bool has = kBuilt.features.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
-                   (kBuilt.coincident || !w.coincident) && (kBuilt.veils || !w.veils) &&
-                   (kBuilt.instances || w.geometry.instances.empty()) &&
+                   (kBuilt.veils || !w.veils) && (kBuilt.instances || w.geometry.instances.empty()) &&
                    (kBuilt.environment_maps || !w.lights.map()) &&
                    (kBuilt.light_trees || !w.lights.has_tree()) && (kBuilt.lenses || !w.camera.has_lens()) &&
                    (kBuilt.found_lights || w.needs.only_delta_lights ||
@@ -188,6 +194,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
   }
+  w.coincident = find_coincident(w.geometry).any;
   auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) -> Result<ImageData> {
     const auto it = files.find(a.digest);
     if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
@@ -199,7 +206,12 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
   w.inputs.add(HealthCause::negative_texel, w.lights.clamped_inputs());
-  w.coincident = find_coincident(w.geometry);
+  for (SurfaceInfo& s : w.geometry.surfaces) {
+    s.transition = s.transition && w.use_media;
+    s.borders = s.transition || s.together > 0;
+    s.plain = s.light == kNone && !s.null && !s.veil;
+    w.lights_on_others = w.lights_on_others || (s.null && s.light != kNone && s.together > 0);
+  }
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
@@ -212,20 +224,24 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
-  w.need.overlaps = found.overlaps;                        // a matter of where the shapes' files put them
+  w.need.overlaps = found.overlaps || w.coincident;        // a matter of where the shapes' files put them
   w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
   if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
   if (!w.need.covers(found))
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
-  w.overlaps = w.need.overlaps;
+  w.overlaps = found.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
   w.need.split = w.aovs.any_of(aovs_of(AovKind::light));
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
+  w.shadows_walk = w.veils || (w.need.media && w.accel.has_boundaries());
   w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
   w.equiangular_points = kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) &&
                          a_point_shines_in_a_grid(w);
+  for (Medium& m : w.media) {
+    if (m.grid ? w.equiangular_points : w.equiangular) m.focus = m.grid ? Focus::points : Focus::places;
+  }
   // Lights chosen for a whole segment know no point: what is weighed against them must choose alike.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();

@@ -44,7 +44,8 @@ std::unique_ptr<RenderBackend> backend(const std::string& fault, int slots = 1,
   ChildOptions options{.arguments = {"--render-child", std::to_string(slots), fault},
                        .slots = slots,
                        .hang_limit = hang_limit,
-                       .forget_limit = hang_limit};
+                       .forget_limit = hang_limit,
+                       .respawn_pause = std::chrono::milliseconds(1)};
   auto made = make_child_backend(options);
   EXPECT_TRUE(made) << made.error().message;
   return std::move(*made);
@@ -171,6 +172,37 @@ TEST(Child, ReplacesARendererThatHangsWhenItFreesAScene) {
   EXPECT_TRUE(child->prepare(job_with_seed(4)));
 }
 
+// A coordinator whose data were replaced gives an id again, and a unit of the old job is under way.
+TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
+  const auto child = backend("");
+  const LocalJob old = job_with_seed(3);
+  LocalJob other = job_with_seed(4);
+  other.brief.job = old.brief.job;
+  ASSERT_TRUE(child->prepare(old));
+  child->forget(old.brief.job);
+  expect_right_pixels(child->render(old, unit(0), kGoOn), 3, 0);
+
+  ASSERT_TRUE(child->prepare(other));
+
+  expect_right_pixels(child->render(other, unit(0), kGoOn), 4, 0);
+}
+
+// Its fault is not another's: jobs that are ready are rendered meanwhile, and afterwards.
+TEST(Child, RendersOtherJobsWhileAWorldIsBuiltWithoutEnd) {
+  ChildOptions options{.arguments = {"--render-child", "1", "odd,builds"},
+                       .prepare_limit = std::chrono::milliseconds(500)};
+  const auto child = make_child_backend(options).value();
+  ASSERT_TRUE(child->prepare(job_with_seed(3)));
+  std::jthread builder([&] {
+    EXPECT_THAT(child->prepare(job_with_seed(4)).error().reason,
+                HasSubstr("building the scene took longer than"));
+  });
+
+  for (int i = 0; i < 20; ++i) expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
+  builder.join();
+  expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
+}
+
 TEST(Child, IsToldOfAsManyFilesAsAJobMayHave) {
   const auto child = backend("");
   LocalJob job = job_with_seed(3);
@@ -225,19 +257,56 @@ TEST_F(ChildOfAFile, IsBrokenWhenANewChildHasAnotherNumericClass) {
   EXPECT_THAT(child->broken()->message, AllOf(HasSubstr("replaced"), HasSubstr("child_test")));
 }
 
-TEST_F(ChildOfAFile, IsBrokenWhenANewChildEndsBeforeItIsReady) {
+TEST_F(ChildOfAFile, IsBrokenWhenNewChildrenEndBeforeTheyAreReadyAgainAndAgain) {
   const auto child = backend("class," + file_.string());
   EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
   std::filesystem::remove(file_);
 
   EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
 
-  EXPECT_TRUE(child->broken());
+  ASSERT_TRUE(child->broken());
+  EXPECT_THAT(child->broken()->message, HasSubstr("ended with exit code 3 before it was ready"));
 }
+
+// As where there is not enough address space for a moment.
+TEST_F(ChildOfAFile, StartsAnotherAfterANewChildThatEndsBeforeItIsReady) {
+  const auto child = backend("later," + file_.string());
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
+    std::filesystem::remove(file_);
+
+    EXPECT_TRUE(child->render(job_with_seed(3), unit(0), kGoOn));
+  }
+  EXPECT_FALSE(child->broken());
+}
+
+// Builds the world of seed 4 without end.
+class Builder final : public LocalBackend {
+ public:
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
+    while (job.brief.settings.seed == 4) ::pause();
+    return fake_->prepare(job);
+  }
+  tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
+                                                        const std::atomic<bool>& stop,
+                                                        render::Breadcrumb* where) override {
+    return fake_->render_marked(job, unit, stop, where);
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+
+ private:
+  const std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+};
 
 // Children that no renderer would be.
 int serve_oddly(const std::string& kind) {
   using namespace child;
+  if (kind == "builds") {
+    Builder builder;
+    return serve(builder, 1);
+  }
   if (kind == "environment") {
     std::ifstream own("/proc/self/environ");
     const std::string all{std::istreambuf_iterator<char>(own), {}};
@@ -264,10 +333,13 @@ int serve_oddly(const std::string& kind) {
 int serve_as_told(int slots, const std::string& how) {
   if (how.starts_with("odd,")) return serve_oddly(how.substr(4));
   FakeOptions options;
-  if (how.starts_with("class,")) {
+  const bool later = how.starts_with("later,");  // ends, but lets the next one live
+  if (later || how.starts_with("class,")) {
     std::ifstream in(how.substr(6));
     std::string text;
-    if (!(in >> text)) return 3;
+    const bool there = static_cast<bool>(in >> text);
+    if (!there && later) std::ofstream(how.substr(6)) << "one";
+    if (!there) return 3;
     options.numeric_class = sha256(text);
     options.fault = parse_fake_fault("crash,tile=1").value();
   } else {

@@ -35,6 +35,9 @@ TEST(SpecQuery, SaysAllOfASpec) {
   spec.priority = -3;
   spec.float_output = true;
   spec.tags = {"fast", "big"};
+  spec.max_workers = 4;
+  spec.max_units = 100;
+  spec.memory = std::uint64_t{8} << 30;
 
   EXPECT_EQ(as_the_coordinator_reads(spec, true), spec);
 }

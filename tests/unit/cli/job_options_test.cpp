@@ -33,6 +33,9 @@ TEST(JobOptions, TakesEveryOption) {
   options.defines = {"density=2", "path=a=b", "empty="};
   options.priority = "-3";
   options.float_output = true;
+  options.max_workers = "4";
+  options.max_units = "100";
+  options.memory = "8G";
 
   const auto spec = options.parse();
 
@@ -47,6 +50,9 @@ TEST(JobOptions, TakesEveryOption) {
             (std::map<std::string, std::string>{{"density", "2"}, {"path", "a=b"}, {"empty", ""}}));
   EXPECT_EQ(spec->priority, -3);
   EXPECT_TRUE(spec->float_output);
+  EXPECT_EQ(spec->max_workers, 4u);
+  EXPECT_EQ(spec->max_units, 100u);
+  EXPECT_EQ(spec->memory, std::uint64_t{8} << 30);
 }
 
 TEST(JobOptions, NamesTheOptionAndWhatIsWrongWithIt) {
@@ -61,6 +67,11 @@ TEST(JobOptions, NamesTheOptionAndWhatIsWrongWithIt) {
     JobOptions options;
     options.size = size;
     EXPECT_THAT(error_of(options), testing::AllOf(HasSubstr("--size"), HasSubstr(size)));
+  }
+  for (const char* memory : {"0", "G", "8GB", "-1G", "1.5G", "9999999T"}) {
+    JobOptions options;
+    options.memory = memory;
+    EXPECT_THAT(error_of(options), testing::AllOf(HasSubstr("--memory"), HasSubstr(memory)));
   }
   for (const char* time : {"0", "-2", "nan", "inf", "1e400", "2s"}) {
     JobOptions options;

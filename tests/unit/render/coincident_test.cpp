@@ -1,5 +1,9 @@
 // Surfaces that lie on each other.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <string_view>
 
 #include "tests/support/render_check.h"
 #include "worker/render/coincident.h"
@@ -78,6 +82,23 @@ TEST(Coincident, AreFoundAmongRoundShapes) {
   EXPECT_FALSE(found(1.001));
 }
 
+// No other instantiation looks for them; that media overlap is another matter.
+TEST(Coincident, AreAMatterOfTheGeneralInstantiationWithOrWithoutMedia) {
+  for (const bool foggy : {false, true}) {
+    SceneKit kit({1, 1});
+    if (foggy)
+      kit.container(CubeShape{}, {}, kit.null(), kit.homogeneous({1, 1, 1}, {0, 0, 0}));
+    else
+      kit.shape(CubeShape{}, {}, kit.null());
+    kit.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(5), kit.diffuse(.5));
+    const auto w = test::world_of(kit);
+    EXPECT_TRUE(w->coincident);
+    EXPECT_TRUE(w->need.overlaps);
+    EXPECT_FALSE(w->overlaps);
+    EXPECT_EQ(covering_variants(*w).front(), "everything");
+  }
+}
+
 // All that lies between two points, whatever its kind, each once.
 TEST(Coincident, AreAllListedByTheAccelerationStructure) {
   SceneKit kit({1, 1});
@@ -91,6 +112,38 @@ TEST(Coincident, AreAllListedByTheAccelerationStructure) {
   EXPECT_EQ(w->accel.between(at(-.01), at(.001)).count, 4);
   EXPECT_EQ(w->accel.between(at(-.01), at(.1)).count, 5);
   EXPECT_EQ(w->accel.between(at(.1), at(.5)).count, 0);
+}
+
+// Apart from each other, and too many to compare all with all.
+TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
+  constexpr int kSpheres = 12'000;
+  SceneKit kit({1, 1});
+  const BsdfIndex null = kit.null();
+  for (int i = 0; i < kSpheres; ++i) kit.shape(SphereShape{}, translate({3. * i, 0, 0}), null);
+  auto g = Geometry::build(kit.scene, {kit.scene, kit.files});
+  ASSERT_TRUE(g);
+
+  const Coincidence found = find_coincident(*g);
+
+  EXPECT_TRUE(found.any);
+  EXPECT_LE(found.marks, g->primitive_count());
+  for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.together, 1);
+}
+
+// Instances of every shape of a group of many: more boxes than can be listed.
+TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
+  constexpr int kShapes = 3'000, kInstances = 3'000;
+  SceneKit kit({1, 1});
+  const BsdfIndex null = kit.null();
+  const GroupIndex group = SceneKit::push<GroupTag>(kit.scene.groups, ShapeGroup{});
+  for (int i = 0; i < kShapes; ++i) kit.shape(SphereShape{}, translate({3. * i, 0, 0}), null).group = group;
+  for (int i = 0; i < kInstances; ++i) kit.scene.instances.push_back({group, translate({0, 3. * i, 0})});
+  auto g = Geometry::build(kit.scene, {kit.scene, kit.files});
+  ASSERT_TRUE(g);
+
+  EXPECT_TRUE(find_coincident(*g).any);
+
+  for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.together, 1);
 }
 
 // A glass plate and the fog in it, with the same faces: both are crossed or none.
@@ -111,6 +164,96 @@ TEST(Coincident, MediaBeginWithTheGlassThatTheyFill) {
     whole += std::abs(light - 2) < 1e-2;  // but for the share 2.5e-9 that is reflected
   }
   EXPECT_EQ(whole, 64);
+}
+
+// A floor under a box of fog of optical depth 1, lit straight down through a pane in one of the box's faces:
+// rho / pi times what the pane and the fog leave. Parallel light has no noise.
+double under_a_pane(BsdfIndex (*pane)(SceneKit&), const Transform& at, bool pane_first,
+                    const char* integrator, bool instanced = false) {
+  SceneKit kit({2, 2});
+  kit.scene.integrator.name = integrator;
+  kit.scene.integrator.max_depth = integrator == std::string_view("path") ? -1 : 2;
+  const BsdfIndex bsdf = pane(kit), null = kit.null();
+  if (pane_first) kit.shape(RectangleShape{}, at, bsdf);
+  Shape& fog = kit.container(CubeShape{}, translate({0, 0, 1.5}) * test::scale(1, 1, .5), null,
+                             kit.homogeneous({1, 1, 1}, {0, 0, 0}));
+  if (instanced) {
+    fog.group = SceneKit::push<GroupTag>(kit.scene.groups, ShapeGroup{});
+    kit.scene.instances.push_back({*fog.group, {}});
+  }
+  if (!pane_first) kit.shape(RectangleShape{}, at, bsdf);
+  kit.shape(RectangleShape{}, {}, kit.diffuse(.5));
+  kit.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+  kit.look({-3, .1, .4}, {0, 0, 0});
+  return test::estimate(kit, 8, 0, 1).mean[1];
+}
+BsdfIndex half_mask(SceneKit& kit) { return kit.bsdf(MaskBsdf{kit.texture({.5, .5, .5}), kit.diffuse(0)}); }
+BsdfIndex thin_glass(SceneKit& kit) {
+  const TextureIndex white = kit.texture({1, 1, 1});
+  return kit.bsdf(ThinDielectricBsdf{1.5, 1, white, white});
+}
+
+TEST(PaneOnABoundary, TakesItsShareOfShadowRaysWhicheverOfTheTwoIsMet) {
+  const double fog = std::exp(-1.), lit = .5 / test::kPi;
+  for (const double face : {1., 2.})
+    for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7, 1e-2, -1e-2})
+      for (const bool first : {false, true}) {
+        SCOPED_TRACE(fmt::format("at {} {:+g}, {}", face, aside, first ? "first" : "last"));
+        const Transform at = translate({0, 0, face + aside});
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath"), .5 * fog * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath_distant_mis"), .5 * fog * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "path"), .5 * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath", true), .5 * fog * lit, 1e-5 * lit);
+        // Of a pane R = .04 a side: (1 - R) / (1 + R).
+        EXPECT_NEAR(under_a_pane(thin_glass, at, first, "volpath"), .96 / 1.04 * fog * lit, 1e-5 * lit);
+      }
+}
+
+// A room whose walls are lit by a light that lets all light pass and lies on them: whatever of the two a ray
+// meets, L + rho L + rho^2 L ... = L / (1 - rho) everywhere.
+TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
+  for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7})
+    for (const bool first : {false, true}) {
+      SCOPED_TRACE(fmt::format("{:+g} outside, {}", aside, first ? "first" : "last"));
+      SceneKit kit;
+      const TextureIndex radiance = kit.texture({1, 1, 1});
+      const BsdfIndex wall = kit.diffuse(.5), null = kit.null();
+      const auto light = [&] {
+        Shape& s = kit.shape(CubeShape{}, test::scale(1 + aside), null);
+        s.emitter = AreaEmitter{radiance};
+        s.flip_normals = true;
+      };
+      if (first) light();
+      kit.shape(CubeShape{}, {}, wall).flip_normals = true;
+      if (!first) light();
+      kit.look({.1, .2, -.3}, {1, .3, .4}, 60);
+      const test::Estimate e = test::estimate(kit, 256, 0, 1);
+      EXPECT_NEAR(e.mean[1], 2, 5 * e.standard_error[1]);
+      EXPECT_LT(e.standard_error[1], .004);
+      EXPECT_EQ(e.health.nonfinite, 0u);
+    }
+}
+
+// Seen through fog, on the fog's own faces: behind all of it, and before it.
+TEST(LightThatLetsLightPass, ShinesOnTheFaceOfAMediumThatItLiesOn) {
+  for (const double face : {-1., 1.})
+    for (const bool first : {false, true}) {
+      SCOPED_TRACE(fmt::format("at {}, {}", face, first ? "first" : "last"));
+      SceneKit kit({2, 2});
+      const TextureIndex radiance = kit.texture({1, 1, 1});
+      const BsdfIndex null = kit.null();
+      const auto light = [&] {
+        kit.shape(RectangleShape{}, translate({0, 0, face}), null).emitter = AreaEmitter{radiance};
+      };
+      if (first) light();
+      kit.container(CubeShape{}, {}, null, kit.homogeneous({.5, .5, .5}, {0, 0, 0}));
+      if (!first) light();
+      kit.look({.1, .2, 5}, {.1, .2, 0}, 1e-3, {0, 1, 0});
+      const test::Estimate e = test::estimate(kit, 4096, 0, 1);
+      const double seen = face > 0 ? 1 : std::exp(-1.);
+      EXPECT_NEAR(e.mean[1], seen, 5 * e.standard_error[1] + 1e-5);
+      EXPECT_LT(e.standard_error[1], .004);
+    }
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// Environment maps: which direction each texel is, what is between them, and densities that are exactly those
-// of the samples.
+// Environment maps: which direction each texel is, what is between them, what is refused, and scenes under them.
 #include "worker/render/envmap.h"
 
 #include <gmock/gmock.h>
@@ -7,12 +6,9 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 
-#include "tests/support/chi_square.h"
-#include "tests/support/jacobian.h"
 #include "tests/support/render_check.h"
-#include "tests/support/sky_kit.h"
+#include "tests/unit/render/envmap_kit.h"
 #include "worker/render/hash.h"
 #include "worker/render/world.h"
 
@@ -26,22 +22,6 @@ using test::operator*;
 
 constexpr double kPiD = 3.14159265358979323846;
 
-ImageData data(const SkyImage& s) {
-  ImageData d;
-  d.width = static_cast<std::uint32_t>(s.width);
-  d.height = static_cast<std::uint32_t>(s.height);
-  d.channels = 3;
-  d.f32 = s.rgb;
-  return d;
-}
-Result<EnvironmentMap> try_map(const SkyImage& s, const Transform& t = {}, double scale = 1) {
-  return EnvironmentMap::build("sky.exr", data(s), scale, t);
-}
-EnvironmentMap map_of(const SkyImage& s, const Transform& t = {}, double scale = 1) {
-  auto m = try_map(s, t, scale);
-  if (!m) throw std::runtime_error(m.error().message);
-  return std::move(*m);
-}
 std::string refusal(const SkyImage& s, const Transform& t = {}, double scale = 1) {
   const auto m = try_map(s, t, scale);
   return m ? "accepted" : m.error().message;
@@ -97,152 +77,6 @@ TEST(EnvironmentMap, ToWorldTurnsAndMirrorsItAndNothingElse) {
   EXPECT_NEAR(value(map_of(s, test::scale(-1, 1, 1)), {-1, 0, -1}), 11, kEps);
   EXPECT_NEAR(value(map_of(s, test::translate({5, 6, 7}) * test::scale(3)), {1, 0, -1}), 11, kEps);
   EXPECT_NEAR(value(map_of(s, {}, 2.5), {1, 0, -1}), 27.5, 3 * kEps);
-}
-
-SkyImage random_sky(int width, int height, unsigned seed) {
-  SkyImage s(width, height);
-  std::mt19937 rng(seed);
-  for (float& v : s.rgb) v = rng() % 3 == 0 ? static_cast<float>(rng() % 1000) / 500 : 0.f;
-  if (height > 3) s.set(width / 3, height / 3, {34000, 30000, 20000});
-  return s;
-}
-struct Named {
-  const char* name;
-  SkyImage image;
-};
-std::vector<Named> skies() {
-  std::vector<Named> all = {{"least", random_sky(2, 3, 1)},
-                            {"small", random_sky(7, 5, 2)},
-                            {"sun", random_sky(64, 32, 3)},
-                            {"constant", SkyImage(6, 4, 2)}};
-  SkyImage pole(8, 5), corner(8, 5);
-  pole.set_row(0, {3, 2, 1});
-  corner.set(7, 4, {1, 1, 1});
-  all.push_back({"only a pole", pole});
-  all.push_back({"only the last texel", corner});
-  return all;
-}
-
-// The map's own direction at the azimuth 2 pi u and with the cosine z.
-V3 direction(double u, double z) {
-  const double r = std::sqrt(std::max(0., 1 - z * z));
-  return V3(V3d(std::sin(2 * kPiD * u) * r, z, -std::cos(2 * kPiD * u) * r));
-}
-
-// Within a cell the density is bilinear in azimuth and cosine, so that the midpoint rule is exact.
-struct Bins {
-  int across, down, per = 2;  // cells, and parts of a cell
-  explicit Bins(const SkyImage& s) : across(s.width), down(s.height - 1) {}
-  int size() const { return across * down * per * per; }
-  double edge(int row) const {  // cosine at the upper edge of a row of parts
-    const double top = std::cos(kPiD * (row / per) / down), bottom = std::cos(kPiD * (row / per + 1) / down);
-    return top + (bottom - top) * (row % per) / per;
-  }
-  double share(const EnvironmentMap& m, int column, int row) const {
-    const double u = ((column + .5) / per + .5) / across, z = (edge(row) + edge(row + 1)) / 2;
-    return double{m.at(direction(u, z)).pdf} * 2 * kPiD / (across * per) * (edge(row) - edge(row + 1));
-  }
-  int of(const V3& d) const {
-    double u = std::atan2(double{d.x}, -double{d.z}) / (2 * kPiD) * across - .5;
-    u = (u < 0 ? u + across : u) * per;
-    const double angle = std::atan2(std::hypot(double{d.x}, double{d.z}), double{d.y});
-    int row = std::min(static_cast<int>(angle / kPiD * down), down - 1) * per;
-    const double z = d.y / std::sqrt(double{dot(d, d)});
-    while (row % per + 1 < per && z < edge(row + 1)) ++row;
-    return row * across * per + std::min(static_cast<int>(u), across * per - 1);
-  }
-};
-
-TEST(EnvironmentMap, DensityIntegratesToOne) {
-  for (const Named& n : skies()) {
-    const EnvironmentMap m = map_of(n.image, test::rotate_y(0));
-    const Bins bins(n.image);
-    double sum = 0;
-    for (int row = 0; row < bins.down * bins.per; ++row)
-      for (int column = 0; column < bins.across * bins.per; ++column) sum += bins.share(m, column, row);
-    // Each part's density is off by the rounding of its place, 2^-24 of a turn, of which a cell is 1/64th.
-    EXPECT_NEAR(sum, 1, 64 * 0x1p-22) << n.name;
-  }
-}
-
-TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
-  test::ChiSquareBook book("render/envmap");
-  for (const Named& n : skies()) {
-    const EnvironmentMap m = map_of(n.image);
-    const Bins bins(n.image);
-    constexpr int kSamples = 1 << 18;
-    std::vector<double> expected, got(static_cast<std::size_t>(bins.size()));
-    for (int row = 0; row < bins.down * bins.per; ++row)
-      for (int column = 0; column < bins.across * bins.per; ++column)
-        expected.push_back(kSamples * bins.share(m, column, row));
-    RandomStream r(77);
-    for (int i = 0; i < kSamples; ++i) {
-      const std::uint32_t x = r.bits(), y = r.bits();
-      ++got[static_cast<std::size_t>(bins.of(m.sample(x, y)))];
-    }
-    book.expect(n.name, expected, got);
-  }
-  book.close();
-}
-
-// Of one value everywhere the map has no kinks between its cells.
-TEST(EnvironmentMap, AConstantMapStretchesTheSquareByOneOverTheDensity) {
-  const EnvironmentMap m = map_of(SkyImage(6, 4, 2));
-  test::expect_jacobian("constant sky", [&](const V2& u) -> std::optional<test::Mapped> {
-    const auto word = [](float x) { return static_cast<std::uint32_t>(x * 0x1p32f); };
-    const V3 d = m.sample(word(u.x), word(u.y));
-    return test::Mapped{V3d(d), double{m.at(d).pdf}};
-  });
-}
-
-TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {
-  const EnvironmentMap m = map_of(SkyImage(16, 9, 3));
-  RandomStream r(3);
-  for (int i = 0; i < 1000; ++i) {
-    const std::uint32_t x = r.bits(), y = r.bits();
-    const EnvironmentMap::Light l = m.at(m.sample(x, y));
-    // Shares of 2^-32 words, of cells of 1/128 and more; float32.
-    EXPECT_NEAR(l.pdf * kFourPi, 1, 1e-5f);
-    EXPECT_FLOAT_EQ(l.radiance.x, 3);
-  }
-  EXPECT_NEAR(m.flux(), 3 * 4 * kPiD, 1e-4);
-}
-
-// Away from the poles light over density is constant for one colour: no noise of its own.
-TEST(EnvironmentMap, DensityFollowsTheLight) {
-  SkyImage s(64, 32);
-  std::mt19937 rng(5);
-  for (int y = 0; y < 32; ++y)
-    for (int x = 0; x < 64; ++x) {
-      const double v = 1 + rng() % 100;
-      s.set(x, y, {v, v, v});
-    }
-  const EnvironmentMap m = map_of(s);
-  RandomStream r(3);
-  double sum = 0, square = 0;
-  constexpr int kSamples = 20000;
-  for (int i = 0; i < kSamples; ++i) {
-    const std::uint32_t x = r.bits(), y = r.bits();
-    const EnvironmentMap::Light l = m.at(m.sample(x, y));
-    ASSERT_GT(l.pdf, 0);
-    const double v = l.radiance.x / l.pdf;
-    sum += v;
-    square += v * v;
-  }
-  const double mean = sum / kSamples, relative = (square / kSamples - mean * mean) / (mean * mean);
-  EXPECT_LT(relative, 1e-3);  // 1/8 in the two cells of rows next to the poles, which have 1/400 of all light
-}
-
-TEST(EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight) {
-  for (const Named& n : skies()) {
-    const EnvironmentMap m = map_of(n.image);
-    for (const std::uint32_t x : {0u, 1u, 0x80000000u, 0xffffffffu})
-      for (const std::uint32_t y : {0u, 1u, 0x80000000u, 0xffffffffu}) {
-        const V3 d = m.sample(x, y);
-        EXPECT_NEAR(dot(d, d), 1, 1e-6f) << n.name;
-        EXPECT_GT(m.at(d).pdf, 0) << n.name << " " << x << " " << y;
-      }
-  }
 }
 
 TEST(EnvironmentMap, NegativeTexelsBecomeBlackAndAreCounted) {

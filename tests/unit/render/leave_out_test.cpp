@@ -124,8 +124,25 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
 TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
   const auto variant = [](const SceneKit& kit) { return describe(*test::world_of(kit)).variant; };
   EXPECT_EQ(variant(room()), "surfaces");
+  EXPECT_EQ(variant(with(room(),
+                         [](SceneKit& k) {
+                           k.shape(SphereShape{}, translate({.2, -.6, .4}), k.null());
+                         })),
+            "surfaces that light passes");
+  EXPECT_EQ(variant(with(room(),
+                         [](SceneKit& k) {
+                           k.shape(SphereShape{}, translate({.2, -.6, .4}),
+                                   k.bsdf(MaskBsdf{k.texture({.5, .5, .5}), k.diffuse(.4)}));
+                         })),
+            "surfaces that light passes");
   EXPECT_EQ(variant(foggy()), "homogeneous grey media");
   EXPECT_EQ(variant(cloudy()), "grey grids");
+  // Fog that stands on a floor: what looks for surfaces on each other is in the general one alone.
+  EXPECT_EQ(variant(with(foggy(),
+                         [](SceneKit& k) {
+                           k.shape(RectangleShape{}, translate({0, 0, -.9}) * test::scale(3), k.diffuse(.5));
+                         })),
+            "everything");
   auto world = test::world_of(cloudy());
   EXPECT_THAT(covering_variants(*world), testing::Contains(all_variants(*world).back()));
 }

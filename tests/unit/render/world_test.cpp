@@ -75,7 +75,7 @@ SceneKit veiled(SceneKit kit) {
 
 std::vector<Named> scenes() {
   std::vector<Named> all;
-  all.push_back({"surfaces", room(), 6});
+  all.push_back({"surfaces", room(), 7});
   all.push_back({"homogeneous grey", with_medium([](SceneKit& k) {
                    return k.homogeneous({.8, .8, .8}, {.9, .5, .2}, .3);
                  }),

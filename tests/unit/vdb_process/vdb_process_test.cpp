@@ -2,11 +2,14 @@
 // over.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 
 #include "tests/unit/nvdb/nvdb_kit.h"
@@ -128,6 +131,61 @@ TEST_F(VdbProcess, AReplyIsBelievedOnlyWhereItHolds) {
   ASSERT_FALSE(told);
   EXPECT_EQ(told.error().message.size(), sizeof refused.error - 1);
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow is larger than any limit
+constexpr std::uint64_t kMiB = 1 << 20;
+std::uint64_t limit() {
+  rlimit data{};
+  ::getrlimit(RLIMIT_DATA, &data);
+  return data.rlim_cur;
+}
+// What `run` gives in a process that may take so many bytes more.
+int with_limit(std::uint64_t more, const std::function<int()>& run) {
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    rlimit data{1 << 30, 1 << 30};
+    ::setrlimit(RLIMIT_DATA, &data);
+    data.rlim_cur = data.rlim_max = (1 << 30) - data_left() + more;
+    ::setrlimit(RLIMIT_DATA, &data);
+    ::_exit(run());
+  }
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+// 258^3 values, 66 MiB: read they fit into any of these limits, but the reply takes as much again.
+TEST_F(VdbProcess, AGridAndItsReplyFitIntoWhatTheRendererHasLeft) {
+  test::NvdbKit kit;
+  kit.hi = {255, 255, 255};
+  const auto path = file("large.nvdb", kit.file());
+  const auto read_with = [&](std::uint64_t more) {
+    return with_limit(more, [&] {
+      const auto read = VdbFile::read(path, "", 1 << 25);
+      if (!read) return read.error().code == Errc::resource_exhausted ? 1 : 2;
+      return values_of(read->grid()) == 258 * 258 * 258 ? 0 : 3;
+    });
+  };
+
+  EXPECT_EQ(read_with(512 * kMiB), 0);
+  EXPECT_EQ(read_with(120 * kMiB), 1);
+  EXPECT_EQ(read_with(60 * kMiB), 1);  // not even read: no fault of the file
+}
+
+TEST_F(VdbProcess, AReplyThatIsMappedCountsTowardsTheLimit) {
+  const auto path = file("a.nvdb", test::NvdbKit().file());
+  const int failed = with_limit(512 * kMiB, [&] {
+    const std::uint64_t before = limit();
+    {
+      const auto read = VdbFile::read(path, "", 1 << 20);
+      const std::uint64_t taken = kVdbValuesAt + 4 * values_of(read->grid());
+      if (limit() != before - taken) return 1;
+    }
+    return limit() == before ? 0 : 2;
+  });
+  EXPECT_EQ(failed, 0);
+}
+#endif
 
 TEST_F(VdbProcess, AProgramThatIsMissingIsNoFaultOfTheFile) {
   const auto missing = VdbFile::read("a.vdb", "", 1 << 20, "/nowhere/lightshaft-vdb");

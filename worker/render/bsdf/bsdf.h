@@ -79,6 +79,10 @@ class BsdfTable {
   struct Principled;
 
  private:
+  // One-sided kinds that are more than diffuse and of one reflectance.
+  BsdfEval eval_lobes(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
+  std::optional<BsdfSample> sample_lobes(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
+                                         V2 u) const;
   BsdfEval eval_wide(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
   std::optional<BsdfSample> sample_wide(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
                                         V2 u) const;

@@ -35,6 +35,7 @@ class Builder {
   Material operator()(const DiffuseBsdf& b) {
     Material m = make(MaterialKind::diffuse);
     m.second_slot = reflectance(b.reflectance);
+    if (!m.second_slot.constant) m.kind = MaterialKind::textured_diffuse;
     return m;
   }
   Material operator()(const ConductorBsdf& b) {
@@ -349,6 +350,7 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   switch (m.kind) {
     case MaterialKind::diffuse:
+    case MaterialKind::textured_diffuse:
     case MaterialKind::rough_conductor:
     case MaterialKind::rough_plastic:
     case MaterialKind::plastic:

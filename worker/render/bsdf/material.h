@@ -9,7 +9,8 @@
 namespace ls::render {
 
 enum class MaterialKind : std::uint8_t {
-  diffuse,
+  diffuse,  // of one reflectance everywhere
+  textured_diffuse,
   conductor,
   rough_conductor,
   dielectric,

@@ -124,6 +124,7 @@ V3 flipped(const V3& w) { return {w.x, w.y, -w.z}; }
 
 }  // namespace
 
+// What most surfaces are, diffuse and of one reflectance everywhere, needs nothing that the others do.
 BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Material* m = &materials_[i.value];
   V3 o = wo, in = wi;
@@ -133,22 +134,27 @@ BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3&
   }
   if (m->kind >= kFirstWide) return eval_wide(*m, uv, o, in);
   if (!(o.z > 0) || !(in.z > 0)) return {};  // none of the others has a smooth lobe on the back
+  if (m->kind == MaterialKind::diffuse) return eval_diffuse(m->second_slot.value, in);
+  return eval_lobes(*m, uv, o, in);
+}
+
+BsdfEval BsdfTable::eval_lobes(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Lookup look{*textures_, uv};
-  switch (m->kind) {
-    case MaterialKind::diffuse:
-      return eval_diffuse(look.reflectance(m->second_slot), in);
+  switch (m.kind) {
+    case MaterialKind::textured_diffuse:
+      return eval_diffuse(look.reflectance(m.second_slot), wi);
     case MaterialKind::rough_conductor: {
-      const auto rough = look.roughness(*m);
+      const auto rough = look.roughness(m);
       if (rough.mirror) return {};
-      const Metal metal{m->eta, m->k, look.reflectance(m->specular_slot)};
-      BsdfEval e = eval_rough_metal(metal, rough.facets, o, in);
-      if (m->energy) e.f_cos *= m->energy->factor(o.z, metal.tint * m->mean_fresnel);
+      const Metal metal{m.eta, m.k, look.reflectance(m.specular_slot)};
+      BsdfEval e = eval_rough_metal(metal, rough.facets, wo, wi);
+      if (m.energy) e.f_cos *= m.energy->factor(wo.z, metal.tint * m.mean_fresnel);
       return e;
     }
     case MaterialKind::rough_plastic:
-      return eval_plastic(Plastic<false>(*m, look, o), o, in);
+      return eval_plastic(Plastic<false>(m, look, wo), wo, wi);
     case MaterialKind::plastic:
-      return eval_plastic(Plastic<true>(*m, look, o), o, in);
+      return eval_plastic(Plastic<true>(m, look, wo), wo, wi);
     default:
       return {};
   }
@@ -157,7 +163,22 @@ BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3&
 std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe,
                                             V2 u) const {
   const Material* m = &materials_[i.value];
-  if (m->kind == MaterialKind::null) {
+  V3 o = wo;
+  const bool from_behind = m->kind == MaterialKind::two_sided && o.z < 0;
+  if (m->kind == MaterialKind::two_sided) m = &materials_[from_behind ? m->back : m->front];
+  if (from_behind) o = flipped(o);
+  std::optional<BsdfSample> s;
+  if (m->kind != MaterialKind::diffuse)
+    s = m->kind >= kFirstWide ? sample_wide(*m, uv, o, u_lobe, u) : sample_lobes(*m, uv, o, u_lobe, u);
+  else if (o.z > 0)
+    s = sample_diffuse(m->second_slot.value, u);
+  if (s && from_behind) s->wi = flipped(s->wi);
+  return s;
+}
+
+std::optional<BsdfSample> BsdfTable::sample_lobes(const Material& m, const UvPoint& uv, const V3& wo,
+                                                  float u_lobe, V2 u) const {
+  if (m.kind == MaterialKind::null) {
     BsdfSample s;
     s.wi = -wo;
     s.weight = C3(1);
@@ -165,46 +186,30 @@ std::optional<BsdfSample> BsdfTable::sample(BsdfIndex i, const UvPoint& uv, cons
     s.delta = s.transmitted = true;
     return s;
   }
-  V3 o = wo;
-  const bool from_behind = m->kind == MaterialKind::two_sided && o.z < 0;
-  if (m->kind == MaterialKind::two_sided) m = &materials_[from_behind ? m->back : m->front];
-  if (from_behind) o = flipped(o);
   const Lookup look{*textures_, uv};
-  if (m->kind == MaterialKind::dielectric)
-    return o.z != 0 ? sample_dielectric(*m, look, o, u_lobe) : std::nullopt;
-  std::optional<BsdfSample> s;
-  if (m->kind >= kFirstWide) {
-    s = sample_wide(*m, uv, o, u_lobe, u);
-    if (s && from_behind) s->wi = flipped(s->wi);
-    return s;
-  }
-  if (!(o.z > 0)) return std::nullopt;
-  const auto metal = [&] { return Metal{m->eta, m->k, look.reflectance(m->specular_slot)}; };
-  switch (m->kind) {
-    case MaterialKind::diffuse:
-      s = sample_diffuse(look.reflectance(m->second_slot), u);
-      break;
+  if (m.kind == MaterialKind::dielectric)
+    return wo.z != 0 ? sample_dielectric(m, look, wo, u_lobe) : std::nullopt;
+  if (!(wo.z > 0)) return std::nullopt;
+  const auto metal = [&] { return Metal{m.eta, m.k, look.reflectance(m.specular_slot)}; };
+  switch (m.kind) {
+    case MaterialKind::textured_diffuse:
+      return sample_diffuse(look.reflectance(m.second_slot), u);
     case MaterialKind::conductor:
-      s = sample_mirror(metal().reflectance(o.z), o);
-      break;
+      return sample_mirror(metal().reflectance(wo.z), wo);
     case MaterialKind::rough_conductor: {
-      const auto rough = look.roughness(*m);
-      s = rough.mirror ? sample_mirror(metal().reflectance(o.z), o)
-                       : sample_rough_metal(metal(), rough.facets, o, u);
-      if (s && m->energy) s->weight *= m->energy->factor(o.z, metal().tint * m->mean_fresnel);
-      break;
+      const auto rough = look.roughness(m);
+      auto s = rough.mirror ? sample_mirror(metal().reflectance(wo.z), wo)
+                            : sample_rough_metal(metal(), rough.facets, wo, u);
+      if (s && m.energy) s->weight *= m.energy->factor(wo.z, metal().tint * m.mean_fresnel);
+      return s;
     }
     case MaterialKind::rough_plastic:
-      s = sample_plastic(Plastic<false>(*m, look, o), o, u_lobe, u);
-      break;
+      return sample_plastic(Plastic<false>(m, look, wo), wo, u_lobe, u);
     case MaterialKind::plastic:
-      s = sample_plastic(Plastic<true>(*m, look, o), o, u_lobe, u);
-      break;
+      return sample_plastic(Plastic<true>(m, look, wo), wo, u_lobe, u);
     default:
-      break;
+      return std::nullopt;
   }
-  if (s && from_behind) s->wi = flipped(s->wi);
-  return s;
 }
 
 }  // namespace ls::render

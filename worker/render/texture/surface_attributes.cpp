@@ -2,17 +2,17 @@
 
 namespace ls::render {
 
-C3 SurfaceAttributes::mean(std::uint32_t name) const {
-  V3d sum(0, 0, 0);
-  double count = 0;
-  for (std::size_t s = 0; s < surfaces; ++s) {
-    const std::uint32_t i = channel_of[name * surfaces + s];
-    if (i == kNoChannel) continue;
-    const Channel& c = channels[i];
-    for (std::uint32_t k = 0; k < c.count; ++k) sum += V3d(values[c.first + k]);
-    count += c.count;
-  }
-  return count > 0 ? C3(sum / count) : C3(0);
+void SurfaceAttributes::find_means() {
+  std::vector<V3d> sums(names.size(), V3d(0, 0, 0));
+  std::vector<double> counts(names.size(), 0);
+  for (std::uint32_t i : first_of)
+    for (; i != kNoChannel; i = channels[i].next) {
+      const Channel& c = channels[i];
+      for (std::uint32_t k = 0; k < c.count; ++k) sums[c.name] += V3d(values[c.first + k]);
+      counts[c.name] += c.count;
+    }
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    means.push_back(counts[i] > 0 ? C3(sums[i] / counts[i]) : C3(0));
 }
 
 }  // namespace ls::render

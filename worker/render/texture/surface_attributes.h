@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,22 +21,23 @@ struct SurfaceAttributes {
     bool per_face = false;
     std::uint32_t base = 0;  // the mesh's first vertex, or triangle, in the world's lists
     std::uint32_t count = 0;
-    std::size_t first = 0;  // in values
+    std::size_t first = 0;                      // in values
+    std::uint32_t name = 0, next = kNoChannel;  // next: of the same surface
   };
-  std::vector<std::string> names;  // what the scene's textures read, none twice
-  std::size_t surfaces = 0;
-  std::vector<std::uint32_t> channel_of;  // by name and surface: names.size() times surfaces
+  std::map<std::string, std::uint32_t, std::less<>> names;  // what the scene's textures read, numbered
+  std::vector<std::uint32_t> first_of;                      // channels, by surface
   std::vector<Channel> channels;
   std::vector<C3> values;     // a lone number thrice
+  std::vector<C3> means;      // by name, of all values
   std::uint64_t clamped = 0;  // negative ones, made 0
 
   bool empty() const { return channels.empty(); }
   std::uint64_t bytes() const { return values.size() * sizeof(C3); }
-  // Of all values under this name: for sampling weights.
-  C3 mean(std::uint32_t name) const;
+  void find_means();
   // `corners`: three vertices a triangle. Black where the surface has nothing of this name.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
-    const std::uint32_t i = channel_of[name * surfaces + at.surface];
+    std::uint32_t i = first_of[at.surface];
+    while (i != kNoChannel && channels[i].name != name) i = channels[i].next;
     if (i == kNoChannel) return C3(0);
     const Channel& c = channels[i];
     if (c.per_face) return values[c.first + (at.triangle - c.base)];

@@ -87,10 +87,10 @@ Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttrib
     return fail(Errc::invalid_argument,
                 fmt::format("the scale {} of mesh attribute \"{}\" is not a number >= 0", t.scale, t.name));
   if (!attributes) return e;
-  const auto it = std::find(attributes->names.begin(), attributes->names.end(), t.name);
+  const auto it = attributes->names.find(t.name);
   if (it == attributes->names.end()) return Entry{};
-  e.first = static_cast<std::uint32_t>(it - attributes->names.begin());
-  e.value = attributes->mean(e.first) * e.scale;
+  e.first = it->second;
+  e.value = attributes->means[e.first] * e.scale;
   return e;
 }
 

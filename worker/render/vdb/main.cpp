@@ -1,26 +1,43 @@
-// lightshaft-vdb FILE GRID MOST_VALUES: reads a grid for worker/render/vdb_process.h, and ends. The reply
-// goes to the file that it inherits as kVdbReplyFd.
+// lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/vdb_process.h, and ends.
+// The reply goes to the file that it inherits as kVdbReplyFd. MOST_BYTES of memory: its own and the reply's.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <limits>
 
+#include "worker/render/vdb_limit.h"
 #include "worker/render/vdb_reply.h"
 
 namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // the largest grids take seconds
 
-// It lives no longer than who asked, and takes no more than a file can be worth.
-void confine() {
+// It lives no longer than who asked, and takes no more than a file can be worth and who asked has left.
+void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   const rlimit no_core{0, 0}, cpu{kMostCpuSeconds, kMostCpuSeconds + 10};
   ::setrlimit(RLIMIT_CORE, &no_core);
   ::setrlimit(RLIMIT_CPU, &cpu);
+  const rlim_t reply_bytes =
+      ls::render::kVdbValuesAt + 4 * std::min(most_values, std::numeric_limits<rlim_t>::max() / 8);
+  const rlimit file{reply_bytes, reply_bytes};
+  ::signal(SIGXFSZ, SIG_IGN);
+  ::setrlimit(RLIMIT_FSIZE, &file);
+  const rlimit data{most_bytes, most_bytes};
+  if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
+}
+
+// Of memory at once, so far.
+std::uint64_t taken() {
+  rusage used{};
+  ::getrusage(RUSAGE_SELF, &used);
+  return static_cast<std::uint64_t>(used.ru_maxrss) * 1024;
 }
 
 bool write_all(const void* from, std::uint64_t bytes, std::uint64_t at) {
@@ -38,20 +55,27 @@ bool write_all(const void* from, std::uint64_t bytes, std::uint64_t at) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
-  confine();
+  if (argc != 5) return 2;
+  const std::uint64_t most_values = std::strtoull(argv[3], nullptr, 10),
+                      most_bytes = std::strtoull(argv[4], nullptr, 10);
+  confine(most_values, most_bytes);
   ls::render::VdbReply reply{};
   reply.magic = ls::render::kVdbMagic;
   LsVdbGrid grid{};
-  reply.code = ls_vdb_read(argv[1], argv[2], std::strtoull(argv[3], nullptr, 10), &grid, reply.error,
-                           sizeof reply.error);
+  reply.code = ls_vdb_read(argv[1], argv[2], most_values, &grid, reply.error, sizeof reply.error);
+  const std::uint64_t values = reply.code == 0 ? 4 * ls::render::values_of(grid) : 0;
+  if (values > most_bytes - std::min(taken(), most_bytes)) {
+    reply.code = 2;
+    std::snprintf(reply.error, sizeof reply.error,
+                  "the grid of %llu MiB needs more memory than the renderer has left of its limit",
+                  static_cast<unsigned long long>(values >> 20));
+  }
   reply.grid = grid;
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
   // Padded, so that the file always reaches to where values begin.
   written = written && ::ftruncate(ls::render::kVdbReplyFd, ls::render::kVdbValuesAt) == 0;
-  if (reply.code == 0)
-    written = written && write_all(grid.values, 4 * ls::render::values_of(grid), ls::render::kVdbValuesAt);
+  if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);
   return written ? 0 : 1;
 }

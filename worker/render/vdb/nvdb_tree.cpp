@@ -62,7 +62,7 @@ class Tree {
     place();
     const auto count = std::uint64_t{static_cast<std::uint64_t>(out_.size[0])} *
                        static_cast<std::uint64_t>(out_.size[1]) * static_cast<std::uint64_t>(out_.size[2]);
-    out_.values = new float[count * channels()];
+    out_.values = room_for(count * channels());
     fill(lo_, end_, value(root_ + layout_.background));
     read_root();
   }

@@ -126,7 +126,7 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
                          std::to_string(max_values / static_cast<std::uint64_t>(out.channels))};
   }
   place(*grid, box.min(), out);
-  out.values = new float[count * static_cast<std::uint64_t>(out.channels)];
+  out.values = ls::render::room_for(count * static_cast<std::uint64_t>(out.channels));
   copy_values(*grid, box, out);
 }
 

@@ -1,0 +1,199 @@
+// What a renderer can still do once it is shut in. Each try is made in a process of its own.
+#include "worker/child/cage.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/ioctl.h>
+#include <sys/ipc.h>
+#include <sys/msg.h>
+#include <sys/ptrace.h>
+#include <sys/resource.h>
+#include <sys/sem.h>
+#include <sys/shm.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+namespace ls::worker::child {
+namespace {
+
+constexpr int kNotCaged = 200;
+
+class Cage : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "lightshaft-cage-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    root_ = name;
+    std::filesystem::create_directories(root_ / "cache/sub");
+    std::ofstream(root_ / "cache/sub/asset") << "asset";
+    std::ofstream(root_ / "secret") << "secret";
+  }
+  void TearDown() override { std::filesystem::remove_all(root_); }
+
+  // 0 if `attempt` gave 0 in a caged process, else the errno that it left.
+  int try_caged(const std::function<int()>& attempt, bool Caged::*needs) const {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      const Caged caged = shut_in({root_ / "cache"});
+      if (!(caged.*needs)) ::_exit(kNotCaged);
+      ::_exit(attempt() == 0 ? 0 : errno);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  int try_open(const std::filesystem::path& path, int flags) const {
+    return try_caged([&] { return ::open(path.c_str(), flags, 0600) >= 0 ? 0 : 1; }, &Caged::files);
+  }
+
+  std::filesystem::path root_;
+};
+
+#define SKIP_UNCAGED(code) \
+  if (code == kNotCaged) GTEST_SKIP() << "this kernel, or a sanitizer, leaves it out"
+
+TEST_F(Cage, ReadsAssetsAndNothingElseOfTheMachine) {
+  const int asset = try_open(root_ / "cache/sub/asset", O_RDONLY);
+  SKIP_UNCAGED(asset);
+  EXPECT_EQ(asset, 0);
+  EXPECT_EQ(try_open(root_ / "secret", O_RDONLY), EACCES);
+  EXPECT_EQ(try_open(root_ / "cache/../secret", O_RDONLY), EACCES);
+  EXPECT_EQ(try_open("/etc/passwd", O_RDONLY), EACCES);
+  EXPECT_EQ(try_open("/proc/1/environ", O_RDONLY), EACCES);
+  EXPECT_EQ(try_open("/proc/self/status", O_RDONLY), 0);
+}
+
+TEST_F(Cage, WritesNothing) {
+  const int made = try_open(root_ / "cache/new", O_WRONLY | O_CREAT);
+  SKIP_UNCAGED(made);
+  EXPECT_EQ(made, EACCES);
+  EXPECT_EQ(try_open(root_ / "cache/sub/asset", O_WRONLY), EACCES);
+  EXPECT_EQ(try_open("/tmp/lightshaft-cage-test", O_WRONLY | O_CREAT), EACCES);
+  EXPECT_EQ(try_open("/dev/null", O_RDWR), 0);
+  EXPECT_EQ(try_caged([&] { return ::unlink((root_ / "cache/sub/asset").c_str()); }, &Caged::files), EACCES);
+}
+
+TEST_F(Cage, MovesAndLinksNothing) {
+  const auto asset = root_ / "cache/sub/asset", beside = root_ / "cache/sub/other", out = root_ / "out";
+  const int moved = try_caged([&] { return ::rename(asset.c_str(), beside.c_str()); }, &Caged::files);
+  SKIP_UNCAGED(moved);
+  EXPECT_EQ(moved, EACCES);
+  // Into another folder: as if it were another disk, where the kernel does not know better.
+  EXPECT_THAT(try_caged([&] { return ::rename(asset.c_str(), out.c_str()); }, &Caged::files),
+              testing::AnyOf(EACCES, EXDEV));
+  EXPECT_THAT(try_caged([&] { return ::link(asset.c_str(), out.c_str()); }, &Caged::files),
+              testing::AnyOf(EACCES, EXDEV));
+  EXPECT_EQ(try_caged([&] { return ::symlink(asset.c_str(), beside.c_str()); }, &Caged::files), EACCES);
+  EXPECT_TRUE(std::filesystem::exists(asset));
+}
+
+TEST_F(Cage, CutsNoFileShort) {
+  const auto asset = root_ / "cache/sub/asset";
+  const int cut = try_caged([&] { return ::truncate(asset.c_str(), 0); }, &Caged::sizes);
+  SKIP_UNCAGED(cut);
+  EXPECT_EQ(cut, EACCES);
+  EXPECT_EQ(std::filesystem::file_size(asset), 5u);
+}
+
+TEST_F(Cage, OpensNoSocketAndTracesNobody) {
+  const int tcp = try_caged([] { return ::socket(AF_INET, SOCK_STREAM, 0) >= 0 ? 0 : 1; }, &Caged::calls);
+  SKIP_UNCAGED(tcp);
+  EXPECT_EQ(tcp, EPERM);
+  for (const int family : {AF_INET6, AF_UNIX, AF_NETLINK})
+    EXPECT_EQ(try_caged([=] { return ::socket(family, SOCK_DGRAM, 0) >= 0 ? 0 : 1; }, &Caged::calls), EPERM);
+  EXPECT_EQ(try_caged([] { return ::ptrace(PTRACE_ATTACH, ::getppid(), 0, 0) == 0 ? 0 : 1; }, &Caged::calls),
+            EPERM);
+}
+
+TEST_F(Cage, SignalsNobodyButItself) {
+  const int agent = try_caged([] { return ::kill(::getppid(), 0); }, &Caged::calls);
+  SKIP_UNCAGED(agent);
+  EXPECT_EQ(agent, EPERM);
+  const auto denied = [&](const std::function<long()>& call) {
+    return try_caged([&] { return call() == -1 ? 1 : 0; }, &Caged::calls) == EPERM;
+  };
+  siginfo_t info{};
+  EXPECT_TRUE(denied([] { return ::syscall(SYS_tkill, ::getppid(), 0); }));
+  EXPECT_TRUE(denied([] { return ::syscall(SYS_tgkill, ::getppid(), ::getppid(), 0); }));
+  EXPECT_TRUE(denied([&] { return ::syscall(SYS_rt_sigqueueinfo, ::getppid(), SIGTERM, &info); }));
+  EXPECT_TRUE(denied([] { return ::syscall(SYS_pidfd_open, ::getppid(), 0); }));
+  // By way of the kernel, when a pipe becomes ready.
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  EXPECT_TRUE(denied([&] { return ::fcntl(ends[0], F_SETOWN, ::getppid()); }));
+  EXPECT_TRUE(denied([&] { return ::fcntl(ends[0], F_SETSIG, SIGTERM); }));
+  int owner = ::getpid();
+  EXPECT_TRUE(denied([&] { return ::ioctl(ends[0], FIOSETOWN, &owner); }));
+  EXPECT_FALSE(denied([&] { return ::fcntl(ends[0], F_SETFL, O_NONBLOCK); }));
+  for (const int end : ends) ::close(end);
+}
+
+TEST_F(Cage, DiesOfItsOwnSignals) {
+  for (const bool aborts : {true, false}) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (!shut_in({root_ / "cache"}).calls) ::_exit(kNotCaged);
+      if (aborts) std::abort();
+      ::raise(SIGTERM);
+      ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    if (WIFEXITED(status)) SKIP_UNCAGED(WEXITSTATUS(status));
+    ASSERT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(WTERMSIG(status), aborts ? SIGABRT : SIGTERM);
+  }
+}
+
+TEST_F(Cage, ChangesLimitsOfNobodyButItself) {
+  const auto set = [](pid_t of) {
+    rlimit files{};
+    return ::prlimit(of, RLIMIT_NOFILE, nullptr, &files) == 0 &&
+                   ::prlimit(of, RLIMIT_NOFILE, &files, nullptr) == 0
+               ? 0
+               : 1;
+  };
+  const int agent = try_caged([&] { return set(::getppid()); }, &Caged::calls);
+  SKIP_UNCAGED(agent);
+  EXPECT_EQ(agent, EPERM);
+  EXPECT_EQ(try_caged([&] { return set(0); }, &Caged::calls), 0);
+  EXPECT_EQ(try_caged([] { return ::setpriority(PRIO_PROCESS, static_cast<id_t>(::getppid()), 19); },
+                      &Caged::calls),
+            EPERM);
+}
+
+TEST_F(Cage, LeavesNoMemoryBehind) {
+  const int shared =
+      try_caged([] { return ::shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600) >= 0 ? 0 : 1; }, &Caged::calls);
+  SKIP_UNCAGED(shared);
+  EXPECT_EQ(shared, EPERM);
+  EXPECT_EQ(try_caged([] { return ::msgget(IPC_PRIVATE, IPC_CREAT | 0600) >= 0 ? 0 : 1; }, &Caged::calls),
+            EPERM);
+  EXPECT_EQ(try_caged([] { return ::semget(IPC_PRIVATE, 1, IPC_CREAT | 0600) >= 0 ? 0 : 1; }, &Caged::calls),
+            EPERM);
+}
+
+TEST_F(Cage, HoldsWhatItStartsToTheSame) {
+  const auto read_secret = [&] {
+    const std::string command = "cat '" + (root_ / "secret").string() + "' 2>&1";
+    return ::system(command.c_str()) == 0 ? 0 : 1;
+  };
+  const int code = try_caged([&] { return read_secret() == 0 ? 0 : (errno = EACCES, 1); }, &Caged::files);
+  SKIP_UNCAGED(code);
+  EXPECT_EQ(code, EACCES);
+  EXPECT_EQ(try_caged([] { return ::system("true") == 0 ? 0 : (errno = ENOENT, 1); }, &Caged::files), 0);
+}
+
+}  // namespace
+}  // namespace ls::worker::child

@@ -1,0 +1,64 @@
+// The limit of memory (RLIMIT_DATA) of a process that has OpenVDB files read: it shares it with the process
+// that reads them, and with what that answers, which the limit does not count.
+#pragma once
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <mutex>
+#include <utility>
+
+namespace ls::render {
+
+inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
+
+// What this process may still take, in bytes, as the limit counts them.
+inline std::uint64_t data_left() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kNoDataLimit;
+  std::uint64_t size = 0, resident = 0, shared = 0, text = 0, library = 0, data = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident >> shared >> text >> library >> data;
+  const std::uint64_t bytes = data * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  return limit.rlim_cur - std::min<std::uint64_t>(bytes, limit.rlim_cur);
+}
+
+// Takes so many bytes off the limit for as long as it lives: those of a mapped file, which it does not count.
+class DataTaken {
+ public:
+  DataTaken() = default;
+  explicit DataTaken(std::uint64_t bytes) : bytes_(lower(bytes)) {}
+  DataTaken(DataTaken&& from) noexcept : bytes_(std::exchange(from.bytes_, 0)) {}
+  DataTaken& operator=(DataTaken&& from) noexcept {
+    std::swap(bytes_, from.bytes_);
+    return *this;
+  }
+  ~DataTaken() { raise(bytes_); }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  static std::uint64_t lower(std::uint64_t bytes) {
+    const std::lock_guard lock(mutex());
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return 0;
+    bytes = std::min<std::uint64_t>(bytes, limit.rlim_cur);
+    limit.rlim_cur -= bytes;
+    return ::setrlimit(RLIMIT_DATA, &limit) == 0 ? bytes : 0;
+  }
+  static void raise(std::uint64_t bytes) {
+    const std::lock_guard lock(mutex());
+    rlimit limit{};
+    if (bytes == 0 || ::getrlimit(RLIMIT_DATA, &limit) != 0) return;
+    limit.rlim_cur += bytes;
+    ::setrlimit(RLIMIT_DATA, &limit);
+  }
+
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace ls::render
