@@ -8,6 +8,7 @@ import os
 import pathlib
 import random
 import signal
+import ssl
 import subprocess
 import tempfile
 import time
@@ -87,12 +88,18 @@ class Process:
 
 
 class LocalFarm:
-    def __init__(self, folder=None, bin=None, flags=()):
-        self.flags = list(flags)  # of the coordinator, besides its ports and folder
+    def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None):
+        self.host = host  # that workers connect to
+        self.environment = dict(environment or {})  # of the coordinator, besides this process's; read at every start
+        self.tls = tls
+        self.flags = list(flags) + (["--tls"] if tls else [])  # of the coordinator, besides its ports and folder
         self.bin = pathlib.Path(bin) if bin else bin_dir()
         self._temporary = tempfile.TemporaryDirectory(prefix="lightshaft-farm-") if folder is None else None
         self.folder = pathlib.Path(folder or self._temporary.name)
+        self.folder.mkdir(parents=True, exist_ok=True)
         self.data = self.folder / "data"
+        self.secrets = pathlib.Path(secrets) if secrets else self.data  # of tokens and certificates
+        self.flags += ["--secrets", self.secrets] if secrets else []
         self.workers = []
         self.coordinator = None
         self.http = self.grpc = None
@@ -122,14 +129,14 @@ class LocalFarm:
         self.coordinator = Process(
             "coordinator",
             [self.bin / "lightshaft-coordinator", "--http", f"127.0.0.1:{self.http or 0}",
-             "--grpc", f"127.0.0.1:{self.grpc or 0}", "--data", self.data] + self.flags,
-            self.folder / "coordinator.log")
+             "--grpc", f"{self.host}:{self.grpc or 0}", "--data", self.data] + self.flags,
+            self.folder / "coordinator.log", dict(os.environ, **self.environment))
         wait_until(lambda: (self.data / "ports.json").exists() or not self.coordinator.alive(), "the coordinator listens")
         assert self.coordinator.alive(), self.coordinator.output()
         ports = json.loads((self.data / "ports.json").read_text())
         self.http, self.grpc = ports["http"], ports["grpc"]
-        self.token = (self.data / "token").read_text().strip()
-        self.join_token = (self.data / "join-token").read_text().strip()
+        self.token = (self.secrets / "token").read_text().strip()
+        self.join_token = (self.secrets / "join-token").read_text().strip()
 
     def restart_coordinator(self):
         """kill -9 and a new one on the same folder and ports."""
@@ -137,12 +144,16 @@ class LocalFarm:
         self.start_coordinator()
 
     # ---- workers ----
-    def add_worker(self, *flags, threads=1, token=None, fake=True):
+    def add_worker(self, *flags, threads=1, token=None, fake=True, within=(), environment=None, coordinator=None, name=None):
+        """`within`: a command that starts it somewhere else, e.g. in a network namespace. `coordinator`: another address than its own."""
         self.count += 1
-        name = f"worker-{self.count}"
-        env = dict(os.environ, LIGHTSHAFT_JOIN_TOKEN=self.join_token if token is None else token)
-        args = [self.bin / "lightshaft-worker", "--coordinator", f"127.0.0.1:{self.grpc}", "--threads", threads,
-                "--cache", self.folder / "cache" / name, "--name", name]
+        called, name = name, f"worker-{self.count}"
+        env = dict(os.environ, LIGHTSHAFT_JOIN_TOKEN=self.join_token if token is None else token, **(environment or {}))
+        args = [*within, self.bin / "lightshaft-worker", "--coordinator", coordinator or f"{self.host}:{self.grpc}", "--threads", threads,
+                "--cache", self.folder / "cache" / name, "--name", called or name]
+        if self.tls:
+            args += ["--tls-ca", self.secrets / "tls/ca.pem", "--tls-cert", self.secrets / "tls/worker.pem",
+                     "--tls-key", self.secrets / "tls/worker.key"]
         worker = Process(name, args + (["--fake"] if fake else []) + list(flags), self.folder / f"{name}.log", env)
         self.workers.append(worker)
         return worker
@@ -155,13 +166,19 @@ class LocalFarm:
                    f"{count} workers are connected")
 
     # ---- HTTP ----
+    def url(self):
+        return f"{'https' if self.tls else 'http'}://127.0.0.1:{self.http}"
+
+    def trust(self):
+        return ssl.create_default_context(cafile=self.secrets / "tls/ca.pem") if self.tls else None
+
     def request(self, method, path, body=None, content_type="application/json", token=None):
-        request = urllib.request.Request(f"http://127.0.0.1:{self.http}{path}", data=body, method=method)
+        request = urllib.request.Request(f"{self.url()}{path}", data=body, method=method)
         request.add_header("Authorization", f"Bearer {self.token if token is None else token}")
         if body is not None:
             request.add_header("Content-Type", content_type)
         try:
-            with urllib.request.urlopen(request, timeout=60) as reply:
+            with urllib.request.urlopen(request, timeout=60, context=self.trust()) as reply:
                 return reply.read()
         except urllib.error.HTTPError as error:
             raise HttpError(error.code, error.read().decode(errors="replace")) from None

@@ -4,6 +4,7 @@
 // stop by the farm's own rule, from the error estimate that the farm uses.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -79,13 +80,18 @@ class SyntheticFilm {
 class SyntheticJob {
  public:
   SyntheticJob(const SyntheticFilm& film, std::uint64_t seed)
-      : film_(film), seed_(seed), sums_(film.grid().count()), rounds_(film.grid().count()) {}
+      : film_(film),
+        seed_(seed),
+        sums_(film.grid().count()),
+        before_(film.grid().count()),
+        rounds_(film.grid().count()) {}
 
   // Folds the tile's next round; its relative error sum with it.
   double fold(TileIndex t) {
     const auto pixels = film_.tile(t);
     auto& sums = sums_[t];
     sums.resize(2 * pixels.size());
+    before_[t] = sums;
     const RoundIndex round = rounds_[t]++;
     const double half = static_cast<double>(round_range(round).count()) / 2;
     std::mt19937_64 random(seed_ * 0x9e3779b97f4a7c15ull + t * 0xc2b2ae3d27d4eb4full + round);
@@ -100,16 +106,14 @@ class SyntheticJob {
   }
 
   TileError estimate(TileIndex t) const {
-    const std::size_t n = film_.tile(t).size();
     const PixelRect rect = film_.grid().rect(t);
-    const std::uint64_t spp = round_range(rounds_[t] - 1).s1;
-    std::vector<double> a(3 * n), b(3 * n);
-    for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t i = 0; i < n; ++i) {
-        a[c * n + i] = kGrey[c] * sums_[t][i] * 2 / static_cast<double>(spp);
-        b[c * n + i] = kGrey[c] * sums_[t][n + i] * 2 / static_cast<double>(spp);
-      }
-    return estimate_error({rect.width(), rect.height(), a, b}, spp);
+    const RoundIndex last = rounds_[t] - 1;
+    const auto now = means(sums_[t], round_range(last).s1);
+    const HalfMeans halves{rect.width(), rect.height(), now[0], now[1]};
+    if (last == 0) return estimate_error(halves, round_range(last).s1);
+    const auto before = means(before_[t], round_range(last - 1).s1);
+    const EarlierMeans earlier{{rect.width(), rect.height(), before[0], before[1]}, round_range(last - 1).s1};
+    return estimate_error(halves, round_range(last).s1, &earlier);
   }
 
   // The image's value less the truth, of every pixel in the order of tiles.
@@ -125,9 +129,21 @@ class SyntheticJob {
   }
 
  private:
+  // Planes of three channels of both halves.
+  static std::array<std::vector<double>, 2> means(const std::vector<double>& sums, std::uint64_t spp) {
+    const std::size_t n = sums.size() / 2;
+    std::array<std::vector<double>, 2> out;
+    for (std::size_t h = 0; h < 2; ++h)
+      for (const double weight : kGrey)
+        for (std::size_t i = 0; i < n; ++i)
+          out[h].push_back(weight * sums[h * n + i] * 2 / static_cast<double>(spp));
+    return out;
+  }
+
   const SyntheticFilm& film_;
   std::uint64_t seed_;
-  std::vector<std::vector<double>> sums_;  // of each tile: half A, then half B
+  std::vector<std::vector<double>> sums_;    // of each tile: half A, then half B
+  std::vector<std::vector<double>> before_;  // likewise, before its last round
   std::vector<RoundIndex> rounds_;
 };
 

@@ -1,9 +1,11 @@
 """`lightshaft verify`: a finished image against its scene, tile by tile."""
 
 import json
+import signal
+import subprocess
 
 import pytest
-from cli_kit import lightshaft, write_fog
+from cli_kit import PATIENCE, bin_dir, lightshaft, write_fog
 
 SPP = 70  # full rounds and a cut one
 
@@ -63,3 +65,19 @@ def test_a_picture_without_a_seal_is_refused(finished, tmp_path):
     assert "by their digest only" in refused.stderr
     assert "cannot" in lightshaft("verify", scene, "--scene", scene, code=2).stderr
     lightshaft("verify", tmp_path / "missing.exr", "--scene", scene, code=1)
+
+
+def test_tiles_that_an_interrupt_left_out_are_not_called_wrong(tmp_path):
+    scene = write_fog(tmp_path)
+    lightshaft("render", scene, "-o", tmp_path / "long.exr", "--spp", 800)
+    verify = subprocess.Popen([str(bin_dir() / "lightshaft"), "verify", tmp_path / "long.exr", "--scene", scene, "--tiles", "6", "--threads", "1"],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    first = verify.stdout.readline()
+    verify.send_signal(signal.SIGINT)  # five tiles are still to come
+    rest, _ = verify.communicate(timeout=PATIENCE)
+
+    assert "as sealed" in first
+    assert verify.returncode == 1
+    told = [line for line in [first, *rest.splitlines()] if line.startswith("tile ")]
+    assert all("800 samples: as sealed" in line for line in told)  # those that were rendered, and no others
+    assert f"{len(told)} of 6 tiles are as sealed, {6 - len(told)} were not rendered: stopped" in rest

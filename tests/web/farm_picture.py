@@ -19,6 +19,7 @@ def main(out, spp, files):
         page.evaluate("void (location.hash = '#/submit')")
         page.wait("document.getElementById('files')")
         page.set_files("#files", files)
+        page.wait("document.querySelector('.settings button:not([disabled])')")
         page.click("#set-spp")
         page.type(spp)
         page.click(".settings button")

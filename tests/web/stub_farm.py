@@ -21,7 +21,7 @@ TOKEN = "let-there-be-light"
 def job(id="j-1", name="steam.xml", state="running", **more):
     return {"id": id, "name": name, "state": state, "stopped": "", "progress": 0.25, "spp": 64, "spp_done": 16, "rmse": 0.05, "relmse": 0.01,
             "relmse_ci95": [0.009, 0.011], "target_error": None, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
-            "priority": 0, "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
+            "priority": 0, "owner": "", "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
             "health": {"clean": True, "nonfinite": 0, "negative": 0, "majorant_violations": 0, "causes": []}, **more}
 
 
@@ -55,6 +55,7 @@ class StubFarm:
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
         self.requests = []  # (method, path)
+        self.role = "admin"  # of the token
         self.signed_in = False  # of the one browser that a test has
         self.broken = set()  # names under /api/v1/ that answer with 503
         self.put_gate = threading.Event()  # blobs are taken while it is set
@@ -163,6 +164,8 @@ def _handler(farm):
             return self._send(200, file.read_bytes(), TYPES[file.suffix])
 
         def _session(self, body):
+            if self.command == "GET":
+                return self._send(200, {"role": farm.role, "user": ""}) if farm.signed_in else self._problem(401, "No session.")
             if self.command == "DELETE":
                 farm.signed_in = False
                 return self._send(204)

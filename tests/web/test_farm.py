@@ -47,6 +47,8 @@ def test_from_dropped_files_to_a_finished_image(real_farm, page, tmp_path):
     real_farm.add_workers(2, *SLOW)
     real_farm.wait_for_workers(2)
     submit_files(page, tmp_path, {"bath.xml": WITH_MESH, "quad.obj": QUAD})
+    # The list of files pushes the form down once it is there, and "Start over" to where the form was.
+    page.wait("document.querySelector('.settings button:not([disabled])')")
     page.click("#set-spp")
     page.type("64")
     page.click(".settings button")

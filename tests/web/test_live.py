@@ -374,6 +374,7 @@ def test_settings_that_make_no_sense_are_refused_here(farm, dashboard, scene_fil
     page = dashboard("#/submit")
     page.wait("document.getElementById('files')")
     page.set_files("#files", scene_files)
+    page.wait("document.querySelector('.settings button:not([disabled])')")
     page.click("#set-spp")
     page.type("many")
     page.click(".settings button")

@@ -2,7 +2,7 @@
 import * as data from "./data.js";
 import { initialState, openJob, withEvent, withJobs, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
 
-const signedIn = (route = { view: "jobs", id: null, frame: null }) => ({ ...initialState(), session: "in", link: "live", route });
+const signedIn = (route = { view: "jobs", id: null, frame: null }) => ({ ...initialState(), me: { role: "admin", user: "" }, session: "in", link: "live", route });
 const farm = (route) => withWorkers(withJobs(signedIn(route), data.jobs), data.workers);
 
 function jobPage(id, more = {}, jobs = data.jobs) {

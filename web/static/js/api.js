@@ -40,6 +40,8 @@ const jobPath = (id) => `/jobs/${encodeURIComponent(id)}`;
 export const api = {
   signIn: (token) => call("POST", "/session", json({ token })),
   signOut: () => call("DELETE", "/session"),
+  /** {role, user} of the session. */
+  me: async () => (await call("GET", "/session")).json(),
   jobs: async () => (await (await call("GET", "/jobs")).json()).jobs,
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,

@@ -71,8 +71,9 @@ async function signIn(token) {
 /** Shows the farm. Returns the error if that is not possible. */
 async function enter() {
   let jobs;
+  let me;
   try {
-    jobs = await api.jobs();
+    [jobs, me] = await Promise.all([api.jobs(), api.me()]);
   } catch (error) {
     if (error.status === 401) signedOut();
     else if (state.session === "unknown") {
@@ -81,7 +82,7 @@ async function enter() {
     }
     return error;
   }
-  set(withUi({ ...withJobs(state, jobs), session: "in" }, { signInError: null, notice: null }));
+  set(withUi({ ...withJobs(state, jobs), me, session: "in" }, { signInError: null, notice: null }));
   closeEvents ??= openEvents({ onOpen, onLost, onEvent });
   showRoute();
   return null;

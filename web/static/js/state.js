@@ -6,6 +6,7 @@ export const kPalette = 10; // worker colours in css/tokens.css
 export function initialState() {
   return {
     session: "unknown", // "in", "out"
+    me: { role: "read", user: "" }, // the least, until it is known
     link: "connecting", // "live", "lost"
     route: { view: "jobs", id: null, frame: null },
     jobs: null, // Map id -> job JSON, of frames only the one that is shown; null: not known yet
@@ -43,6 +44,11 @@ export const openJob = (id, shown = id) => ({
   picked: null, // point of the plot under the pointer
   problem: null, // why it can't be shown
 });
+
+/** What the coordinator would not take from this token anyway is not offered. */
+export const mayChange = (state) => state.me.role === "admin" || state.me.role === "submit";
+export const seesOthers = (state) => state.me.role !== "submit";
+export const ownerOf = (job) => job.owner || "admin";
 
 export const withUi = (state, ui) => ({ ...state, ui: { ...state.ui, ...ui } });
 export const withOpen = (state, open) => (state.open ? { ...state, open: { ...state.open, ...open } } : state);
@@ -87,7 +93,7 @@ export function withEvent(state, type, data) {
 }
 
 export function withJob(state, job) {
-  if (job.state === "removed") return withoutJob(state, job.id);
+  if (job.state === "removed" || job.state === "moved") return withoutJob(state, job.id);
   const jobs = new Map(state.jobs ?? []);
   const sequence = job.sequence ? jobs.get(job.sequence) : null;
   if (sequence?.frames?.list) {

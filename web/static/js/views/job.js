@@ -1,6 +1,6 @@
 // One job: its image as it fills in, how wrong that image still is, and who is at work on it.
 import { h } from "../dom.js";
-import { healthComplaints } from "../state.js";
+import { healthComplaints, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
@@ -36,7 +36,7 @@ function shownJob(state, job, actions) {
 
 function heading(state, job, actions) {
   return h("div", { class: "job-head" },
-    h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id)),
+    h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id), seesOthers(state) ? h("span", { key: "owner", class: "owner" }, ` of ${ownerOf(job)}`) : null),
     h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), jobActions(state, job, actions, true)),
     progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
     h("p", { class: "unseen", role: "status" }, stateWord(job)), // said aloud when it changes, unlike the figures

@@ -1,17 +1,17 @@
 // All jobs.
 import { h } from "../dom.js";
-import { jobsInOrder } from "../state.js";
+import { jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
 import { jobActions, progressBar, safeClass, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
   if (state.jobs === null) return h("p", { class: "waiting", key: "waiting" }, "Fetching the jobs …");
   const jobs = jobsInOrder(state);
-  if (jobs.length === 0) return firstSteps();
+  if (jobs.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are handed in with another one."));
   return h("section", { key: "jobs", class: "jobs" },
-    h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(jobs)), h("a", { class: "button primary", href: "#/submit" }, "New job")),
+    h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(jobs)), mayChange(state) ? h("a", { class: "button primary", href: "#/submit" }, "New job") : null),
     h("table", { class: "list" },
-      h("thead", null, h("tr", null, ["Scene", "State", "Progress", "Samples", "relMSE", "Time left"].map((name) => h("th", { scope: "col", key: name }, name)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
+      h("thead", null, h("tr", null, ["Scene", seesOthers(state) ? "Owner" : null, "State", "Progress", "Samples", "relMSE", "Time left"].filter(Boolean).map((name) => h("th", { scope: "col", key: name }, name)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
       h("tbody", null, jobs.map((job) => row(state, job, actions)))));
 }
 
@@ -26,6 +26,7 @@ function row(state, job, actions) {
     h("td", { class: "name" },
       h("a", { href: `#/jobs/${encodeURIComponent(job.id)}` }, jobName(job)),
       h("small", null, job.frames ? `${count(job.frames.done)} of ${count(job.frames.total)} frames · ` : null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
+    seesOthers(state) ? h("td", { key: "owner", class: "owner", "data-label": "Owner" }, ownerOf(job)) : null,
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),

@@ -1,6 +1,6 @@
 // Small parts that several views share.
 import { h } from "../dom.js";
-import { isOver } from "../state.js";
+import { isOver, mayChange } from "../state.js";
 import { percent } from "../format.js";
 
 const kStateWords = { queued: "waiting", running: "rendering", paused: "paused", done: "done", failed: "failed", cancelled: "cancelled" };
@@ -31,7 +31,7 @@ export const choice = (name, label, options, chosen, onChoose) =>
 
 /** Pause or resume, and cancel, which asks once more. */
 export function jobActions(state, job, actions, large = false) {
-  if (isOver(job)) return null;
+  if (isOver(job) || !mayChange(state)) return null;
   const busy = state.ui.busy === job.id;
   const button = (key, label, onclick, className = "") =>
     h("button", { key, type: "button", class: `${large ? "" : "small "}${className}`, disabled: busy, onclick, "aria-label": `${label}: ${job.name || job.id}` }, label);

@@ -6,6 +6,7 @@ import { jobView } from "./job.js";
 import { workersView } from "./workers.js";
 import { submitView } from "./submit.js";
 import { mark } from "./pieces.js";
+import { mayChange } from "../state.js";
 
 const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView };
 const kLinkWords = { connecting: "connecting …", live: "live", lost: "connection lost, trying again …" };
@@ -34,7 +35,7 @@ function header(state, actions) {
   const link = (view, label) => h("a", { key: view, href: `#/${view}`, "aria-current": here === view ? "page" : null }, label);
   return h("header", { key: "header", class: "top" },
     h("a", { class: "brand", href: "#/jobs", "aria-label": "Lightshaft, all jobs" }, mark(), h("span", null, "Lightshaft")),
-    h("nav", { "aria-label": "Main" }, link("jobs", "Jobs"), link("workers", workersLabel(state)), link("submit", "New job")),
+    h("nav", { "aria-label": "Main" }, link("jobs", "Jobs"), link("workers", workersLabel(state)), mayChange(state) ? link("submit", "New job") : null),
     h("span", { class: `link ${state.link}`, role: "status" }, h("i", { "aria-hidden": "true" }), h("span", null, kLinkWords[state.link])),
     h("button", { type: "button", class: "small quiet", onclick: actions.signOut }, "Sign out"));
 }

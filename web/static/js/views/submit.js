@@ -2,9 +2,11 @@
 import { h } from "../dom.js";
 import { bytes, plural } from "../format.js";
 import { scenesAmong } from "../bundle.js";
-import { diagnostics, progressBar } from "./pieces.js";
+import { diagnostics, notice, progressBar } from "./pieces.js";
+import { mayChange } from "../state.js";
 
 export function submitView(state, actions) {
+  if (!mayChange(state)) return notice("mild", "This token may look, and hand in nothing", h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
   const { submit } = state;
   const busy = submit.phase === "hashing" || submit.phase === "sending";
   return h("section", { key: "submit", class: "submit" },
@@ -33,12 +35,15 @@ function bundle(submit, actions, busy) {
   const scenes = scenesAmong(submit.files);
   const { plan } = submit;
   return h("section", { key: "bundle", class: "panel bundle" },
+    // At the top, and with the name that is known at once: what comes later must not push it under the pointer.
+    h("div", { key: "head", class: "bundle-head" },
+      h("h2", null, plan ? plan.main.name : submit.main?.split("/").at(-1) ?? "No scene yet"),
+      h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over")),
     scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, "There is no .xml scene among these files. Add it.") : null,
     scenes.length > 1
       ? h("p", null, h("label", { for: "main-scene" }, "Scene "), h("select", { id: "main-scene", disabled: busy, onchange: actions.onMain }, scenes.map((path) => h("option", { key: path, value: path, ".selected": path === submit.main }, path))))
       : null,
-    plan ? [h("h2", { key: "h" }, plan.main.name), planned(plan)] : null,
-    h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over"));
+    plan ? planned(plan) : null);
 }
 
 function planned(plan) {

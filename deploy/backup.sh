@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Writes all that a coordinator keeps in its --data folder to one archive, while it works or not. Its secrets are in it: the
+# archive is readable by its owner only. What the farm accepts while this runs may be missing in the archive: after a restore it
+# is rendered again, to the same bits.
+#   deploy/backup.sh DATA OUT.tar.gz          needs python3 (for SQLite's online backup)
+set -euo pipefail
+[ $# = 2 ] || { echo "usage: deploy/backup.sh DATA OUT.tar.gz" >&2; exit 2; }
+data="$1" out="$2"
+[ -e "$data/jobs.sqlite" ] || { echo "error: $data is no coordinator's folder: it has no jobs.sqlite" >&2; exit 1; }
+
+umask 077
+stage=$(mktemp -d "$out.XXXXXX")
+trap 'rm -rf "$stage"' EXIT
+mkdir "$stage/jobs"
+
+# The order makes it whole. A film is copied before the results that it was folded from, so that none it needs is missing; the
+# database after both, so that it knows of every job that has results; blobs, which never change, last, so that no job lacks one.
+for job in "$data"/jobs/*/; do
+  [ -d "$job" ] || continue
+  to="$stage/jobs/$(basename "$job")"
+  mkdir "$to"
+  if [ -e "$job/film.snap" ]; then cp -a "$job/film.snap" "$to/" 2>/dev/null || true; fi
+  # A job that is removed meanwhile goes, a file being written aside is not wanted.
+  find "$job" -mindepth 1 -maxdepth 1 ! -name film.snap ! -name '*.new' ! -name '*.tmp*' -exec cp -a -t "$to" {} + 2>/dev/null || true
+done
+python3 - "$data/jobs.sqlite" "$stage/jobs.sqlite" <<'END'
+import sqlite3, sys
+source, target = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True), sqlite3.connect(sys.argv[2])
+source.backup(target)
+target.close()
+END
+kept=()
+for name in blobs webhooks token tokens join-token webhook-secret tls; do
+  if [ -e "$data/$name" ]; then kept+=("$name"); fi
+done
+# Status 1: something changed while it was read, such as an upload in progress, which nobody needs.
+tar -czf "$out.new" --exclude '*.tmp' -C "$stage" jobs jobs.sqlite -C "$(realpath "$data")" "${kept[@]}" 2>/dev/null || [ $? = 1 ]
+mv "$out.new" "$out"
+echo "$out: $(du -h "$out" | cut -f 1), $(find "$stage/jobs" -mindepth 1 -maxdepth 1 | wc -l) jobs"

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Writes docs/dependencies.md: what deploy/packages.txt installs, in the versions of this machine.
+#   deploy/install-deps.sh --tests && deploy/dependencies.sh > docs/dependencies.md
+set -euo pipefail
+here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
+
+cat <<'HEAD'
+# Dependencies
+
+All of them are packages of Debian 12; there is nothing else, no bundled copy and no download. Made by `deploy/dependencies.sh` on a machine with
+the versions below; security fixes to them come with `apt-get upgrade` and, where a library is linked statically or headers are all
+of it (nlohmann-json, CLI11, Boost, expected, stb, spdlog), with a new build.
+HEAD
+section=""
+while read -r line; do
+  case "$line" in
+    "" | "#"*) continue ;;
+    "["*)
+      section="${line//[\[\]]/}"
+      printf '\n## %s\n\n| package | version | what it is |\n|---|---|---|\n' \
+        "$([ "$section" = build ] && echo "To build and to run" || echo "For the tests besides")"
+      continue ;;
+  esac
+  dpkg-query -W -f='| `${Package}` | ${Version} | ${binary:Summary} |\n' "$line" 2>/dev/null ||
+    { echo "error: $line is not installed: deploy/install-deps.sh --tests first" >&2; exit 1; }
+done <"$here/packages.txt"

@@ -1,0 +1,119 @@
+"""The chaos suite: every storm of storms.py, again and again, with an image-hash check after each.
+
+    tests/chaos/chaos.py [--seed S] [--repetitions N] [--only TEXT] [--write docs/chaos.md]
+
+Ends with 1 if any image was another one, or a storm broke what it must not. A storm that cannot be made here says why.
+"""
+
+import argparse
+import functools
+import os
+import statistics
+import sys
+import time
+import traceback
+
+from chaos_kit import DELAY, SPEC, Storm
+from storms import STORMS
+from weather import Skip
+
+
+def try_once(name, seed):
+    with Storm(seed) as storm, STORMS[name](storm) as farm:
+        return farm.finish()
+
+
+@functools.cache
+def expected_pixels(size):
+    """Of one worker that nothing happens to."""
+    with Storm(0) as storm, storm.farm() as farm:
+        farm.fast_worker()
+        farm.submit_storm(size=size)
+        return farm.finish()[0]
+
+
+@functools.cache
+def calm_seconds(size):
+    """Of three workers that nothing happens to, the middle one of three tries."""
+    def once():
+        with Storm(0) as storm, storm.farm() as farm:
+            farm.add_workers(3, "--fake-delay", DELAY)
+            farm.wait_for_workers(3)
+            farm.submit_storm(size=size)
+            return farm.finish()[2]
+    return statistics.median(once() for _ in range(3))
+
+
+def tries(name, seed, repetitions):
+    """(tries that were right, [units rendered again at most], [seconds lost]), or a Skip."""
+    right, again, lost = 0, [], []
+    for k in range(repetitions):
+        try:
+            pixels, units, took, size = try_once(name, f"{seed} {name} {k}")
+        except Skip:
+            raise
+        except Exception:
+            print(f"BROKEN: {name}, seed {seed}, repetition {k}", file=sys.stderr)
+            traceback.print_exc()
+            continue
+        right += pixels == expected_pixels(size)
+        again.append(units)
+        lost.append(max(0, took - calm_seconds(size)))
+    return right, again, lost
+
+
+def line(name, right, count, again, lost):
+    def both(values, form):
+        return f"{form.format(statistics.median(values))} ({form.format(max(values))})" if values else "-"
+    return f"| {name} | {count} | {right} | {both(again, '{:.0f}')} | {both(lost, '{:.1f}')} |"
+
+
+PAGE = """# Storms
+
+`/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
+same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
+
+*Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
+
+| storm | repetitions | hash equal | units again, at most | seconds lost |
+|---|---|---|---|---|
+{table}
+
+"Killed at STEP": the process kills itself with SIGKILL when it comes to that step of a unit's life for the n-th time, n random (`common/base/step.h`). Workers behind bad networks are in a network namespace, and every packet of theirs passes through `tests/chaos/weather.py`; full disks are small file systems; the wall clock is libfaketime's.
+{skipped}"""
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--repetitions", type=int, default=3)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--write")
+    arguments = parser.parse_args()
+
+    began = time.monotonic()
+    rows, skipped, wrong = [], [], 0
+    for name in STORMS:
+        if arguments.only not in name:
+            continue
+        try:
+            right, again, lost = tries(name, arguments.seed, arguments.repetitions)
+        except Skip as why:
+            skipped.append(f"- {name}: {why}")
+            print(f"left out: {name}: {why}", flush=True)
+            continue
+        wrong += arguments.repetitions - right
+        rows.append(line(name, right, arguments.repetitions, again, lost))
+        print(rows[-1], flush=True)
+    print(f"{len(rows)} storms, {wrong} tries went wrong, {len(skipped)} storms left out, {time.monotonic() - began:.0f} s")
+    if arguments.write and not arguments.only:
+        left_out = "\nLeft out, because they could not be made on that machine:\n\n" + "\n".join(skipped) + "\n" if skipped else ""
+        with open(arguments.write, "w", encoding="utf-8") as out:
+            out.write(PAGE.format(seed=arguments.seed, repetitions=arguments.repetitions, cores=os.cpu_count(),
+                                  minutes=(time.monotonic() - began) / 60, units=48 * 5, delay=DELAY, calm=calm_seconds(SPEC["size"]), table="\n".join(rows), skipped=left_out))
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    assert SPEC["spp"] == 24  # five rounds of 48 tiles: what the page says
+    sys.exit(main())

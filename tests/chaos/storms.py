@@ -1,0 +1,9 @@
+"""All storms, in the order in which they are told of."""
+
+import chaos_kit  # noqa: F401  (finds tests/support)
+import process_storms  # noqa: F401
+import network_storms  # noqa: F401
+import machine_storms  # noqa: F401
+from storm_list import STORMS
+
+__all__ = ["STORMS"]

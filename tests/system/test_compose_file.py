@@ -1,0 +1,47 @@
+"""deploy/docker-compose.yml as far as it can be read without Docker; tests/compose/run.sh really runs it."""
+
+import re
+
+import pytest
+from local_farm import ROOT
+
+yaml = pytest.importorskip("yaml")
+
+COMPOSE = yaml.safe_load((ROOT / "deploy" / "docker-compose.yml").read_text())
+SERVICES = COMPOSE["services"]
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_service_is_confined(name):
+    service = SERVICES[name]
+
+    assert service["read_only"] and service["user"] == "10001:10001" and service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert service["restart"] == ("no" if name == "secrets" else "unless-stopped")
+    assert not service.get("privileged")
+
+
+def test_only_localhost_sees_a_port_and_workers_reach_the_coordinator_alone():
+    published = [port for service in SERVICES.values() for port in service.get("ports", [])]
+
+    assert len(published) == 1 and published[0].startswith("127.0.0.1:")
+    assert SERVICES["worker"]["networks"] == ["farm"] and COMPOSE["networks"]["farm"]["internal"]
+    assert "farm" not in SERVICES["redis"]["networks"] and COMPOSE["networks"]["store"]["internal"]
+
+
+def test_secrets_are_written_by_one_service_and_the_authority_is_seen_by_no_other():
+    def mounts(name):
+        return {v.split(":")[0]: v for v in SERVICES[name]["volumes"]}
+
+    for name in ("redis", "coordinator", "worker"):
+        secret = [v for volume, v in mounts(name).items() if volume.endswith("secrets")]
+        assert len(secret) == 1 and secret[0].endswith(":ro"), name
+        assert "authority" not in mounts(name)
+
+
+def test_every_volume_network_and_target_is_there():
+    targets = set(re.findall(r"^FROM base AS (\w+)$", (ROOT / "deploy" / "Dockerfile").read_text(), re.M))
+    for service in SERVICES.values():
+        assert {v.split(":")[0] for v in service["volumes"]} <= set(COMPOSE["volumes"])
+        assert set(service.get("networks", [])) <= set(COMPOSE["networks"])
+        assert service.get("build", {}).get("target", "redis") in targets

@@ -1,0 +1,272 @@
+"""What docs/operations.md promises: metrics and the dashboard that shows them, logs, webhooks, backup and restore."""
+
+import hashlib
+import hmac
+import http.server
+import json
+import queue
+import re
+import shutil
+import subprocess
+import sys
+import threading
+
+import pytest
+from local_farm import ROOT, SCENE, LocalFarm, Process, wait_until
+from redis_server import RedisServer
+
+SPEC = dict(spp=24, seed=5)
+
+
+def metrics(farm):
+    text = farm.request("GET", "/metrics").decode()
+    return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in text.splitlines() if not line.startswith("#")}
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    with LocalFarm(tmp_path_factory.mktemp("undisturbed")) as farm:
+        farm.add_worker()
+        return farm.pixels(farm.submit(SCENE, **SPEC))
+
+
+# ---- metrics ----
+
+def test_the_dashboard_of_Grafana_asks_only_for_metrics_that_there_are(tmp_path):
+    dashboard = json.loads((ROOT / "deploy" / "grafana" / "lightshaft.json").read_text())
+    asked = [t["expr"] for p in dashboard["panels"] for t in p["targets"]]
+    names = {name for expression in asked for name in re.findall(r"\b((?:lightshaft|process)_\w+)", expression)}
+    labels = {label for expression in asked for label in re.findall(r"by \((\w+)\)", expression)}
+    with RedisServer(tmp_path) as redis, LocalFarm(
+            tmp_path / "farm", flags=["--store", redis.url, "--webhook", "http://127.0.0.1:9/"]) as farm:
+        farm.add_worker()
+        farm.pixels(farm.submit(SCENE, **SPEC))
+        text = farm.request("GET", "/metrics").decode()
+
+    given = set(re.findall(r"^# TYPE (\w+)", text, re.M))
+    assert len(names) > 25
+    assert names - given == set()
+    assert given - names == set(), "every metric is shown somewhere"
+    assert labels <= set(re.findall(r"(\w+)=\"", text))
+
+
+def test_metrics_count_what_a_job_took(farm):
+    farm.add_worker()
+    job = farm.submit(SCENE, **SPEC)
+    farm.pixels(job)
+
+    m, units = metrics(farm), farm.job(job)["units_total"]
+    assert m["lightshaft_units_folded_total"] == m['lightshaft_results_total{verdict="accepted"}'] == units
+    assert m["lightshaft_units_lent_total"] >= units and m["lightshaft_leases_granted_total"] >= 1
+    assert m["lightshaft_units_lent"] == m["lightshaft_leases"] == 0
+    assert m["lightshaft_result_bytes_total"] > units * 32 * 32 * 24 / 4 and m["lightshaft_blob_bytes_total"] > 0
+    assert 0 < m["lightshaft_fold_lag_seconds_total"] < 60 * units
+    assert m["process_threads"] > 3 and m["process_open_fds"] > 3 and m["process_resident_memory_bytes"] > 1e6
+
+
+def test_metrics_count_retries_by_their_cause(farm):
+    victim = farm.add_worker("--fake-delay", 50)
+    job = farm.submit(SCENE, **SPEC)
+    farm.wait_for_progress(job, 2)
+    held = wait_until(lambda: metrics(farm)["lightshaft_units_lent"], "units are lent")
+    victim.kill()
+
+    lost = wait_until(lambda: metrics(farm)['lightshaft_units_freed_total{cause="worker lost"}'], "its units are freed")
+    assert 0 < lost <= held + 64
+    farm.add_worker()
+    farm.wait_for_job(job)
+
+
+# ---- logs ----
+
+def test_logs_are_lines_of_json_with_the_keys_of_job_and_worker(tmp_path):
+    with LocalFarm(tmp_path, flags=["--log-format", "json"]) as farm:
+        worker = farm.add_worker("--log-format", "json", name='a "b" job=stolen')
+        job = farm.submit(SCENE, **SPEC)
+        farm.wait_for_job(job)
+        coordinator = [json.loads(line) for line in farm.coordinator.output().splitlines()]
+        said = [json.loads(line) for line in worker.output().splitlines()]
+
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", line["time"]) for line in coordinator + said)
+    assert {line["level"] for line in coordinator} == {"info"}
+    assert [line for line in coordinator if line.get("job") == job and line.get("state") == "done"]
+    joined = next(line for line in coordinator if line["text"] == "joined" and "name" in line)
+    assert joined["worker"].startswith("w-") and "job" not in joined and "stolen" in joined["name"]
+    assert any(line["text"] == "joined the coordinator" for line in said)
+
+
+def test_the_log_of_a_job_tells_its_life(farm):
+    farm.add_worker()
+    job = farm.submit(SCENE, **SPEC)
+    farm.wait_for_job(job)
+
+    log = wait_until(lambda: (t := farm.request("GET", f"/api/v1/jobs/{job}/log").decode()).count("\n") >= 1 and t, "it is written")
+    assert "running" in log
+
+
+# ---- readiness ----
+
+def test_readiness_tells_that_redis_is_away(tmp_path):
+    with RedisServer(tmp_path) as redis, LocalFarm(tmp_path / "farm", flags=["--store", redis.url]) as farm:
+        assert farm.request("GET", "/readyz") == b"ready\n"
+        redis.kill()
+        farm.submit(SCENE, **SPEC)
+
+        wait_until(lambda: b"but" in farm.request("GET", "/readyz"), "it is told")
+        redis.start()
+
+
+# ---- webhooks ----
+
+class Receiver(http.server.ThreadingHTTPServer):
+    """Takes POSTs; answers with the statuses it is given, then 200."""
+
+    def __init__(self, statuses=()):
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_POST(self):
+                body = self.rfile.read(int(self.headers["Content-Length"]))
+                status = self.server.statuses.pop(0) if self.server.statuses else 200
+                self.send_response(status)
+                if status == 302:
+                    self.send_header("Location", f"http://127.0.0.1:{self.server.server_port}/elsewhere")
+                self.send_header("Content-Length", "0")
+                self.end_headers()
+                self.server.came.put((self.path, dict(self.headers), body, status))
+
+            def log_message(self, *arguments):
+                pass
+
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.statuses, self.came = list(statuses), queue.Queue()
+        self.url = f"http://127.0.0.1:{self.server_port}/hook"
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+    def __exit__(self, *error):
+        self.shutdown()
+        super().__exit__(*error)
+
+    def next(self):
+        return self.came.get(timeout=60)
+
+    def until(self, event):
+        """All that comes, up to the first delivery of this event that was taken."""
+        seen = [self.next()]
+        while seen[-1][1]["Lightshaft-Event"] != event or seen[-1][3] != 200:
+            seen.append(self.next())
+        return seen
+
+
+def signature_is_right(farm, headers, body):
+    secret = (farm.data / "webhook-secret").read_text().strip()
+    fields = dict(part.split("=", 1) for part in headers["Lightshaft-Signature"].split(","))
+    return hmac.compare_digest(hmac.new(secret.encode(), fields["t"].encode() + b"." + body, hashlib.sha256).hexdigest(), fields["v1"])
+
+
+def test_a_webhook_is_told_of_a_jobs_life_signed_and_in_order(tmp_path):
+    with Receiver() as receiver, LocalFarm(tmp_path, flags=["--webhook", receiver.url]) as farm:
+        job = farm.submit(SCENE, **SPEC)
+        farm.add_worker()
+        came = receiver.until("job.done")
+
+        assert [h["Lightshaft-Event"] for _, h, _, _ in came] == ["job.queued", "job.running", "job.done"]
+        assert all(signature_is_right(farm, h, body) for _, h, body, _ in came)
+        assert not signature_is_right(farm, came[0][1], came[0][2] + b" ")
+        told = json.loads(came[-1][2])["job"]
+        assert told["id"] == job and told["state"] == "done" and told["units_done"] == told["units_total"]
+
+
+def test_a_webhook_that_fails_is_repeated_and_a_redirect_is_not_followed(tmp_path):
+    with Receiver([500, 302]) as receiver, LocalFarm(tmp_path, flags=["--webhook", receiver.url]) as farm:
+        farm.submit(SCENE, **SPEC)
+        came = receiver.until("job.queued")
+
+        assert wait_until(lambda: (m := metrics(farm)) and m['lightshaft_webhook_sendings_total{result="taken"}'] == 1 and m, "it is counted")
+        m = metrics(farm)
+        assert m['lightshaft_webhook_sendings_total{result="failed"}'] == 2
+        assert m["lightshaft_webhooks_waiting"] == m["lightshaft_webhooks_given_up_total"] == 0
+
+    assert [status for _, _, _, status in came] == [500, 302, 200]
+    assert {path for path, _, _, _ in came} == {"/hook"}
+    assert len({h["Lightshaft-Delivery"] for _, h, _, _ in came}) == 1
+
+
+def test_what_a_receiver_does_not_take_is_counted_as_waiting(tmp_path):
+    with LocalFarm(tmp_path, flags=["--webhook", "http://127.0.0.1:9/"]) as farm:
+        farm.submit(SCENE, **SPEC)
+        wait_until(lambda: metrics(farm)['lightshaft_webhook_sendings_total{result="failed"}'] >= 1, "a sending has failed")
+
+        assert metrics(farm)["lightshaft_webhooks_waiting"] == 1
+
+
+def test_a_webhook_is_told_after_kill_9_of_the_coordinator(tmp_path):
+    with Receiver([503] * 3) as receiver, LocalFarm(tmp_path, flags=["--webhook", receiver.url]) as farm:
+        job = farm.submit(SCENE, **SPEC)
+        receiver.next()
+        farm.restart_coordinator()
+        farm.add_worker()
+        came = receiver.until("job.done")
+
+    taken = [h["Lightshaft-Event"] for _, h, _, status in came if status == 200]
+    assert taken[0] == "job.queued" and taken[-1] == "job.done"
+    assert json.loads(came[-1][2])["job"]["id"] == job
+
+
+def test_a_webhook_that_is_no_address_is_refused_at_the_start(tmp_path):
+    with LocalFarm(tmp_path / "farm") as farm:
+        other = Process("refused", [farm.bin / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0", "--data", tmp_path / "data",
+                                    "--webhook", "file:///etc/passwd"], tmp_path / "refused.log")
+        assert other.wait() == 2
+        assert "http://HOST" in other.output()
+
+
+# ---- backup and restore ----
+
+def backup(farm, to):
+    subprocess.run([ROOT / "deploy" / "backup.sh", farm.data, to], check=True, capture_output=True)
+
+
+def test_a_farm_restored_from_a_backup_made_while_it_worked_finishes_the_job(farm, tmp_path, expected):
+    farm.add_worker("--fake-delay", 10)
+    farm.request("POST", "/api/v1/tokens", b'{"role": "read"}')
+    job = farm.submit(SCENE, **SPEC)
+    farm.wait_for_progress(job, 8)
+    backup(farm, tmp_path / "backup.tar.gz")
+    farm.wait_for_progress(job, 12)
+    for process in farm.workers + [farm.coordinator]:
+        process.kill()
+    shutil.rmtree(farm.data)
+
+    subprocess.run([ROOT / "deploy" / "restore.sh", tmp_path / "backup.tar.gz", farm.data], check=True, capture_output=True)
+    assert (farm.data / "token").read_text().strip() == farm.token and (farm.data / "tokens").exists()
+    farm.start_coordinator()
+
+    assert farm.job(job)["units_done"] >= 8, "what was accepted before the backup is not rendered again"
+    farm.add_worker()
+    assert farm.pixels(job) == expected
+
+
+def test_a_restore_does_not_touch_a_folder_that_has_a_farm_in_it(farm, tmp_path):
+    backup(farm, tmp_path / "backup.tar.gz")
+
+    refused = subprocess.run([ROOT / "deploy" / "restore.sh", tmp_path / "backup.tar.gz", farm.data], capture_output=True, text=True)
+
+    assert refused.returncode == 1 and "not empty" in refused.stderr
+
+
+# ---- upgrade ----
+
+def test_a_worker_of_another_protocol_is_refused_with_both_versions(farm, tmp_path):
+    grpc = pytest.importorskip("grpc")
+    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
+    from meddler import load_protocol
+    protocol = load_protocol(tmp_path)
+    hello = protocol.FromWorker(hello=protocol.Hello(protocol=99, name="old-timer", build="9.9", numeric_class=bytes(32), threads=1,
+                                                     join_token=farm.join_token))
+    with grpc.insecure_channel(f"127.0.0.1:{farm.grpc}") as channel:
+        work = channel.stream_stream("/lightshaft.farm.v1.Farm/Work", request_serializer=None, response_deserializer=None)
+        answer = protocol.ToWorker.FromString(next(iter(work(iter([hello.SerializeToString()])))))
+
+    assert answer.WhichOneof("message") == "refused" and not answer.refused.retry
+    assert "99" in answer.refused.problem.message and "coordinator speaks 1" in answer.refused.problem.message
+    assert farm.get("/api/v1/workers")["workers"] == []
+    assert "old-timer" in farm.coordinator.output(), "its name is in the log"

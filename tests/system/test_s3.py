@@ -1,0 +1,140 @@
+"""Blobs in an S3-compatible store that checks every signature: the same pixels, also when it is slow, breaks off or lies."""
+
+import hashlib
+import os
+import re
+import concurrent.futures
+import shutil
+import threading
+
+import farm_rpc
+import pytest
+from local_farm import SCENE, LocalFarm, Process, bin_dir, wait_until
+from s3_server import ENVIRONMENT, S3Server
+
+
+@pytest.fixture
+def s3(monkeypatch):
+    for name, value in ENVIRONMENT.items():
+        monkeypatch.setenv(name, value)
+    with S3Server() as server:
+        yield server
+
+
+@pytest.fixture
+def s3_farm(s3, tmp_path):
+    with LocalFarm(tmp_path, flags=["--blobs", s3.url()]) as farm:
+        yield farm
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    with LocalFarm(tmp_path_factory.mktemp("disk")) as farm:
+        farm.add_worker()
+        return farm.pixels(farm.submit(SCENE, spp=8, seed=3))
+
+
+def put(farm, data):
+    digest = hashlib.sha256(data).hexdigest()
+    farm.request("PUT", f"/api/v1/blobs/{digest}", data, "application/octet-stream")
+    return digest
+
+
+def missing(farm, digest):
+    return farm.request("POST", "/api/v1/blobs/missing", b'{"digests":["%s"]}' % digest.encode()) != b'{"missing":[]}'
+
+
+def test_a_job_has_the_pixels_of_a_store_on_disk_also_after_the_local_copies_are_lost(s3, s3_farm, expected):
+    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    assert len(s3.objects) == 1 and all(key.startswith("scenes/") for key in s3.objects)
+
+    s3_farm.coordinator.kill()
+    shutil.rmtree(s3_farm.data / "blobs")
+    s3_farm.start_coordinator()
+    s3_farm.add_worker()
+
+    assert s3_farm.pixels(job) == expected
+
+
+def test_a_blob_that_many_workers_ask_for_comes_once_and_others_are_answered_meanwhile(s3, s3_farm):
+    digest = put(s3_farm, os.urandom(300_000))
+    s3_farm.coordinator.kill()
+    shutil.rmtree(s3_farm.data / "blobs")
+    s3_farm.start_coordinator()
+    s3.requests.clear()
+    s3.gate = threading.Event()
+    token = (s3_farm.data / "join-token").read_text().strip()
+
+    with concurrent.futures.ThreadPoolExecutor(20) as pool:
+        fetches = [pool.submit(farm_rpc.fetch_blob, farm_rpc.channel_of(s3_farm.grpc), token, digest) for _ in range(20)]
+        wait_until(lambda: any(method == "GET" for method, _ in s3.requests), "the first fetch")
+        s3_farm.add_worker()
+        s3_farm.wait_for_workers(1)  # its stream is listened to
+        job = s3_farm.submit(SCENE, spp=2)
+        s3_farm.wait_for_progress(job, 1)
+        s3.gate.set()
+        assert {fetch.result(60)[0] for fetch in fetches} == {"OK"}
+
+    assert sum(method == "GET" and key.endswith(digest) for method, key in s3.requests) == 1
+
+
+def test_lists_of_many_pages_are_read_at_the_start(s3, s3_farm):
+    digests = [put(s3_farm, b"%d" % i) for i in range(7)]
+
+    s3_farm.restart_coordinator()
+    before = len(s3.requests)
+
+    assert not any(missing(s3_farm, digest) for digest in digests)
+    assert len(s3.requests) == before, "what was listed is not asked for again"
+
+
+def test_a_store_that_is_busy_is_asked_again(s3, s3_farm):
+    s3.refuse = [503, 500, 503]
+
+    digest = put(s3_farm, os.urandom(100_000))
+
+    assert f"scenes/{digest[:2]}/{digest}" in s3.objects
+    assert not s3.refuse
+
+
+def test_a_store_that_stays_away_is_named_and_the_upload_can_be_tried_again(s3, s3_farm):
+    s3.refuse = [503] * 12
+    data = os.urandom(1000)
+    with pytest.raises(Exception, match="503.*SlowDown"):
+        put(s3_farm, data)
+    s3.refuse = []
+
+    assert put(s3_farm, data)
+
+
+def test_an_object_that_breaks_off_comes_again_and_one_that_is_damaged_is_not_believed(s3, s3_farm, expected):
+    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    s3_farm.coordinator.kill()
+    shutil.rmtree(s3_farm.data / "blobs")
+    (key, good), = s3.objects.items()
+    s3.objects[key] = good.replace(b"0", b"1", 1)
+    s3_farm.start_coordinator()
+    s3_farm.add_worker()
+    wait_until(lambda: "is damaged" in s3_farm.coordinator.output() or "SHA-256" in "".join(w.output() for w in s3_farm.workers),
+               "the damage is noticed")
+
+    s3.objects[key] = good
+    s3.cut = 1
+
+    assert s3_farm.pixels(job) == expected
+
+
+@pytest.mark.parametrize("change, said", [
+    ({"AWS_SECRET_ACCESS_KEY": "wrong"}, "SignatureDoesNotMatch.*check AWS_ACCESS_KEY_ID"),
+    ({"AWS_ACCESS_KEY_ID": ""}, "set AWS_ACCESS_KEY_ID"),
+    ({"bucket": "other-bucket"}, "NoSuchBucket.*make the bucket first"),
+    ({"prefix": "a b"}, "prefix with other characters"),
+])
+def test_what_cannot_work_is_told_at_the_start(s3, tmp_path, change, said):
+    where = s3.url(change.get("prefix", "scenes"), change.get("bucket"))
+    env = dict(os.environ, **{k: v for k, v in change.items() if k.startswith("AWS")})
+    coordinator = Process("refused", [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0",
+                                      "--data", tmp_path / "data", "--blobs", where], tmp_path / "refused.log", env)
+
+    assert coordinator.wait() in (1, 2)
+    assert re.search(said, coordinator.output()), coordinator.output()
