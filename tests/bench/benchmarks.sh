@@ -1,21 +1,21 @@
 #!/bin/bash
 # Makes docs/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
 #
-# usage: benchmarks.sh SCENES [--clock wall|cpu] [--time S] [--seeds K] [--only races|curves] [--out DIR]
+# usage: benchmarks.sh SCENES [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
 # SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references.
 # Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba and bpy; what is missing is said.
-# The curves have the demo scenes, too, made here if they are not there; they are counted by CPU seconds, and so may be made while
-# others use the machine. The races want a quiet one, or --clock cpu.
+# The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
+# seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
 ADAPTERS=tests/bench/adapters
-clock=wall time=4 seeds=3 only= out=docs/benchmarks
+clock=wall time=4 seeds=3 seed=0 only= out=docs/benchmarks
 [ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
 scenes=$1; shift
 while [ $# -ge 2 ]; do
   case $1 in
-    --clock) clock=$2 ;; --time) time=$2 ;; --seeds) seeds=$2 ;; --only) only=$2 ;; --out) out=$2 ;;
+    --clock) clock=$2 ;; --time) time=$2 ;; --seeds) seeds=$2 ;; --seed) seed=$2 ;; --only) only=$2 ;; --out) out=$2 ;;
     *) echo "benchmarks.sh: unknown option $1" >&2; exit 2 ;;
   esac
   shift 2
@@ -34,12 +34,16 @@ if [ "$only" != curves ]; then
   add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
   add_programs bpy cycles
   "$BIN/lightshaft" compare "$scenes"/*.xml --references "$scenes/refs" --integrators volpath "${programs[@]}" \
-    --time "$time" --seeds "$seeds" --clock "$clock" --report "$out/races" || status=$?
+    --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/races" || status=$?
 fi
 if [ "$only" != races ]; then
   bath=build/benchmarks/bath
   [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" >&2
-  "$BIN/lightshaft" compare "$scenes"/*.xml "$bath/bath.xml" --integrators volpath --size 72x48 \
-    --time 600 --spp 1024 --seeds "$seeds" --clock cpu --report "$out/curves" || status=$?
+  race() {  # FOLDER SCENE...
+    "$BIN/lightshaft" compare "${@:2}" --integrators volpath --size 72x48 --time 600 --spp 1024 --seeds "$seeds" --seed "$seed" \
+      --clock cpu --report "$out/$1" || status=$?
+  }
+  race curves "$scenes"/*.xml
+  race bath "$bath/bath.xml"
 fi
 exit $status

@@ -1,18 +1,24 @@
 #!/usr/bin/env python3
 """What a scene does not need, measured: writes docs/leave-out.md.
 
-usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone]    N = 0: with what was built before
+usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone]
+N = 0: with what was built before, which must be of these sources.
 
 For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
 - instructions per path (callgrind, within render_tile, one thread) of the release build, against a build of the same sources
-  without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...), and against one without the guards of health;
+  without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...), against one without extinction that differs
+  between channels alone, and against one without the guards of health;
 - the same of every instantiation of the integrator that covers the scene;
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
-- what a worker on a farm keeps resident and which libraries it has mapped;
+- what a worker on a farm keeps resident and which libraries it has mapped, with larger files;
 - bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
---bytes-alone measures the last two, which need no other build. Builds land in build/leave-out-*. Needs valgrind and a release build. Instruction counts do not depend on what else runs.
+--bytes-alone measures the last two, which need no other build. Builds land in build/leave-out-*, eight of them, of which only the
+renderer differs: with ccache each compiles a few dozen files; build/release must be configured. Needs valgrind. Instruction counts
+do not depend on what else runs. Ends with 1 if a scene pays more than LIMIT for what it leaves out, or a counter of unused work is
+not 0.
 """
 import argparse
+import array
 import json
 import os
 import pathlib
@@ -25,13 +31,15 @@ import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "system")]
-from cli_kit import FOG, write_fog  # noqa: E402
+from cli_kit import FOG, fog_values, write_fog  # noqa: E402
 from local_farm import LocalFarm  # noqa: E402
 from processes import family  # noqa: E402
 
-SIZE, SPP = (48, 32), 8
+SIZE, SPP = (48, 36), 2
+LIMIT = 0.005
 UNUSED = 100 << 20
-ALL = ["media", "grids", "chromatic", "emission", "overlaps", "boundaries", "coincident", "veils", "textures", "user_geometries", "instances", "environment_maps",
+VOL = struct.Struct("<4s5i6f")  # the header of Mitsuba's grids
+ALL = ["media", "grids", "chromatic", "emission", "overlaps", "boundaries", "veils", "textures", "user_geometries", "instances", "environment_maps",
        "equiangular", "light_trees", "lenses", "found_lights"]
 GRID = re.compile(r'  <shape type="cube">.*?</shape>\n', re.S)
 BOX = '<shape type="cube"><transform name="to_world"><scale value="0.6"/></transform><bsdf type="diffuse">{}</bsdf></shape>\n'
@@ -52,6 +60,12 @@ SCENES = {  # text, the parts that it needs
     "textured": (GRID.sub(BOX.format(TEXTURE), LIT, count=1), ["textures", "found_lights"]),
     "delta": (GRID.sub(HOMOGENEOUS + INSIDE, UNLIT, count=1), ["media", "boundaries", "equiangular"]),
 }
+GREY = ["homogeneous", "grid", "delta"]  # scenes with media whose channels fade alike
+# Counters of work that a scene must leave at 0: all but these.
+WORKS = {"vacuum": {"shadow_rays"}, "textured": {"shadow_rays", "texels"},
+         "homogeneous": {"shadow_rays", "phase", "transmittance", "equiangular", "boundary_rays"},
+         "grid": {"shadow_rays", "phase", "density", "macro_cells", "boundary_rays"}}
+WORKS["delta"] = WORKS["homogeneous"]
 
 
 def scene_text(name):
@@ -66,21 +80,40 @@ def png(width, height):
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
-def write(folder):
-    write_fog(folder, n=32)
-    (folder / "checks.png").write_bytes(png(256, 256))
+def write(folder, nodes, texels):
+    """The scenes, with a grid of so many nodes a side and an image of so many texels."""
+    folder.mkdir()
+    values = array.array("f", fog_values(16))  # repeated: its content does not matter where it is large
+    write_fog(folder, n=nodes) if nodes <= 32 else (folder / "fog.vol").write_bytes(
+        VOL.pack(b"VOL\x03", 1, nodes, nodes, nodes, 1, 0, 0, 0, 1, 1, 1) + (values * (nodes ** 3 // len(values))).tobytes())
+    (folder / "checks.png").write_bytes(png(texels, texels))
     for name in SCENES:
         (folder / f"{name}.xml").write_text(scene_text(name))
 
 
-def build(name, *options, jobs):
-    """Nothing is built with jobs = 0: the binaries that lie there are taken."""
-    folder = ROOT / "build" / f"leave-out-{name}"
-    if jobs == 0:
-        return folder / "bin" / "lightshaft"
-    subprocess.run(["cmake", "--preset", "release", "-B", folder, "-DLIGHTSHAFT_TESTS=OFF", *options], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    subprocess.run(["cmake", "--build", folder, "-j", str(jobs), "--target", "lightshaft"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+def build(folder, *targets, jobs):
+    """With jobs = 0 nothing is built: what lies there is taken."""
+    if jobs > 0:
+        subprocess.run(["cmake", "--build", folder, "-j", str(jobs), "--target", *targets], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     return folder / "bin" / "lightshaft"
+
+
+def build_without(name, *options, jobs):
+    folder = ROOT / "build" / f"leave-out-{name}"
+    if jobs > 0:
+        subprocess.run(["cmake", "--preset", "release", "-B", folder, "-DLIGHTSHAFT_TESTS=OFF", *options], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    return build(folder, "lightshaft", jobs=jobs)
+
+
+def without(name):
+    return [part for part in ALL if part not in SCENES[name][1]]
+
+
+# Names of build folders, and what cmake is told. The last two do without instantiations that none of the scenes is rendered with,
+# which take the compiler longest.
+OTHERS = "chromatic,overlaps"
+BUILDS = {**{name: ["-DLIGHTSHAFT_WITHOUT=" + ",".join(without(name))] for name in SCENES}, "grey": ["-DLIGHTSHAFT_WITHOUT=chromatic"],
+          "unguarded": [f"-DLIGHTSHAFT_WITHOUT=health,{OTHERS}"], "counting": ["-DLIGHTSHAFT_COUNT=ON", f"-DLIGHTSHAFT_WITHOUT={OTHERS}"]}
 
 
 def instructions(binary, scene, folder):
@@ -95,8 +128,9 @@ def instructions(binary, scene, folder):
 
 
 # By name: the flags of worker/render/features.h, in their order, without those that are not set at the end.
-INSTANTIATIONS = {"surfaces": (), "homogeneous grey media": (1,), "homogeneous chromatic media": (1, 0, 1), "grey grids": (1, 1),
-                  "chromatic grids": (1, 1, 1), "everything": (1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1)}
+INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
+                  "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
+                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1)}
 
 
 def inclusive(callgrind):
@@ -127,7 +161,7 @@ def by_instantiation(binary, scene, folder):
     for function, cost in inclusive(out).items():
         if (m := re.search(r"sample_with<ls::render::Features\{([^}]*)\}", function)):
             flags = tuple(int(flag == "true") for flag in m[1].split(", ")) if m[1] else ()
-            costs[flags] = cost / paths
+            costs[flags] = costs.get(flags, 0) + cost / paths
     return [(v["variant"], costs[INSTANTIATIONS[v["variant"]]]) for v in told["variant_bits"]]
 
 
@@ -144,6 +178,7 @@ def on_a_farm(scene, folder):
         rss = max(int(re.search(r"VmRSS:\s+(\d+)", pathlib.Path(f"/proc/{pid}/status").read_text())[1]) * 1024 for pid in pids)
         used = lambda path: sum(p.stat().st_size for p in path.rglob("*") if p.is_file())  # noqa: E731
         blobs = used(farm.data / "blobs") if (farm.data / "blobs").is_dir() else used(farm.data)
+        blobs -= scene.stat().st_size  # the file as it was written, which names what is not used, too
         return {"rss": rss, "libraries": sorted(set(re.findall(r"/(lib[\w+.-]+?)\.so", maps))), "stored": blobs,
                 "cached": used(folder / "cache"), "peak": report["peak_rss_bytes"], "pixels": report["pixels_sha256"]}
 
@@ -151,8 +186,7 @@ def on_a_farm(scene, folder):
 def with_unused(scene, folder):
     big = folder / "unused.vol"
     n = 298  # cubed, times four bytes: 100 MiB and a little
-    head = b"VOL\x03" + struct.pack("<5i6f", 1, n, n, n, 1, 0, 0, 0, 1, 1, 1)
-    big.write_bytes(head + os.urandom(4096) + bytes(4 * n ** 3 - 4096))
+    big.write_bytes(VOL.pack(b"VOL\x03", 1, n, n, n, 1, 0, 0, 0, 1, 1, 1) + os.urandom(4096) + bytes(4 * n ** 3 - 4096))
     assert big.stat().st_size >= UNUSED
     text = scene.read_text().replace("</scene>", '<medium type="heterogeneous" id="u"><volume name="sigma_t" type="gridvolume">'
                                      '<string name="filename" value="unused.vol"/></volume></medium></scene>')
@@ -170,35 +204,51 @@ def work(binary, scene):
     return json.loads(done.stdout)["work"]
 
 
-def compute(name, release, unguarded, counting, jobs, scene, folder):
-    without = [part for part in ALL if part not in SCENES[name][1]]
-    bare = build(name, "-DLIGHTSHAFT_WITHOUT=" + ",".join(without), jobs=jobs)
-    full, pixels = instructions(release, scene, folder)
-    least, same = instructions(bare, scene, folder)
-    assert pixels == same, f"{name}: the build without {without} gives another image"
-    print(name, f"{full:.0f} instructions a path, {least:.0f} without: {100 * (full / least - 1):+.2f} %", flush=True)
-    trusting, same = instructions(unguarded, scene, folder)
-    assert pixels == same, f"{name}: the build without guards gives another image"
-    print(name, f"{trusting:.0f} without the guards of health: {100 * (full / trusting - 1):+.2f} %", flush=True)
-    return {"full": full, "bare": least, "without": without, "unguarded": trusting, "work": work(counting, scene),
-            "variants": by_instantiation(release, scene, folder)}
+def compute(name, binaries, scene, folder):
+    row = {"full": None, "bare": None}
+    row |= {what: None for what in ("unguarded", "grey") if what in binaries and (what != "grey" or name in GREY)}
+    pixels = {}
+    for what in row:
+        binary = binaries[{"full": "release", "bare": name}.get(what, what)]
+        row[what], pixels[what] = instructions(binary, scene, folder)
+        print(f"{name}: {row[what]:.0f} instructions a path, {what}, {percent(row['full'], row[what])}", flush=True)
+    assert len(set(pixels.values())) == 1, f"{name}: the builds do not agree on the image: {pixels}"
+    if "counting" in binaries:
+        row["work"] = work(binaries["counting"], scene)
+    return row | {"variants": by_instantiation(binaries["release"], scene, folder)}
 
 
-def measure(names, jobs, folder, bytes_alone):
-    write(folder)
-    release = ROOT / "build" / "release" / "bin" / "lightshaft"
-    if not bytes_alone:
-        counting = build("counting", "-DLIGHTSHAFT_COUNT=ON", jobs=jobs)
-        unguarded = build("unguarded", "-DLIGHTSHAFT_WITHOUT=health", jobs=jobs)
+def measure(names, jobs, folder, bytes_alone, skipped=()):
+    release = ROOT / "build" / "release"
+    binaries = {"release": build(release, "lightshaft", "lightshaft-coordinator", "lightshaft-worker", jobs=jobs)}
+    small, large = folder / "small", folder / "large"
+    write(small, 32, 256)
+    write(large, 128, 1024)
+    for name in [] if bytes_alone else [*names, "grey", "unguarded", "counting"]:
+        if name not in skipped:
+            binaries[name] = build_without(name, *BUILDS[name], jobs=jobs)
     rows = {}
     for name in names:
-        scene = folder / f"{name}.xml"
-        told = json.loads(subprocess.run([release, "inspect", scene, "--json"], check=True, capture_output=True, text=True).stdout)
+        scene = large / f"{name}.xml"
+        told = json.loads(subprocess.run([release / "bin" / "lightshaft", "inspect", scene, "--json"], check=True, capture_output=True, text=True).stdout)
         rows[name] = {"variant": told["variant"], "needed": sum(s["bytes"] for s in told["structures"]),
-                      "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, folder), folder / f"farm-{name}-fat")}
+                      "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, large), folder / f"farm-{name}-fat")}
         if not bytes_alone:
-            rows[name] |= compute(name, release, unguarded, counting, jobs, scene, folder)
+            rows[name] |= compute(name, binaries, small / f"{name}.xml", folder)
     return rows
+
+
+def faults(rows):
+    """What is not as it should be."""
+    for name, r in rows.items():
+        if "full" in r and r["full"] > r["bare"] * (1 + LIMIT):
+            yield f"{name}: {percent(r['full'], r['bare'])} instructions for what it leaves out"
+        if "grey" in r and r["full"] > r["grey"] * (1 + LIMIT):
+            yield f"{name}: {percent(r['full'], r['grey'])} instructions for media of three channels, of which it has none"
+        if "work" in r:
+            yield from (f"{name}: {n} of {key}, which it does not need" for key, n in r["work"].items() if n and key not in WORKS[name])
+        if any(r["farm"][key] != r["fat"][key] for key in ("stored", "cached", "pixels")):
+            yield f"{name}: unused files change what is stored, fetched or rendered"
 
 
 def percent(n, of):
@@ -209,10 +259,17 @@ def computed(rows):
     out = ["## Instructions per path", "", f"Images of {SIZE[0]} x {SIZE[1]} pixels with {SPP} samples, one thread.", "",
            "Callgrind, within `render_tile`: what the presence of parts that the scene does not use costs it. *without*: the same sources "
            "with these parts compiled out (`cmake -DLIGHTSHAFT_WITHOUT=...`); both give the same pixels, bit for bit.", "",
-           "| scene | instantiation | instructions | without the unused parts | difference |", "|---|---|---|---|---|"]
+           "| scene | instantiation | instructions | without the unused parts | difference | within 0.5 % |", "|---|---|---|---|---|---|"]
     for name, r in rows.items():
-        out.append(f"| {name} | {r['variant']} | {r['full']:.0f} | {r['bare']:.0f} | {percent(r['full'], r['bare'])} |")
-    out += ["", "Compiled out were: " + "; ".join(f"for *{n}* {', '.join(r['without'])}" for n, r in rows.items()) + ".", ""]
+        out.append(f"| {name} | {r['variant']} | {r['full']:.0f} | {r['bare']:.0f} | {percent(r['full'], r['bare'])} | "
+                   f"{'yes' if r['full'] <= r['bare'] * (1 + LIMIT) else 'NO'} |")
+    out += ["", "Compiled out were: " + "; ".join(f"for *{n}* {', '.join(without(n))}" for n in rows) + ".", ""]
+    out += ["What is left is asked at hits: whether one is on a triangle of the world's own, whether a boundary thins light; and, at flights, whether "
+            "points are sampled about a light.", ""]
+    out += chromatic(rows)
+    out += compared(rows, "unguarded", "### The guards of numeric health",
+                    "Against a build without them (`-DLIGHTSHAFT_WITHOUT=health`, and without instantiations that none of these scenes is rendered "
+                    "with): each sample's test, the bounds of densities, directions that are none.")
     out += ["### By instantiation", "",
             "The same bits at another price, in a small image (`lightshaft inspect SCENE --variants`, which names the prices itself where the machine has a "
             "counter of instructions; here again callgrind): the first is the one that the scene is rendered with. What it saves over the general one is "
@@ -220,16 +277,43 @@ def computed(rows):
     for name, r in rows.items():
         cheapest = r["variants"][0][1]
         out.append(f"- {name}: " + "; ".join(f"{v} {n:.0f}" + ("" if n == cheapest else f" ({percent(n, cheapest)})") for v, n in r["variants"]) + ".")
-    out += ["", "### The guards of numeric health", "",
-            "Against a build without them (`-DLIGHTSHAFT_WITHOUT=health`): each sample's test, the bounds of densities, directions that are none.", "",
-            "| scene | instructions | without the guards | difference |", "|---|---|---|---|"]
+    return out + [""] + worked({name: r["work"] for name, r in rows.items() if "work" in r})
+
+
+def chromatic(rows):
+    """What media of three channels cost grey ones: by being there, and if they were rendered by their code."""
+    rows = {name: r for name, r in rows.items() if "grey" in r}
+    if not rows:
+        return []
+    out = ["### Grey or chromatic", "",
+           "What extinction that differs between channels, and grids of three channels, cost grey media: by their presence in the renderer (against "
+           "`-DLIGHTSHAFT_WITHOUT=chromatic`), which is what grey scenes pay; and what they would pay if there were no instantiation for grey media "
+           "(the next one that covers the scene and knows channels, in the small image of the list below).", "",
+           "| scene | grey / chromatic | instructions | without | difference | within 0.5 % | as chromatic |", "|---|---|---|---|---|---|---|"]
     for name, r in rows.items():
-        out.append(f"| {name} | {r['full']:.0f} | {r['unguarded']:.0f} | {percent(r['full'], r['unguarded'])} |")
-    out += ["", "## Work that is not done", "", "Counted in a build with `-DLIGHTSHAFT_COUNT=ON` (`lightshaft inspect SCENE --work`), in a small image.", "",
-            "| work | " + " | ".join(rows) + " |", "|---|" + "---|" * len(rows)]
-    for key in next(iter(rows.values()))["work"]:
-        out.append(f"| {key.replace('_', ' ')} | " + " | ".join(str(r["work"][key]) for r in rows.values()) + " |")
+        by = dict(r["variants"])
+        other = {"homogeneous grey media": "homogeneous chromatic media", "grey grids": "chromatic grids"}[r["variant"]]
+        out.append(f"| {name} | {r['variant']} / {other} | {r['full']:.0f} | {r['grey']:.0f} | {percent(r['full'], r['grey'])} | "
+                   f"{'yes' if r['full'] <= r['grey'] * (1 + LIMIT) else 'NO'} | {percent(by[other], by[r['variant']])} |")
     return out + [""]
+
+
+def compared(rows, what, title, words):
+    """The release build against another one, for the scenes that were measured with it."""
+    rows = {name: r for name, r in rows.items() if what in r}
+    if not rows:
+        return []
+    return [title, "", words, "", "| scene | instructions | without | difference |", "|---|---|---|---|",
+            *(f"| {name} | {r['full']:.0f} | {r[what]:.0f} | {percent(r['full'], r[what])} |" for name, r in rows.items()), ""]
+
+
+def worked(works):
+    if not works:
+        return []
+    return ["## Work that is not done", "",
+            "Counted in a build with `-DLIGHTSHAFT_COUNT=ON` (`lightshaft inspect SCENE --work`), in a small image; the script fails where a counter of "
+            "what a scene does not need is not 0.", "", "| work | " + " | ".join(works) + " |", "|---|" + "---|" * len(works),
+            *(f"| {key.replace('_', ' ')} | " + " | ".join(str(work[key]) for work in works.values()) + " |" for key in next(iter(works.values()))), ""]
 
 
 def page(rows, bytes_alone):
@@ -241,7 +325,8 @@ def page(rows, bytes_alone):
     else:
         out += computed(rows)
     out += ["## Bytes", "",
-            "A job on a farm with one worker: what the coordinator stores of it, what the worker fetched, what its render process keeps resident; and "
+            "A job on a farm with one worker, with a grid of 128^3 nodes (8 MiB) and an image of 1024^2 texels (3 MiB): what the coordinator stores of it "
+            "beside the scene's own text, what the worker fetched, what its render process keeps resident; and "
             "the same with a grid of 100 MiB beside it that nothing needed names. *needed*: the sum of the scene's structures (`lightshaft inspect`); "
             "resident memory beyond the vacuum scene's against what is needed beyond its.", "",
             "| scene | needed MiB | resident MiB | beyond vacuum: resident, needed | stored MiB, with 100 MiB unused | fetched MiB, with | resident MiB, with | same pixels |",
@@ -266,11 +351,15 @@ def main():
     options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "leave-out.md")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
+    options.add_argument("--skip", default="")
     options.add_argument("--bytes-alone", action="store_true")
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="lightshaft-leave-out-") as folder:
-        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone)
+        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone, chosen.skip.split(","))
     chosen.out.write_text(page(rows, chosen.bytes_alone))
+    found = list(faults(rows))
+    print("\n".join(found), file=sys.stderr)
+    sys.exit(1 if found else 0)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 // What the stop rule gains and what it costs, on images whose truth is known: docs/stopping.md is made by it.
-//   stopping_bench [JOBS]     jobs of each image and target; 100 unless told otherwise
+//   stopping_bench [JOBS] [SEED]     jobs of each image and target, 100 unless told otherwise; seeds from
+//   SEED on (1)
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -29,7 +30,7 @@ struct Moments {
   double squared_bias(double n) const { return mean(n) * mean(n) - variance_of_mean(n); }
 };
 
-Row measure(const SyntheticFilm& film, double target, int jobs) {
+Row measure(const SyntheticFilm& film, double target, int jobs, std::uint64_t first) {
   Row row;
   const double n = jobs;
   std::vector<Moments> pixels(film.pixels()), tiles(film.grid().count());
@@ -38,7 +39,7 @@ Row measure(const SyntheticFilm& film, double target, int jobs) {
   for (TileIndex t = 0; t < film.grid().count(); ++t)
     for (const SyntheticPixel& p : film.tile(t)) truth += p.truth();
   for (int j = 0; j < jobs; ++j) {
-    const StoppedJob job = run_to_target(film, target, static_cast<std::uint64_t>(j) + 1);
+    const StoppedJob job = run_to_target(film, target, first + static_cast<std::uint64_t>(j));
     row.spp += job.stop.mean_spp / n;
     row.realised += job.realised / n;
     row.estimated += job.estimated / n;
@@ -80,7 +81,7 @@ double ideal_gain(const SyntheticFilm& film) {
   return film.relative_variance() / (roots * roots);
 }
 
-void table(int jobs) {
+void table(int jobs, std::uint64_t first) {
   fmt::print(
       "| image | target | samples a pixel | true relMSE / target | estimated / true | above the target "
       "| error of uniform sampling at equal cost / adaptive | best possible "
@@ -93,7 +94,7 @@ void table(int jobs) {
     const double variance = film.relative_variance();
     for (const double samples : {150., 600., 2400.}) {
       const double target = variance / samples;
-      const Row r = measure(film, target, jobs);
+      const Row r = measure(film, target, jobs, first);
       fmt::print("| {} | {:.2g} | {:.0f} | {:.3f} | {:.3f} | {:.0f} % | {:.2f} | {:.2f} |\n", scene.name,
                  target, r.spp, r.realised / target, r.estimated / r.realised, 100 * r.over,
                  variance / r.spp / r.realised, ideal_gain(film));
@@ -111,6 +112,8 @@ void table(int jobs) {
 
 int main(int argc, char** argv) {
   const int jobs = argc > 1 ? std::atoi(argv[1]) : 100;
-  if (jobs < 2) return fmt::print(stderr, "usage: {} [JOBS]    at least 2\n", argv[0]), 2;
-  ls::test::table(jobs);
+  const long long first = argc > 2 ? std::atoll(argv[2]) : 1;
+  if (jobs < 2 || first < 0)
+    return fmt::print(stderr, "usage: {} [JOBS] [SEED]    at least 2 jobs\n", argv[0]), 2;
+  ls::test::table(jobs, static_cast<std::uint64_t>(first));
 }
