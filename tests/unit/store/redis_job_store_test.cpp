@@ -261,6 +261,80 @@ TEST_F(RedisStores, LeaveADamagedRecordToPeopleAndTakeTheOthers) {
   EXPECT_EQ(ask({"HGET", redis_job_key({"j-damaged"}), "record"}).text, "{");
 }
 
+TEST_F(RedisStores, RememberBarredWorkersThroughTheLossOfEither) {
+  ASSERT_TRUE(open()->bar({{"w-1"}, "evidence"}));
+  redis_.kill();
+  redis_.start();
+  open().reset();  // tells the Redis that forgot
+  lose_the_disk();
+
+  EXPECT_EQ(open()->barred().value(), (std::vector<BarredWorker>{{{"w-1"}, "evidence"}}));
+}
+
+TEST_F(RedisStores, OneThatIsRefusedKeepsNoOtherFromBeingTold) {
+  ask({"SET", redis_job_key({"j-000"}), "of another type"});
+  auto store = open();
+  for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->put_job(sample_job(fmt::format("j-{:03}", i))));
+
+  // Both at once: between two tries of the refused one, others may have been told without trouble.
+  ASSERT_TRUE(eventually([&] {
+    const auto status = store->status();
+    return status.behind == 1 && !status.trouble.empty();
+  }));
+  EXPECT_TRUE(in_redis({"j-199"}));
+}
+
+struct SharedStores : RedisStores {
+  std::unique_ptr<JobStore> open_node(const std::string& node) {
+    auto with = options();
+    with.node = node;
+    return open_redis_job_store(open_sqlite_job_store(folder_.path() / (node + ".sqlite")).value(), with).value();
+  }
+  // What another one would have done.
+  void give(const std::string& job, const std::string& from, const std::string& to, int fence) {
+    ask({"HSET", redis_job_key({job}), "owner", to, "from", from, "fence", std::to_string(fence)});
+    ask({"SMOVE", "lightshaft:owned:" + from, "lightshaft:owned:" + to, job});
+    ask({"RPUSH", "lightshaft:lost:" + from, fmt::format("{} {}", job, fence)});
+  }
+};
+
+TEST_F(SharedStores, WhoIsBarredByOneIsToldToTheOther) {
+  const auto a = open_node("a"), b = open_node("b");
+
+  ASSERT_TRUE(a->bar({{"w-1"}, "evidence"}));
+
+  std::vector<BarredWorker> told;
+  ASSERT_TRUE(eventually([&] { return !(told = b->moved().barred).empty(); }));
+  EXPECT_EQ(told, (std::vector<BarredWorker>{{{"w-1"}, "evidence"}}));
+  EXPECT_EQ(b->barred().value(), told);
+  EXPECT_TRUE(a->moved().barred.empty());
+}
+
+TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  ASSERT_TRUE(a->add_log({"j-1"}, {1, "by a"}));
+  ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}) && a->status().behind == 0; }));
+  give("j-1", "a", "b", 2);
+  std::vector<JobId> lost;
+  ASSERT_TRUE(eventually([&] { return !(lost = a->moved().lost).empty(); }));
+
+  ASSERT_TRUE(a->add_log({"j-1"}, {2, "cancelled"}));  // what still stood in the queue
+  ASSERT_TRUE(a->add_point({"j-1"}, {1, 2, 4, {}}));
+  EXPECT_TRUE(a->log({"j-1"}).value().empty());
+  EXPECT_TRUE(a->points({"j-1"}).value().empty());
+  ask({"HSET", redis_job_key({"j-1"}), "log", R"([[3,"by b"]])"});
+  give("j-1", "b", "a", 3);
+  ask({"CLIENT", "KILL", "TYPE", "normal"});
+
+  std::vector<JobStore::Inherited> back;
+  ASSERT_TRUE(eventually([&] { return !(back = a->moved().inherited).empty(); }));
+  EXPECT_EQ(back[0].job.id.value, "j-1");
+  EXPECT_EQ(back[0].from, "b");
+  ASSERT_EQ(a->log({"j-1"}).value().size(), 1u);
+  EXPECT_EQ(a->log({"j-1"}).value()[0].text, "by b");
+}
+
 TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
   test::RedisServer redis("secret");
   RedisAddress address{"127.0.0.1", redis.port(), 0, "", ""};
