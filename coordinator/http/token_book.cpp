@@ -78,7 +78,7 @@ Result<std::unique_ptr<TokenBook>> TokenBook::open(const std::filesystem::path& 
   return book;
 }
 
-Result<void> TokenBook::read_all() {
+Result<void> TokenBook::read_all() const {
   const FileState now = file_state(file_);
   auto text = read_list(file_);
   if (!text) return tl::unexpected(text.error());
@@ -103,11 +103,11 @@ void TokenBook::look_again_locked() const {
   if (file_.empty()) return;
   const FileState now = file_state(file_);
   if (now == seen_) return;
-  if (const auto read = const_cast<TokenBook*>(this)->read_all(); !read) log_error("", read.error().message);
+  if (const auto read = read_all(); !read) log_error("", read.error().message);
   seen_ = now;
 }
 
-Result<void> TokenBook::read_line(std::string_view line) {
+Result<void> TokenBook::read_line(std::string_view line) const {
   if (line.size() > kMaxLine) return bad("the line is too long to be a token's");
   std::string_view rest = line.substr(0, line.find('#'));
   const std::string_view role_name = next_word(rest);
@@ -128,7 +128,7 @@ Result<void> TokenBook::read_line(std::string_view line) {
   return {};
 }
 
-void TokenBook::put(Role role, std::string user, const Digest& digest, bool of_file) {
+void TokenBook::put(Role role, std::string user, const Digest& digest, bool of_file) const {
   entries_.push_back({{digest.hex().substr(0, kIdDigits), role, std::move(user), of_file}, digest});
 }
 

@@ -61,17 +61,18 @@ class TokenBook {
     TokenInfo info;
     Digest digest;
   };
-  void put(Role role, std::string user, const Digest& digest, bool of_file);
-  Result<void> read_line(std::string_view line);
-  Result<void> read_all();
+  void put(Role role, std::string user, const Digest& digest, bool of_file) const;
+  Result<void> read_line(std::string_view line) const;
+  Result<void> read_all() const;
   void look_again_locked() const;  // has another coordinator written the file?
   Result<void> save_locked() const;
 
   std::string session_key_;
   std::filesystem::path file_;  // empty: in memory
   mutable std::mutex mutex_;
-  mutable FileState seen_;  // of file_, as read last
-  std::vector<Entry> entries_;
+  // What the file says, as read last: looking again changes what is known here, not the book.
+  mutable FileState seen_;
+  mutable std::vector<Entry> entries_;
 };
 
 }  // namespace ls::http

@@ -115,7 +115,7 @@ class RedisJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     std::string trouble = trouble_.empty() ? not_kept_ : trouble_;
     if (trouble.empty() && members_) trouble = members_->stranded();
-    return {options_.address.shown(), std::move(trouble), due_.size() + (all_due_ ? revisions_.size() : 0)};
+    return {options_.address.shown(), std::move(trouble), due_.size() + telling_ + (all_due_ ? revisions_.size() : 0)};
   }
 
   Moved moved() override {
@@ -269,6 +269,7 @@ class RedisJobStore final : public JobStore {
   std::set<JobId> lost_;                      // to others: what the service still puts is not stored
   Moved moved_;                               // what the service has not been told yet
   std::map<JobId, Due> due_;
+  std::size_t telling_ = 0;  // jobs on their way to Redis: not due, and not there yet
   JobId told_last_;  // of those that are due: after it the next ones' turn begins
   std::map<std::string, std::uint64_t> counters_;
   std::map<WorkerId, std::string> barred_;  // all there are

@@ -165,6 +165,7 @@ Result<void> RedisJobStore::tell_jobs() {
       told_last_ = next->first;
       taken.insert(due_.extract(next));
     }
+    telling_ = taken.size();
     for (const auto& [id, due] : taken)
       if (const auto fence = fences_.find(id); fence != fences_.end()) fences.insert(*fence);
   }
@@ -194,10 +195,9 @@ Result<void> RedisJobStore::tell_jobs() {
                 "knows is kept "
                 "on its disk only");
   }
-  if (!failed) return {};
   if (replies) std::erase_if(taken, [&](const auto& job) { return !refused.contains(job.first); });
   give_back(std::move(taken));
-  return tl::unexpected(*failed);
+  return failed ? tl::unexpected(*failed) : Result<void>();
 }
 
 std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, const Due& due) const {
@@ -218,8 +218,10 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   return {put_command(update)};
 }
 
+// What of it was not told.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
   const std::lock_guard lock(mutex_);
+  telling_ = 0;
   for (auto& [id, old] : taken) {
     const auto [now, fresh] = due_.try_emplace(id, old);
     if (fresh || now->second.removed) continue;

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "coordinator/store/json_number.h"
 
 namespace ls::coordinator {
 namespace {
@@ -53,9 +54,6 @@ std::optional<TrueFigures> truth_of(const json& t) {
   if (!t.at(2).is_null()) truth.flip = t.at(2).get<double>();
   return truth;
 }
-
-json finite(double value) { return std::isfinite(value) ? value : 0.0; }
-double number_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
 
 json truth_value(const std::optional<TrueFigures>& truth) {
   if (!truth) return nullptr;

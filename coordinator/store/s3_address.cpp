@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cstdlib>
+#include <optional>
 
 #include "coordinator/store/s3_link.h"
 
@@ -29,6 +31,14 @@ tl::unexpected<Error> wrong(std::string_view url, std::string_view why) {
               fmt::format("--blobs '{}' {}; use s3://BUCKET/PREFIX?endpoint=URL&region=NAME", url, why));
 }
 
+// So many MiB within these bounds, in bytes.
+std::optional<std::uint64_t> mebibytes(std::string_view text, std::uint64_t least, std::uint64_t most) {
+  std::uint64_t value = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (read.ec != std::errc() || read.ptr != text.data() + text.size() || value < least || value > most) return {};
+  return value << 20;
+}
+
 Result<void> take_parameters(S3Address& address, std::string_view query, std::string_view url) {
   while (!query.empty()) {
     const std::string_view one = query.substr(0, query.find('&'));
@@ -40,7 +50,14 @@ Result<void> take_parameters(S3Address& address, std::string_view query, std::st
       address.endpoint = value;
     else if (name == "region")
       address.region = value;
-    else
+    else if (name == "part-mib" || name == "copies-mib") {
+      const bool part = name == "part-mib";
+      const auto bytes = part ? mebibytes(value, 5, 5 << 10) : mebibytes(value, 1, std::uint64_t{1} << 40);
+      if (!bytes)
+        return wrong(url, part ? "has a part-mib that is no whole number from 5 to 5120"
+                               : "has a copies-mib that is no whole number of at least 1");
+      (part ? address.part_bytes : address.copies_bytes) = *bytes;
+    } else
       return wrong(url, fmt::format("has an unknown parameter '{}'", name));
   }
   return {};

@@ -7,6 +7,8 @@
 namespace ls::coordinator {
 namespace {
 
+constexpr int kReadTries = 3;
+
 std::string key_of(const Digest& digest) {
   const std::string hex = digest.hex();
   return hex.substr(0, 2) + "/" + hex;
@@ -35,13 +37,15 @@ class S3Blobs::Passed final : public BlobStore::Upload {
   Digest digest_;
 };
 
-Result<std::unique_ptr<S3Blobs>> S3Blobs::open(S3Options options, std::filesystem::path folder) {
+Result<std::unique_ptr<S3Blobs>> S3Blobs::open(const S3Options& options, std::filesystem::path folder) {
   auto local = DiskBlobs::open(std::move(folder));
   if (!local) return tl::unexpected(local.error());
-  std::unique_ptr<S3Blobs> blobs(new S3Blobs(std::move(options), std::move(*local)));
+  std::unique_ptr<S3Blobs> blobs(new S3Blobs(options, std::move(*local)));
   const auto known = blobs->list(false);
   if (!known) return tl::unexpected(known.error());
   blobs->there_.insert(known->begin(), known->end());
+  if (const auto here = blobs->local_->list(false))
+    for (const Digest& digest : *here) blobs->note_copy(digest);
   log_info("store=s3", fmt::format("{}: {} blobs", blobs->link_.shown(), known->size()));
   return blobs;
 }
@@ -73,9 +77,26 @@ Result<std::uint64_t> S3Blobs::size(const Digest& digest) const {
 
 Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t offset,
                                              std::uint64_t length) const {
-  if (!local_->has(digest))
-    if (auto fetched = fetch(digest); !fetched) return tl::unexpected(fetched.error());
-  return local_->read(digest, offset, length);
+  // Between being fetched and being read it may have had to go for others.
+  for (int tries = 1;; ++tries) {
+    if (!local_->has(digest))
+      if (auto fetched = fetch(digest); !fetched) return tl::unexpected(fetched.error());
+    auto bytes = local_->read(digest, offset, length);
+    if (!bytes && bytes.error().code == Errc::not_found && tries < kReadTries) continue;
+    if (bytes) note_copy(digest);
+    return bytes;
+  }
+}
+
+void S3Blobs::note_copy(const Digest& digest) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!there_.contains(digest)) return;  // the only one
+  }
+  const auto bytes = local_->size(digest);
+  if (!bytes) return;
+  for (const Digest& old : copies_.used(digest, *bytes))
+    if (auto removed = local_->remove(old); !removed) log_warn("store=s3", removed.error().message);
 }
 
 Result<void> S3Blobs::fetch(const Digest& digest) const {
@@ -109,6 +130,7 @@ Result<void> S3Blobs::fetch_now(const Digest& digest) const {
   if (auto whole = upload->finish(); !whole)
     return fail(Errc::internal, fmt::format("what {} has for blob {} is damaged: {}", link_.shown(),
                                             digest.hex(), whole.error().message));
+  note(digest);
   return {};
 }
 
@@ -117,6 +139,7 @@ Result<void> S3Blobs::send(const Digest& digest) {
   if (!bytes) return tl::unexpected(bytes.error());
   if (auto sent = link_.put(key_of(digest), local_->path(digest), *bytes, digest); !sent) return sent;
   note(digest);
+  note_copy(digest);
   return {};
 }
 
@@ -155,6 +178,7 @@ Result<void> S3Blobs::remove(const Digest& digest) {
     there_.erase(digest);
   }
   if (auto gone = link_.remove(key_of(digest)); !gone) return gone;
+  copies_.gone(digest);
   return local_->remove(digest);
 }
 

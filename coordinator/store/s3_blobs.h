@@ -1,6 +1,6 @@
 // Blobs in an S3-compatible store, so that they outlive this machine and others reach them: PREFIX/ab/<64 hex
-// digits>. A folder on this machine takes what arrives until it is whole and proven, and keeps what was read:
-// each object comes once, and its digest is checked. A blob counts as there when the store has it.
+// digits>. A folder on this machine takes what arrives until it is whole and proven, and keeps what was read
+// (as much as S3Address::copies_bytes says): each object comes once, and its digest is checked. A blob counts as there when the store has it.
 #pragma once
 
 #include <condition_variable>
@@ -11,6 +11,7 @@
 #include <set>
 
 #include "coordinator/store/disk_blobs.h"
+#include "coordinator/store/local_copies.h"
 #include "coordinator/store/s3_link.h"
 
 namespace ls::coordinator {
@@ -18,7 +19,7 @@ namespace ls::coordinator {
 class S3Blobs final : public BlobStore {
  public:
   // Asks the store for its list first: what is wrong with keys, bucket or address is told at the start.
-  static Result<std::unique_ptr<S3Blobs>> open(S3Options options, std::filesystem::path folder);
+  static Result<std::unique_ptr<S3Blobs>> open(const S3Options& options, std::filesystem::path folder);
 
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
@@ -35,16 +36,19 @@ class S3Blobs final : public BlobStore {
 
  private:
   class Passed;
-  S3Blobs(S3Options options, std::unique_ptr<DiskBlobs> local)
-      : link_(std::move(options)), local_(std::move(local)) {}
+  S3Blobs(const S3Options& options, std::unique_ptr<DiskBlobs> local)
+      : link_(options), local_(std::move(local)), copies_(options.address.copies_bytes) {}
   Result<void> send(const Digest& digest);         // from the folder to the store
   // The other way. Who asks while it is on its way waits for the same.
   Result<void> fetch(const Digest& digest) const;
   Result<void> fetch_now(const Digest& digest) const;
   void note(const Digest& digest) const;
+  // Used just now: others may have to go for it. What lies here and not there is no copy, and stays.
+  void note_copy(const Digest& digest) const;
 
   S3Link link_;
   std::unique_ptr<DiskBlobs> local_;
+  mutable LocalCopies copies_;
   mutable std::mutex mutex_;
   mutable std::set<Digest> there_;  // known to be in the store
   struct Flight {

@@ -1,8 +1,9 @@
-#include "coordinator/store/s3_link.h"
+#include "coordinator/store/s3_request.h"
 
 #include <curl/curl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -19,7 +20,6 @@ constexpr long kStallSeconds = 30;              // without a byte
 constexpr std::size_t kMaxText = 8u << 20;      // of an answer that is no object: a list, an error
 constexpr std::size_t kShownText = 300;         // of it in a message
 constexpr std::size_t kMaxListed = 10'000'000;  // keys
-constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -32,12 +32,25 @@ struct Cleanup {
 };
 using Headers = std::unique_ptr<curl_slist, FreeList>;
 
-std::size_t read_chunk(char* data, std::size_t size, std::size_t count, void* file) {
-  return std::fread(data, 1, size * count, static_cast<std::FILE*>(file));
-}
+// So many bytes of a file, from where it stands.
+struct Source {
+  std::FILE* file;
+  std::uint64_t left;
 
-// The text of the first element of this name; enough of XML for what S3 answers.
-std::string element(std::string_view xml, std::string_view name, std::size_t* at = nullptr) {
+  static std::size_t send(char* data, std::size_t size, std::size_t count, void* pointer) {
+    auto& self = *static_cast<Source*>(pointer);
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(size * count, self.left));
+    const std::size_t bytes = std::fread(data, 1, wanted, self.file);
+    self.left -= bytes;
+    return bytes;
+  }
+};
+
+bool may_pass(int status) { return status == 0 || status == 429 || status >= 500; }
+
+}  // namespace
+
+std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at) {
   const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
   const std::size_t begin = xml.find(open, at ? *at : 0);
   const std::size_t end = begin == std::string_view::npos ? begin : xml.find(close, begin);
@@ -47,7 +60,7 @@ std::string element(std::string_view xml, std::string_view name, std::size_t* at
              : std::string(xml.substr(begin + open.size(), end - begin - open.size()));
 }
 
-std::string escaped(std::string_view text) {
+std::string query_value(std::string_view text) {
   std::string out;
   for (const unsigned char c : text)
     out += std::isalnum(c) || c == '-' || c == '_' || c == '.' || c == '~'
@@ -55,27 +68,6 @@ std::string escaped(std::string_view text) {
                : fmt::format("%{:02X}", c);
   return out;
 }
-
-bool may_pass(int status) { return status == 0 || status == 429 || status >= 500; }
-
-}  // namespace
-
-struct S3Link::Request {
-  const char* method = "GET";
-  std::string key;    // empty: the bucket
-  std::string query;  // sorted and escaped, as it is signed
-  std::filesystem::path file = {};
-  std::uint64_t bytes = 0;
-  std::string payload = kNoBytes;  // digest
-  const Sink* sink = nullptr;
-  const std::function<Result<void>()>* restart = nullptr;
-};
-struct S3Link::Answer {
-  int status = 0;  // 0: none came
-  std::uint64_t length = 0;
-  std::string text;              // what did not go to a sink; without an answer why
-  std::optional<Error> refused;  // by the sink
-};
 
 namespace {
 struct Receiver {
@@ -99,6 +91,16 @@ struct Receiver {
     return bytes;
   }
 };
+
+std::size_t receive_header(char* data, std::size_t size, std::size_t count, void* etag) {
+  constexpr std::string_view kName = "etag:";
+  const std::string_view line(data, size * count);
+  if (line.size() > kName.size() && ::strncasecmp(line.data(), kName.data(), kName.size()) == 0) {
+    const std::size_t begin = line.find_first_not_of(" \t", kName.size()), end = line.find_last_not_of(" \t\r\n");
+    if (begin <= end && end != std::string_view::npos) *static_cast<std::string*>(etag) = line.substr(begin, end + 1 - begin);
+  }
+  return line.size();
+}
 }  // namespace
 
 S3Link::S3Link(S3Options options) : options_(std::move(options)) {
@@ -126,17 +128,25 @@ Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
   Receiver receiver{curl.get(), request.sink, &answer.text, &answer.refused};
   char problem[CURL_ERROR_SIZE] = "";
   std::unique_ptr<std::FILE, CloseFile> file;
+  Source source{nullptr, request.bytes};
   const std::string verb = request.method;
   if (verb == "HEAD") curl_easy_setopt(curl.get(), CURLOPT_NOBODY, 1L);
   if (verb == "DELETE") curl_easy_setopt(curl.get(), CURLOPT_CUSTOMREQUEST, "DELETE");
   if (verb == "PUT") {
     file.reset(std::fopen(request.file.c_str(), "rbe"));
-    if (!file) return fail(Errc::not_found, fmt::format("{} cannot be read", request.file.string()));
+    if (!file || ::fseeko(file.get(), static_cast<off_t>(request.offset), SEEK_SET) != 0)
+      return fail(Errc::not_found, fmt::format("{} cannot be read", request.file.string()));
+    source.file = file.get();
     add("Content-Type: application/octet-stream");
     curl_easy_setopt(curl.get(), CURLOPT_UPLOAD, 1L);
     curl_easy_setopt(curl.get(), CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(request.bytes));
-    curl_easy_setopt(curl.get(), CURLOPT_READFUNCTION, &read_chunk);
-    curl_easy_setopt(curl.get(), CURLOPT_READDATA, file.get());
+    curl_easy_setopt(curl.get(), CURLOPT_READFUNCTION, &Source::send);
+    curl_easy_setopt(curl.get(), CURLOPT_READDATA, &source);
+  }
+  if (verb == "POST") {
+    add("Content-Type: application/xml");
+    curl_easy_setopt(curl.get(), CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request.body.size()));
+    curl_easy_setopt(curl.get(), CURLOPT_POSTFIELDS, request.body.c_str());
   }
   const std::string url = url_of(request), login = options_.keys.id + ":" + options_.keys.secret;
   curl_easy_setopt(curl.get(), CURLOPT_URL, url.c_str());
@@ -150,6 +160,8 @@ Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
   curl_easy_setopt(curl.get(), CURLOPT_LOW_SPEED_TIME, kStallSeconds);
   curl_easy_setopt(curl.get(), CURLOPT_WRITEFUNCTION, &Receiver::receive);
   curl_easy_setopt(curl.get(), CURLOPT_WRITEDATA, &receiver);
+  curl_easy_setopt(curl.get(), CURLOPT_HEADERFUNCTION, &receive_header);
+  curl_easy_setopt(curl.get(), CURLOPT_HEADERDATA, &answer.etag);
   curl_easy_setopt(curl.get(), CURLOPT_ERRORBUFFER, problem);
   const CURLcode code = curl_easy_perform(curl.get());
   long status = 0;
@@ -183,7 +195,7 @@ Result<S3Link::Answer> S3Link::ask(const Request& request) const {
 Error S3Link::error_of(const Request& request, const Answer& answer) const {
   const std::string what = fmt::format("{} {}", request.method, url_of(request));
   if (answer.status == 0) return {Errc::unavailable, fmt::format("{}: no answer: {}", what, answer.text)};
-  const std::string code = element(answer.text, "Code"), text = element(answer.text, "Message");
+  const std::string code = xml_element(answer.text, "Code"), text = xml_element(answer.text, "Message");
   const std::string said = fmt::format("{}: status {} {} {}", what, answer.status, code,
                                        text.empty() ? answer.text.substr(0, kShownText) : text);
   if (answer.status == 404 && code == "NoSuchBucket")
@@ -217,10 +229,7 @@ Result<void> S3Link::get(const std::string& key, const std::function<Result<void
 
 Result<void> S3Link::put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                          const Digest& digest) const {
-  if (bytes > kMostBytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("a file of {} bytes does not go into {}: at most {} bytes in one object", bytes,
-                            shown(), kMostBytes));
+  if (bytes > options_.address.part_bytes) return put_parts(key, file, bytes);
   const Request request{.method = "PUT", .key = key, .file = file, .bytes = bytes, .payload = digest.hex()};
   const auto answer = ask(request);
   if (!answer) return tl::unexpected(answer.error());
@@ -241,17 +250,17 @@ Result<std::vector<std::string>> S3Link::list() const {
   std::vector<std::string> keys;
   for (std::string token; keys.size() < kMaxListed;) {
     Request request;
-    if (!token.empty()) request.query = "continuation-token=" + escaped(token) + "&";
-    request.query += "list-type=2&prefix=" + escaped(prefix);
+    if (!token.empty()) request.query = "continuation-token=" + query_value(token) + "&";
+    request.query += "list-type=2&prefix=" + query_value(prefix);
     const auto answer = ask(request);
     if (!answer) return tl::unexpected(answer.error());
     if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
     for (std::size_t at = 0;;) {
-      const std::string key = element(answer->text, "Key", &at);
+      const std::string key = xml_element(answer->text, "Key", &at);
       if (at == std::string::npos) break;
       if (key.starts_with(prefix)) keys.push_back(key.substr(prefix.size()));
     }
-    token = element(answer->text, "NextContinuationToken");
+    token = xml_element(answer->text, "NextContinuationToken");
     if (token.empty()) break;
   }
   return keys;

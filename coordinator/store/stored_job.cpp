@@ -1,18 +1,14 @@
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "coordinator/store/job_store.h"
+#include "coordinator/store/json_number.h"
 
 namespace ls::coordinator {
 namespace {
 
 using nlohmann::json;
-
-// JSON knows no infinity: it would be written as null, and the record could not be read again.
-double finite(double seconds) { return std::isfinite(seconds) ? seconds : 0; }
-double seconds_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
 
 json to_value(const JobTotals& t) {
   json time;
@@ -48,9 +44,9 @@ Health health_of(const json& totals) {
 
 JobTotals totals_of(const json& j) {
   JobTotals t;
-  t.render_seconds = seconds_of(j.at("render_seconds"));
-  t.core_seconds = seconds_of(j.at("core_seconds"));
-  t.load_seconds = seconds_of(j.at("load_seconds"));
+  t.render_seconds = number_of(j.at("render_seconds"));
+  t.core_seconds = number_of(j.at("core_seconds"));
+  t.load_seconds = number_of(j.at("load_seconds"));
   t.peak_rss_bytes = j.at("peak_rss_bytes");
   t.spp_done = j.at("spp_done");
   t.units = j.at("units");
@@ -58,7 +54,7 @@ JobTotals totals_of(const json& j) {
   t.health = health_of(j);
   const json time = j.value("time", json::object());  // not in records of earlier versions
   for (const TimePart& part : kTimeParts)
-    if (const auto found = time.find(part.name); found != time.end()) t.time.*part.seconds = seconds_of(*found);
+    if (const auto found = time.find(part.name); found != time.end()) t.time.*part.seconds = number_of(*found);
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
   t.doubt = j.value("doubt", std::string());

@@ -5,34 +5,11 @@
 
 #include <cmath>
 
-#include "tests/property/compare.h"
+#include "tests/property/metamorphic.h"
 #include "tests/property/moved.h"
-#include "tests/property/random_scene.h"
-#include "tests/property/structures.h"
-#include "tests/property/watch.h"
 
 namespace ls::test {
 namespace {
-
-constexpr std::uint64_t kRandom = 12;  // scenes beside the different ones
-
-// The different scenes and random ones that can be built, with a film of 12 x 12.
-std::vector<NamedScene> scenes() {
-  std::vector<NamedScene> all = different_scenes();
-  const auto [first, count] = scenes_to_try(kRandom);
-  for (std::uint64_t seed = first; seed < first + count; ++seed) {
-    const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
-    SceneKit kit;
-    kit.scene = s.scene;
-    kit.files = s.assets.files();
-    kit.scene.film.size = {12, 12};
-    kit.scene.film.crop_offset = {0, 0};
-    kit.scene.film.crop_size = {0, 0};
-    if (!render::build_world(kit.scene, settings_of(kit.scene), kit.files, 1)) continue;
-    all.push_back({fmt::format("random scene {}", seed), kit});
-  }
-  return all;
-}
 
 std::vector<float> pixels(const SceneKit& kit, std::uint64_t spp) {
   const FrameSize size = kit.scene.film.image_size();
@@ -43,26 +20,6 @@ SceneKit moved(const SceneKit& kit, const Move& m) {
   SceneKit out = kit;
   out.scene = moved(kit.scene, m);
   return out;
-}
-
-// All of the scenes against what `change` makes of them (nothing: not of this one), with one false-positive
-// rate over all.
-template <class Change>
-void expect_alike(const std::vector<NamedScene>& all, Change change, Looks looks = {}) {
-  const double level = level_of(3. * static_cast<double>(all.size()));
-  std::uint64_t compared = 0, undecided = 0, seed = 1000;
-  for (const NamedScene& s : all) {
-    seed += 10;
-    const std::optional<SceneKit> other = change(s.kit);
-    if (!other) continue;
-    ++compared;
-    const Comparison c = look(s.kit, *other, seed, level, looks);
-    undecided += c.verdict == Verdict::undecided;
-    EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
-  }
-  fmt::print("{} scenes compared, {} undecided\n", compared, undecided);
-  EXPECT_GE(compared, 2u);
-  EXPECT_LE(4 * undecided, compared + 4);
 }
 
 // ---- where, how large, which way round

@@ -4,6 +4,7 @@ algorithm, written here without a look at any client, and every payload against 
 import hashlib
 import hmac
 import http.server
+import re
 import threading
 import urllib.parse
 
@@ -54,6 +55,7 @@ def signature_problem(method, target, headers):
 
 class S3Server:
     PAGE = 2  # keys in one list, so that lists have pages
+    LEAST_PART = 5 << 20  # bytes of all parts but the last
 
     def __init__(self, bucket="farm"):
         self.bucket, self.objects = bucket, {}  # key -> bytes
@@ -61,6 +63,8 @@ class S3Server:
         self.refuse = []  # statuses for the next requests
         self.gate = None  # a threading.Event: objects are given when it is set
         self.cut = 0  # so many of the next objects are cut off in their middle
+        self.uploads = {}  # id -> (key, {number: part}), of those in parts that have not ended
+        self.forget_ends = 0  # so many ends of uploads in parts are done, and answered with an error
         self.lock = threading.Lock()
         owner = self
 
@@ -82,8 +86,8 @@ class S3Server:
     def endpoint(self):
         return f"http://127.0.0.1:{self.http.server_address[1]}"
 
-    def url(self, prefix="scenes", bucket=None):
-        return f"s3://{bucket or self.bucket}/{prefix}?endpoint={self.endpoint}"
+    def url(self, prefix="scenes", bucket=None, more=""):
+        return f"s3://{bucket or self.bucket}/{prefix}?endpoint={self.endpoint}{more}"
 
 
 class Request(http.server.BaseHTTPRequestHandler):
@@ -125,16 +129,48 @@ class Request(http.server.BaseHTTPRequestHandler):
         if signed != "UNSIGNED-PAYLOAD" and signed != hashlib.sha256(body).hexdigest():
             return self.refuse(400, "XAmzContentSHA256Mismatch")
         with state.lock:
-            return getattr(self, "s3_" + self.command.lower())(state, key, dict(urllib.parse.parse_qsl(query)), body)
+            return getattr(self, "s3_" + self.command.lower())(state, key, dict(urllib.parse.parse_qsl(query, keep_blank_values=True)), body)
 
-    do_GET = do_PUT = do_HEAD = do_DELETE = serve
+    do_GET = do_PUT = do_POST = do_HEAD = do_DELETE = serve
 
     def s3_put(self, state, key, query, body):
-        state.objects[key] = body
-        self.answer(200)
+        if "partNumber" not in query:
+            state.objects[key] = body
+            return self.answer(200)
+        if query["uploadId"] not in state.uploads:
+            return self.refuse(404, "NoSuchUpload")
+        state.uploads[query["uploadId"]][1][int(query["partNumber"])] = body
+        self.answer(200, ETag=self.etag(body))
+
+    @staticmethod
+    def etag(body):
+        return f'"{hashlib.md5(body).hexdigest()}"'
+
+    def s3_post(self, state, key, query, body):
+        if "uploads" in query:
+            upload = f"of/{key}+{len(state.requests)}="  # as no address could have it unescaped
+            state.uploads[upload] = (key, {})
+            return self.answer(200, f"<InitiateMultipartUploadResult><UploadId>{upload}</UploadId></InitiateMultipartUploadResult>".encode())
+        if query["uploadId"] not in state.uploads:
+            return self.refuse(404, "NoSuchUpload")
+        parts = state.uploads[query["uploadId"]][1]
+        named = re.findall(r"<PartNumber>(\d+)</PartNumber><ETag>([^<]+)</ETag>", body.decode())
+        if [(int(n), tag) for n, tag in named] != [(n, self.etag(part)) for n, part in sorted(parts.items())]:
+            return self.refuse(400, "InvalidPart")
+        if any(len(part) < state.LEAST_PART for n, part in parts.items() if n < len(parts)):
+            return self.refuse(400, "EntityTooSmall")
+        state.objects[key] = b"".join(part for _, part in sorted(parts.items()))
+        del state.uploads[query["uploadId"]]
+        if state.forget_ends:
+            state.forget_ends -= 1
+            return self.refuse(500, "InternalError")
+        self.answer(200, b"<CompleteMultipartUploadResult/>")
 
     def s3_delete(self, state, key, query, body):
-        state.objects.pop(key, None)
+        if "uploadId" in query:
+            state.uploads.pop(query["uploadId"], None)
+        else:
+            state.objects.pop(key, None)
         self.answer(204)
 
     def s3_head(self, state, key, query, body):

@@ -124,6 +124,65 @@ def test_an_object_that_breaks_off_comes_again_and_one_that_is_damaged_is_not_be
     assert s3_farm.pixels(job) == expected
 
 
+LARGE = 12 << 20  # three parts of 5, 5 and 2 MiB
+
+
+@pytest.fixture
+def farm_of_parts(s3, tmp_path):
+    with LocalFarm(tmp_path, flags=["--blobs", s3.url(more="&part-mib=5")]) as farm:
+        yield farm
+
+
+def of_large(s3, method):
+    return sum(m == method for m, key in s3.requests if key)
+
+
+def test_a_large_file_goes_in_parts_each_of_which_is_tried_again(s3, farm_of_parts):
+    data = os.urandom(LARGE)
+    s3.requests.clear()
+    s3.refuse = [None, None, 503]  # of HEAD, which asks whether it is there, of the beginning, and of the first part
+    digest = put(farm_of_parts, data)
+
+    assert s3.objects[f"scenes/{digest[:2]}/{digest}"] == data
+    assert (of_large(s3, "PUT"), of_large(s3, "POST"), s3.uploads) == (4, 2, {})
+
+    small = put(farm_of_parts, b"x" * (5 << 20))
+    assert f"scenes/{small[:2]}/{small}" in s3.objects
+    assert of_large(s3, "POST") == 2, "what fits into one part goes in one request"
+
+
+def test_an_end_whose_answer_was_lost_is_known_by_what_the_store_has(s3, farm_of_parts):
+    s3.forget_ends = 1
+    digest = put(farm_of_parts, os.urandom(LARGE))
+
+    assert not missing(farm_of_parts, digest)
+    assert of_large(s3, "POST") == 3
+
+
+def test_parts_of_a_file_that_could_not_be_sent_do_not_stay_in_the_store(s3, farm_of_parts):
+    data = os.urandom(LARGE)
+    s3.refuse = [None, None, None] + [503] * 6  # HEAD, the beginning, one part; then the second part, as often as it is tried
+    with pytest.raises(Exception, match="503.*SlowDown"):
+        put(farm_of_parts, data)
+
+    assert (s3.uploads, s3.objects) == ({}, {})
+    assert put(farm_of_parts, data)
+
+
+def test_so_many_copies_as_there_is_room_for_stay_on_this_machine(s3, tmp_path):
+    with LocalFarm(tmp_path, flags=["--blobs", s3.url(more="&copies-mib=1")]) as farm:
+        blobs = [os.urandom(400_000) for _ in range(4)]
+        digests = [put(farm, data) for data in blobs]
+        here = {path.name for path in (farm.data / "blobs").rglob("*") if len(path.name) == 64}
+        assert here == set(digests[2:]), "two of 400,000 bytes fit into a MiB"
+
+        token = (farm.data / "join-token").read_text().strip()
+        for data, digest in zip(blobs, digests):
+            status, got = farm_rpc.fetch_blob(farm_rpc.channel_of(farm.grpc), token, digest)
+            assert status == "OK" and got >= len(data)
+        assert sum(path.stat().st_size for path in (farm.data / "blobs").rglob("*") if path.is_file()) <= 1 << 20
+
+
 @pytest.mark.parametrize("change, said", [
     ({"AWS_SECRET_ACCESS_KEY": "wrong"}, "SignatureDoesNotMatch.*check AWS_ACCESS_KEY_ID"),
     ({"AWS_ACCESS_KEY_ID": ""}, "set AWS_ACCESS_KEY_ID"),

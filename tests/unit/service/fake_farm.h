@@ -44,6 +44,17 @@ class Mailbox {
     mail_.pop_front();
     return first;
   }
+  // Takes those that answer results, and leaves the leases: they may be of another job.
+  std::vector<ToWorker> acks() {
+    const std::lock_guard lock(mutex_);
+    std::vector<ToWorker> taken;
+    std::erase_if(mail_, [&](auto& mail) {
+      if (!std::holds_alternative<ResultAck>(mail.second)) return false;
+      taken.push_back(std::move(mail.second));
+      return true;
+    });
+    return taken;
+  }
   void wait_a_moment() {
     std::unique_lock lock(mutex_);
     arrived_.wait_for(lock, std::chrono::milliseconds(2));
@@ -124,7 +135,7 @@ class FakeFarm {
       return coordinator_.job(job)->state == JobState::done;
     });
     // A job can be done before the letters of its last units are read; a refusal may be among them.
-    while (!mail_->empty()) note_refusal(mail_->take()->second);
+    for (const ToWorker& letter : mail_->acks()) note_refusal(letter);
     return finished;
   }
   std::vector<std::unique_ptr<WorkerSession>>& sessions() { return sessions_; }

@@ -39,17 +39,6 @@ class Gate final : public Clock {
   TimePoint at_{std::chrono::hours(1)};
 };
 
-// Tiles of 32 x 32 pixels: 25 KB each as a message, and as much again decoded.
-const std::string kLargeScene = R"(<scene version="3.0.0">
-  <integrator type="volpath"/>
-  <sensor type="perspective">
-    <film type="hdrfilm"><integer name="width" value="1024"/><integer name="height" value="1024"/></film>
-    <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
-  </sensor>
-  <shape type="sphere"/>
-  <emitter type="constant"/>
-</scene>)";
-
 TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
   TempFolder dir;
   auto clock = std::make_shared<Gate>();
@@ -57,7 +46,10 @@ TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
   options.data = dir.path();
   options.clock = clock;
   auto coordinator = Coordinator::open(options).value();
-  const JobId job = coordinator->submit({"large.xml", kLargeScene, {}, {}}).value();
+  JobSpec large;  // tiles of 32 x 32 pixels: 25 KB each as a message, and as much again decoded
+  large.size = {1024, 1024};
+  large.spp = 2;
+  const JobId job = submit(*coordinator, large);
   struct Sink final : WorkerSink {
     void send(ToWorker message) override {
       const std::lock_guard lock(mutex);

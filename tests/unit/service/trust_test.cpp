@@ -27,6 +27,25 @@ JobSpec samples(std::uint64_t spp) {
   return spec;
 }
 
+// Until the third of four workers was found lying; its id.
+WorkerId bar_fake_2(Coordinator& coordinator) {
+  FakeFarm farm(coordinator, 4);
+  farm.lies = [](int worker, const UnitResult&) { return worker == 2; };
+  EXPECT_TRUE(farm.run([&] { return coordinator.audits().workers_barred > 0; }));
+  for (const WorkerView& worker : coordinator.workers())
+    if (worker.name == "fake-2") return worker.id;
+  ADD_FAILURE() << "fake-2 is not known";
+  return {};
+}
+
+Result<std::unique_ptr<WorkerSession>> come_back(Coordinator& coordinator, const WorkerId& as) {
+  WorkerHello hello;
+  hello.name = "fake-2";
+  hello.numeric_class = sha256("fake class");
+  hello.previous_id = as;
+  return coordinator.connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+}
+
 TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
   auto coordinator = open_audited({}, 1);
   const JobId job = submit(*coordinator, samples(64));
@@ -106,20 +125,12 @@ TEST(Trust, ABarredWorkerStaysBarredOverARestart) {
   WorkerId liar;
   {
     auto coordinator = open_audited(folder.path(), 1);
-    const JobId job = submit(*coordinator, samples(512));
-    FakeFarm farm(*coordinator, 4);
-    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
-    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
-    for (const WorkerView& worker : coordinator->workers())
-      if (worker.name == "fake-2") liar = worker.id;
+    submit(*coordinator, samples(512));
+    liar = bar_fake_2(*coordinator);
   }
 
   auto coordinator = open_audited(folder.path(), 1);
-  WorkerHello hello;
-  hello.name = "fake-2";
-  hello.numeric_class = sha256("fake class");
-  hello.previous_id = liar;
-  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+  const auto session = come_back(*coordinator, liar);
 
   ASSERT_TRUE(session);
   ASSERT_EQ(coordinator->workers().size(), 1u);
@@ -134,22 +145,14 @@ TEST(Trust, ABarredWorkerStaysBarredWhenTheJobThatItWasFoundByIsGone) {
   {
     auto coordinator = open_audited(folder.path(), 1);
     const JobId job = submit(*coordinator, samples(512));
-    FakeFarm farm(*coordinator, 4);
-    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
-    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
-    for (const WorkerView& worker : coordinator->workers())
-      if (worker.name == "fake-2") liar = worker.id;
+    liar = bar_fake_2(*coordinator);
     ASSERT_TRUE(coordinator->remove(job)) << "cancelled";
     ASSERT_TRUE(coordinator->remove(job)) << "gone";
   }
 
   auto coordinator = open_audited(folder.path(), 1);
   ASSERT_TRUE(coordinator->jobs().empty());
-  WorkerHello hello;
-  hello.name = "fake-2";
-  hello.numeric_class = sha256("fake class");
-  hello.previous_id = liar;
-  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+  const auto session = come_back(*coordinator, liar);
 
   ASSERT_TRUE(session);
   EXPECT_EQ(coordinator->workers()[0].id, liar);
