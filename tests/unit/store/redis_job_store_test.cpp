@@ -277,10 +277,8 @@ TEST_F(RedisStores, OneThatIsRefusedKeepsNoOtherFromBeingTold) {
   for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->put_job(sample_job(fmt::format("j-{:03}", i))));
 
   // Both at once: between two tries of the refused one, others may have been told without trouble.
-  ASSERT_TRUE(eventually([&] {
-    const auto status = store->status();
-    return status.behind == 1 && !status.trouble.empty();
-  }));
+  const auto only_it = [](const StoreStatus& s) { return s.behind == 1 && !s.trouble.empty(); };
+  ASSERT_TRUE(eventually([&] { return only_it(store->status()); }));
   EXPECT_TRUE(in_redis({"j-199"}));
 }
 
