@@ -26,6 +26,7 @@ void judge_equivalence(ValidateCase& c, double freedom, double unknown, double r
   const bool known = c.standard_error <= rounding;
   const double f = known ? std::max(freedom, least) : freedom;
   const double half = student_quantile(c.level, f) * c.standard_error + unknown;
+  const double reach = off + student_quantile(c.band_level, f) * c.standard_error + unknown;
   c.z = c.standard_error > 0 ? (c.got - c.expected) / c.standard_error : 0;
   c.p = c.standard_error > 0 ? student_tails(std::max(0., off - unknown) / c.standard_error, f)
         : off > unknown      ? 0.
@@ -39,9 +40,9 @@ void judge_equivalence(ValidateCase& c, double freedom, double unknown, double r
   } else if (!known && freedom < least) {
     c.too_wide = true;
     c.why = fmt::format("a few pixels rule the error: {:.3g} degrees of freedom", freedom);
-  } else if (!(off + half <= room)) {
+  } else if (!(reach <= room)) {
     c.too_wide = true;
-    c.why = fmt::format("the interval reaches {:.3g} from the answer, the band {:.3g}", off + half, room);
+    c.why = fmt::format("the interval reaches {:.3g} from the answer, the band {:.3g}", reach, room);
   }
 }
 

@@ -68,13 +68,14 @@ void deep(Table& t) {
           fmt::format("N17-white-slab-{:g}{}", tau, way.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(way, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // Of a million paths, few are so long that they matter; a small first run sees none of them.
-          {.band = tau < 100 ? .002 : .003, .slack = 1e-6, .slow = true, .least = tau < 100 ? 0u : 1u << 19});
+          // Few paths are so long that they matter: a small first run sees none of them, or thinks there were more,
+          // and few pixels have one.
+          {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
   }
   t.mean("N17-through-a-white-slab-64/homogeneous/volpath", "N17 7.2",
          "What a white slab of optical depth 64 lets through.", [] { return column({}, {.tau = 64}, true); },
-         grey(white_transmittance(64)), {.band = .05, .slack = 1e-4, .slow = true});
+         grey(white_transmittance(64)), {.band = .05, .slack = 1e-4, .slow = true, .paths = 1u << 18});
 }
 
 void roulette(Table& t) {

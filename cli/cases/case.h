@@ -54,8 +54,8 @@ struct MeanOptions {
   bool channels = false;
   // Left out of the quick table: long paths, or heavy tails.
   bool slow = false;
-  // Paths at least, where a first run of few may miss what matters.
-  std::uint64_t least = 0;
+  // Not 0: so many paths, where a first run of few misses what matters, or takes it for more than it is.
+  std::uint64_t paths = 0;
   // Not 0: so many whole frames, and the error is told by how their means differ. For frames in which a few
   // pixels vary so much more than all others that an error from one frame rests on these alone.
   std::uint64_t frames = 0;

@@ -5,10 +5,14 @@
 
 namespace ls::cases {
 
-// A right renderer fails any case of the whole table by chance with this probability at most, and a renderer
-// that is off by more than the band passes a case with no more: shared by all intervals of the table (Sidak),
-// whichever of them are run.
+// A right renderer fails any case of the whole table by chance with this probability at most: shared by all
+// intervals of the table (Sidak), whichever of them are run.
 inline constexpr double kWrongVerdicts = 1e-3;
+
+// A renderer that is off by more than the band in a case passes that case with this probability at most: two
+// one-sided tests (Schuirmann 1987). It is not shared among cases, since the table is passed only where each of
+// them is (an intersection-union test: Berger 1982); among a case's attempts it is.
+inline constexpr double kWrongPass = 1e-3;
 
 // A case whose interval came out too wide is run anew with more paths, so often at most; each is an interval
 // of the table's.

@@ -20,10 +20,12 @@ using cli::ValidateCase;
 
 // Of the first run, which finds how many paths the answer takes.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
-// So many standard errors are left between the interval and the band's end: in one run of fifteen chance
-// takes more, or the first run's variance was far off. Then the case is run again with this many times the
-// paths.
-constexpr double kSpare = 1.5, kAgain = 4;
+// So many standard errors are left between the interval and the band's end: in one run of seven chance takes
+// more, or the first run's variance was far off. Then the case is run again with as many paths as the better
+// figures ask for: so many times as many at least and at most.
+constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
+// Of two one-sided tests, as a two-sided level.
+constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
 // FNV-1a: a case keeps its numbers whatever stands beside it in the table.
 std::uint64_t seed_of(const std::string& id, std::uint64_t seed, std::uint64_t attempt) {
@@ -114,7 +116,7 @@ class Runner {
       const std::size_t c = channel(k);
       const double room = band() * std::abs(s.expected[c]) - unknown(s.expected[c]);
       if (!(room > 0)) return 0;  // no number of paths will do
-      const double ratio = s.error[c] * (kSpare + cli::student_quantile(level_, 1e3)) / room;
+      const double ratio = s.error[c] * (kSpare + cli::student_quantile(kBandLevel, 1e3)) / room;
       worst = std::max(worst, ratio * ratio);
     }
     return worst;
@@ -124,19 +126,21 @@ class Runner {
   void measured(Look look) {
     const std::string& id = case_->id;
     const double most = options_.quick ? kMostQuickPaths : kMostPaths;
-    auto s = look(kPilotPaths, seed_of(id, options_.seed, 0));
-    if (!s) return failed(s.error().message);
-    const double times = growth(*s);
-    double paths = std::clamp(static_cast<double>(s->paths) * times, double{kPilotPaths}, most);
-    paths = std::max(paths, static_cast<double>(case_->options.least));
+    double times = 1, paths = static_cast<double>(case_->options.paths);
+    if (paths == 0) {
+      const auto pilot = look(kPilotPaths, seed_of(id, options_.seed, 0));
+      if (!pilot) return failed(pilot.error().message);
+      times = growth(*pilot);
+      paths = std::clamp(static_cast<double>(pilot->paths) * times, double{kPilotPaths}, most);
+    }
     for (std::size_t attempt = 1;; ++attempt) {
-      s = look(static_cast<std::uint64_t>(paths), seed_of(id, options_.seed, attempt));
+      const auto s = look(static_cast<std::uint64_t>(paths), seed_of(id, options_.seed, attempt));
       if (!s) return failed(s.error().message);
       std::vector<ValidateCase> lines;
       bool wide = false;
       for (std::size_t k = 0; k < lines_of(*case_); ++k) lines.push_back(judged(*s, k, wide));
       if (wide && times > 0 && attempt < kAttempts && paths < most) {
-        paths = std::min(most, kAgain * paths);
+        paths = std::min(most, std::clamp(growth(*s), kAgain, kMostAgain) * paths);
         continue;
       }
       for (ValidateCase& line : lines) add(std::move(line));
@@ -156,6 +160,7 @@ class Runner {
     c.standard_error = s.error[k];
     c.band = band();
     c.level = level_;
+    c.band_level = kBandLevel;
     c.nonfinite = s.unhealthy;
     c.paths = s.paths;
     c.seconds = s.seconds / static_cast<double>(lines_of(*case_));

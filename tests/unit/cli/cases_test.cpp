@@ -17,7 +17,7 @@ cli::ValidateCase judged(double got, double error, double band, double freedom =
   c.got = got;
   c.standard_error = error;
   c.band = band;
-  c.level = .01;  // +- 2.58 standard errors
+  c.level = c.band_level = .01;  // +- 2.58 standard errors
   judge_equivalence(c, freedom, unknown, 1e-9, 40);
   return c;
 }
@@ -33,6 +33,26 @@ TEST(Equivalence, PassesOnlyIfTheIntervalLiesInTheBandAndCoversTheAnswer) {
   EXPECT_TRUE(judged(2.0001, 0, .003, 1000, .0002).passed());
   EXPECT_FALSE(judged(2.0003, 0, .003, 1000, .0002).passed());
   EXPECT_FALSE(judged(std::nan(""), 0, .003).passed());
+}
+
+TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
+  const auto judged_at = [](double off, double level, double band_level) {
+    cli::ValidateCase c;
+    c.expected = 1;
+    c.got = 1 + off;
+    c.standard_error = .001;
+    c.band = .004;
+    c.level = level;
+    c.band_level = band_level;
+    judge_equivalence(c, 1e6, 0, 1e-9, 40);
+    return c;
+  };
+  // 1e-6: +- 4.89 standard errors; .01: +- 2.58.
+  EXPECT_TRUE(judged_at(0, 1e-6, .01).passed());
+  EXPECT_TRUE(judged_at(0, .01, 1e-6).too_wide);
+  EXPECT_TRUE(judged_at(.0016, 1e-6, .01).too_wide);
+  EXPECT_FALSE(judged_at(.003, .01, .9).passed()) << "in the band, and misses the answer";
+  EXPECT_TRUE(judged_at(.003, 1e-6, .9).passed());
 }
 
 TEST(Equivalence, QuantilesAreThoseOfTheTables) {
