@@ -25,7 +25,7 @@ give_up() { printf '\n%s\n%d passed, %d failed, %d skipped\n' "$1" "$passed" "$(
 build() {  # preset, targets...
   local preset="$1"; shift
   cmake --preset "$preset" -DLIGHTSHAFT_TESTS=ON >"$logs/configure-$preset.log" 2>&1 || { tail -n 40 "$logs/configure-$preset.log"; give_up "the '$preset' build could not be configured"; }
-  cmake --build --preset "$preset" ${1:+--target "$@"} >"$logs/build-$preset.log" 2>&1 || { grep -nE 'error|FAILED' -A 12 "$logs/build-$preset.log" | head -n 80; give_up "the '$preset' build failed"; }
+  cmake --build --preset "$preset" ${1:+--target "$@"} >"$logs/build-$preset.log" 2>&1 || { grep -E '^FAILED|^ninja: |[ :]error: |Killed|No space' -A 12 "$logs/build-$preset.log" | head -n 80; give_up "the '$preset' build failed"; }
 }
 
 # Each GoogleTest case counts: the binaries' own summaries are added up. (--output-on-failure would print failing ones twice.)

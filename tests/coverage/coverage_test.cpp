@@ -65,10 +65,11 @@ TEST(Denominator, IsNotBiasedByTheNoiseItMeasures) {
     fmt::print("{}\n", denominator_line(row));
     const bool dark = row.picture.starts_with("black") || row.picture.starts_with("dark");
     const double least_noise = .004;
-    if (dark && row.relmse < .2)
+    if (dark && row.relmse < .2) {
       EXPECT_NEAR(row.ours.value, 1, .005 + 4 * row.ours.sigma) << row.picture;
-    else if (row.relmse < least_noise)
+    } else if (row.relmse < least_noise) {
       EXPECT_NEAR(row.ours.value, 1, .03 + 4 * row.ours.sigma) << row.picture;
+    }
   }
 }
 

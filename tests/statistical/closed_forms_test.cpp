@@ -27,7 +27,7 @@ const cases::Table& table() {
               .slack = c.slack,
               .complement = c.complement,
               .channels = true,
-              .least = c.spp * 256});
+              .paths = c.spp * 256});
     return t;
   }();
   return table;

@@ -22,7 +22,7 @@ Column column(bool transmitted) {
     kit.shape(RectangleShape{}, translate({x, 0, 1}) * rotate_y(90) * scale(3, .6, 1), mirror);
     kit.shape(RectangleShape{}, translate({0, x, 1}) * rotate_x(90) * scale(.6, 3, 1), mirror);
   }
-  kit.shape(RectangleShape{}, translate({0, 0, transmitted ? 3 : -1}) * scale(.6), black);
+  kit.shape(RectangleShape{}, translate({0, 0, transmitted ? 3. : -1.}) * scale(.6), black);
   kit.environment();
   kit.look({.1, .15, 2}, {.1, .15, 0}, 1e-3, {0, 1, 0});
   return c;
