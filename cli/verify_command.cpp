@@ -141,6 +141,7 @@ Result<Numbers> numbers_of(const Flags& flags) {
 int run(const Flags& flags) {
   std::atomic<bool> stop{false};  // outlives the thread that sets it
   Interrupt interrupt;
+  interrupt.on_signal([&] { stop = true; });
   const auto numbers = numbers_of(flags);
   if (!numbers) return say_error(numbers.error());
   const auto defines = parse_defines(flags.defines);
@@ -159,7 +160,6 @@ int run(const Flags& flags) {
   const auto limit = render::limit_threads(threads);
   const auto world = build_world_again(*scene, image->settings, threads);
   if (!world) return say_rejected(world.error());
-  interrupt.on_signal([&] { stop = true; });
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
   const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
   if (flags.json) print(to_json(verified, numbers->seed).dump(2));

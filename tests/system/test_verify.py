@@ -1,11 +1,14 @@
 """`lightshaft verify`: a finished image against its scene, tile by tile."""
 
 import json
+import os
 import signal
 import subprocess
+from pathlib import Path
 
 import pytest
 from cli_kit import PATIENCE, bin_dir, lightshaft, write_fog
+from local_farm import wait_until
 
 SPP = 70  # full rounds and a cut one
 
@@ -81,3 +84,27 @@ def test_tiles_that_an_interrupt_left_out_are_not_called_wrong(tmp_path):
     told = [line for line in [first, *rest.splitlines()] if line.startswith("tile ")]
     assert all("800 samples: as sealed" in line for line in told)  # those that were rendered, and no others
     assert f"{len(told)} of 6 tiles are as sealed, {6 - len(told)} were not rendered: stopped" in rest
+
+
+def test_an_interrupt_is_heard_before_there_is_anything_to_render(finished, tmp_path):
+    scene, _ = finished
+    image = tmp_path / "slow.exr"  # comes when we let it
+    os.mkfifo(image)
+    said = tmp_path / "said.txt"
+    with said.open("w") as out:
+        verify = subprocess.Popen([str(bin_dir() / "lightshaft"), "verify", image, "--scene", scene], stderr=out)
+    try:
+        wait_until(lambda: takes_signals_itself(verify.pid, signal.SIGINT), "verify to take its signals itself")
+        verify.send_signal(signal.SIGINT)
+        wait_until(lambda: "stopping; once more ends at once" in said.read_text(), "the first signal to be heard")
+        verify.send_signal(signal.SIGINT)
+        assert verify.wait(PATIENCE) == -signal.SIGINT
+    finally:
+        verify.kill()
+
+
+def takes_signals_itself(pid, sig):
+    """Its main thread blocks the signal, for another one to wait for."""
+    status = (Path("/proc") / str(pid) / "status").read_text()
+    blocked = next(line.split()[1] for line in status.splitlines() if line.startswith("SigBlk:"))
+    return bool(int(blocked, 16) >> (sig - 1) & 1)
