@@ -123,8 +123,8 @@ def bad_scene(fault, hang_after):
             farm.submit_storm()
             error = farm.wait_for_job(bad, states=("failed",))["error"]
             assert "--pixel 64,0" in error and "--sample" in error, f"no command to see it again: {error}"
-            workers = {w["id"] for w in farm.get("/api/v1/workers")["workers"]}
-            assert sum(w in error or w in farm.request("GET", f"/api/v1/jobs/{bad}/log").decode() for w in workers) == 3, error
+            workers = [w["name"] for w in farm.get("/api/v1/workers")["workers"]]
+            assert len(set(workers)) == 3 and all(f"on {w}: " in error for w in workers), error
             yield farm
             assert all(w.alive() for w in farm.workers)
     run.__name__ = f"beside a scene whose unit is a {fault}"
