@@ -97,7 +97,7 @@ void opaque(Table& t) {
     for (const double tau : {1e3, 1e5, 1e6}) {
       const bool coarse = tau == 1e6;
       if (tau == 1e5 && way.grid != way.distant) continue;
-      if (coarse && way.grid && way.distant) continue;  // as long as all others together
+      if (coarse && way.grid && way.distant) continue;  // half a minute; three ways are left
       t.mean(fmt::format("N03-semi-infinite-a.9-{:g}{}", tau, way.name()), "N3 7.1",
              "An all but endless medium of this depth reflects what Chandrasekhar's H gives.",
              [=] { return half_space(way, .9, tau, 1); }, grey(.414947),

@@ -111,7 +111,7 @@ SceneKit plate_above(const Way& way, Slab slab, bool transmitted) {
 void diffuse(Table& t) {
   for (const Row& row : kIsotropic) {
     for (const Way& way : two_ways()) {
-      if (way.grid && row.slab.tau > 1) continue;  // minutes, for what the slabs above show of grids
+      if (way.grid && row.slab.tau > 1) continue;  // long, for what the slabs above show of grids
       const double lit = row.t_diffuse / (1 - row.r_diffuse / 2),
                    back = row.r_diffuse / (1 - row.r_diffuse / 2);
       t.mean(named("diffuse", row.slab, "T", way), "7.2",
