@@ -56,7 +56,7 @@ built=$SECONDS
 stop_farm
 [ "$detach" = 1 ] || trap stop_farm EXIT
 
-python3 scenes/bath/make_bath.py "$home/bath" --setting "$setting"
+/usr/bin/python3 scenes/bath/make_bath.py "$home/bath" --setting "$setting"
 
 launch() {  # name, command...
   local name="$1"; shift
