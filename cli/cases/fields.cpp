@@ -1,10 +1,11 @@
-// Closed forms in space: atmospheres, mean paths through bodies, and the light of a lamp in an endless
-// medium.
+// Closed forms in space: atmospheres, mean paths through bodies, and the light of a ball or a lamp
+// in an endless medium.
 #include <fmt/format.h>
 
 #include <cmath>
 
 #include "cli/cases/case.h"
+#include "cli/cases/endless.h"
 #include "cli/cases/stages.h"
 
 namespace ls::cases {
@@ -76,42 +77,60 @@ void mean_paths(Table& t) {
   }
 }
 
-// Case, de Hoffmann, Placzek 1953: the fluence phi at r mean free paths from an isotropic lamp of 1 W in an
-// endless medium of albedo c. A camera that sees all directions shows phi / (4 pi), less the lamp itself,
-// which no camera sees: e^-r / (4 pi r^2) of phi. Towards the lamp radiance grows like the inverse of the
-// angle to it, whose square has no mean: at small albedos, where most light is scattered once, close to the
-// lamp, intervals are wide.
-void infinite_medium(Table& t) {
-  struct Row {
-    double c, phi[4];
-  };
-  constexpr double kRadii[] = {.25, 1, 2, 5};
-  constexpr Row kRows[] = {{.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
-                           {.5, {1.2648813, .058695138, .0079276237, 1.2913241e-4}},
-                           {.8, {1.5188779, .10741259, .022065806, 9.5217959e-4}},
-                           {.9, {1.6393113, .14328386, .037126399, .0029151251}},
-                           {.99, {1.8031446, .22019457, .084976895, .019841736}},
-                           {.999, {1.8404525, .24795726, .10858551, .036265014}}};
-  for (const Row& row : kRows) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      const double r = kRadii[i], c = row.c;
-      const double expected = (row.phi[i] - std::exp(-r) / (4 * kPi * r * r)) / (4 * kPi);
+// A medium of extinction 1 as good as endless, seen in all directions from (r, 0, 0): a black end far beyond
+// where light comes back from, e^(-2 kappa R) of it, kappa = .055 at albedo .999.
+SceneKit endless(double albedo, double r, MediumIndex* medium) {
+  SceneKit kit({64, 64});
+  *medium = kit.homogeneous(rgb(1), rgb(albedo));
+  kit.container(SphereShape{}, scale(albedo > .9 ? 150 : 40), kit.diffuse(0), *medium);
+  kit.scene.sensor.medium = *medium;
+  kit.scene.sensor.projection = Projection::spherical;
+  kit.scene.sensor.to_world = translate({r, 0, 0});
+  return kit;
+}
+
+// The fluence of a ball of 1 W and half the distance for its radius; what a camera of all directions shows is
+// that over 4 pi. A ball, because estimates of a point's light have no variance: towards the point radiance grows
+// like the inverse of the angle to it. At albedo .999 paths are a thousand segments long: a wider band.
+void endless_medium(Table& t) {
+  for (const double c : {.3, .5, .8, .9, .99, .999}) {
+    for (const double r : {.25, 1., 2., 5.}) {
+      const double radius = r / 2;
       t.mean(fmt::format("7.6e-fluence-c{:g}-r{:g}/homogeneous/volpath", c, r), "7.6e",
-             "The light of a lamp in an endless medium, over all directions, at this many mean free paths.",
+             "The light of a glowing ball in an endless medium, over all directions, at this many mean free paths.",
              [=] {
-               SceneKit kit({64, 64});
-               const MediumIndex m = kit.homogeneous(rgb(1), rgb(c));
-               // A black end far beyond where light comes back from: e^(-2 kappa R), kappa = .055 at c =
-               // .999.
-               kit.container(SphereShape{}, scale(c > .9 ? 150 : 40), kit.diffuse(0), m);
-               kit.scene.emitters.push_back(PointEmitter{{0, 0, 0}, rgb(1 / (4 * kPi))});
-               kit.scene.sensor.medium = m;
-               kit.scene.sensor.projection = Projection::spherical;
-               kit.scene.sensor.to_world = translate({r, 0, 0});
+               MediumIndex around;
+               SceneKit kit = endless(c, r, &around);
+               const MediumIndex inside = kit.homogeneous(rgb(1), rgb(c));
+               const double volume = 4 * kPi / 3 * radius * radius * radius;
+               std::get<HomogeneousMedium>(kit.scene.media[inside.value]).emission =
+                   rgb(1 / (4 * kPi * volume));
+               kit.container(SphereShape{}, scale(radius), kit.null(), inside).exterior = around;
                return kit;
              },
-             grey(expected), {.band = c < .8 ? .05 : .02, .slack = 1e-3, .slow = c != .9 || r != 1});
+             grey(endless_fluence(c, r, radius) / (4 * kPi)), {.band = c > .99 ? .05 : .02, .slow = c != .9 || r != 1});
     }
+  }
+}
+
+// A lamp itself, which no camera sees: less e^-r / (4 pi r^2) of its fluence. Its tails are heavy, the more the
+// lower the albedo, so that it is asked where they matter least.
+void endless_lamp(Table& t) {
+  struct Row {
+    double c, r;
+  };
+  for (const auto& [c, r] : {Row{.8, .25}, {.8, 1}, {.9, .25}, {.9, 1}}) {
+    const double expected =
+        (endless_fluence(c, r, 0) - std::exp(-r) / (4 * kPi * r * r)) / (4 * kPi);
+    t.mean(fmt::format("7.6e-lamp-c{:g}-r{:g}/homogeneous/volpath", c, r), "7.6e",
+           "The light of a lamp in an endless medium, over all directions, at this many mean free paths.",
+           [c = c, r = r] {
+             MediumIndex around;
+             SceneKit kit = endless(c, r, &around);
+             kit.scene.emitters.push_back(PointEmitter{{0, 0, 0}, rgb(1 / (4 * kPi))});
+             return kit;
+           },
+           grey(expected), {.band = .02, .slow = c != .9 || r != 1});
   }
 }
 
@@ -120,7 +139,8 @@ void infinite_medium(Table& t) {
 void add_fields(Table& t) {
   atmospheres(t);
   mean_paths(t);
-  infinite_medium(t);
+  endless_medium(t);
+  endless_lamp(t);
 }
 
 }  // namespace ls::cases

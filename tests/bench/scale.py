@@ -55,9 +55,10 @@ def drive(farm, workers, seconds=15, unit_ms=0, units=None, warm_up=None):
 
 
 def row(m):
-    ms = {key: [1000 * m[key][q] for q in ("p50", "p99")] for key in ("ack", "gap")}
+    ms = {key: [1000 * m[key][q] for q in ("p50", "p99")] for key in ("ack", "dispatch", "gap")}
     print(f"{m['workers']:6} workers  {m['rate']:7.0f} units/s  {1e6 * m['cpu_per_unit']:6.0f} us of CPU a unit  "
           f"durable {ms['ack'][0]:6.1f} / {ms['ack'][1]:6.1f} ms  "
+          f"dispatch {ms['dispatch'][0]:6.1f} / {ms['dispatch'][1]:6.1f} ms  "
           f"gap {ms['gap'][0]:5.1f} / {ms['gap'][1]:6.1f} ms  {m['resident'] / 2**20:6.0f} MiB  load {os.getloadavg()[0]:.1f}", flush=True)
 
 

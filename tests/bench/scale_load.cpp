@@ -1,8 +1,9 @@
 // Many workers in one process, to load a coordinator: each has its own connection and stream, takes leases, and after
 // the time that a unit shall take hands in a partial of the right form with plain pixels.
 //   scale_load --coordinator HOST:PORT --workers N --seconds S [--unit-ms D] [--units U]   (LIGHTSHAFT_JOIN_TOKEN)
-// Prints JSON: units handed in and acknowledged, how long it took until they were durable and
-// acknowledged, and how long workers stood without a unit. docs/scale.md is made with it by tests/bench/scale.py.
+// Prints JSON: units handed in and acknowledged, how long it took until they were durable and acknowledged (ack),
+// from the result that made room until another lease came (dispatch), and how long workers stood without a unit (gap).
+// docs/scale.md is made with it by tests/bench/scale.py.
 #include <fmt/format.h>
 #include <sys/resource.h>
 
@@ -38,7 +39,7 @@ struct Work {
 struct Measured {
   std::mutex mutex;
   std::uint64_t sent = 0, acknowledged = 0, refused = 0, welcomed = 0, lost = 0;
-  std::vector<float> ack, gap;  // seconds
+  std::vector<float> ack, dispatch, gap;  // seconds
 };
 
 class Load;
@@ -55,6 +56,7 @@ class Worker final : public worker::LinkObserver {
 
  private:
   void begin_locked(Instant now);
+  void replaced_locked(Instant now);
 
   Load& load_;
   std::unique_ptr<worker::CoordinatorLink> link_;
@@ -64,6 +66,7 @@ class Worker final : public worker::LinkObserver {
   std::optional<Work> in_hand_;
   std::map<UnitKey, Instant> unacknowledged_;
   std::optional<Instant> idle_since_;  // without a unit
+  std::optional<Instant> room_since_;  // the last result, if no lease came after it
 };
 
 class Load {
@@ -72,6 +75,7 @@ class Load {
 
   Measured measured;
 
+  double unit_seconds() const { return unit_; }
   void due_in_a_unit(Worker& worker, Instant now) {
     const std::lock_guard lock(mutex_);
     // Workers do not beat in time: the first turn of each is of another length.
@@ -135,6 +139,15 @@ void Worker::begin_locked(Instant now) {
   load_.due_in_a_unit(*this, now);
 }
 
+// A lease came: for the last result, since results make room, though not each (a worker holds some seconds of work).
+// Units take far longer than this, so that the last result is the one. The first leases are for none.
+void Worker::replaced_locked(Instant now) {
+  if (!room_since_) return;
+  const std::lock_guard measuring(load_.measured.mutex);
+  load_.measured.dispatch.push_back(static_cast<float>(seconds_between(*room_since_, now)));
+  room_since_.reset();
+}
+
 void Worker::received(ToWorker message) {
   const Instant now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
@@ -149,6 +162,7 @@ void Worker::received(ToWorker message) {
                         [&](const AssignLease& m) {
                           if (m.brief) briefs_[m.lease.job] = *m.brief;
                           for (const LeaseUnit& unit : m.lease.units) queue_.push_back({m.lease.job, m.lease.id, unit});
+                          replaced_locked(now);
                           begin_locked(now);
                         },
                         [&](const ResultAck& m) {
@@ -191,9 +205,10 @@ void Worker::finish() {
   result.lease = work.lease;
   result.exr = encode_partial(partial, brief.settings.size).value();
   result.digest = unit_digest(partial);
-  result.cpu_seconds = 1e-3;
+  result.cpu_seconds = std::max(1e-3, load_.unit_seconds());  // leases are made by it
   const Instant now = std::chrono::steady_clock::now();
   unacknowledged_[result.unit] = now;
+  room_since_ = now;
   begin_locked(now);
   lock.unlock();
   {
@@ -218,8 +233,8 @@ void print(Measured& m, double seconds, double cpu) {
   };
   fmt::print(
       "{{\"seconds\":{:.3f},\"sent\":{},\"acknowledged\":{},\"refused\":{},\"lost\":{},\"cpu_seconds\":{:.3f},"
-      "\"ack\":{},\"gap\":{}}}\n",
-      seconds, m.sent, m.acknowledged, m.refused, m.lost, cpu, figures(m.ack), figures(m.gap));
+      "\"ack\":{},\"dispatch\":{},\"gap\":{}}}\n",
+      seconds, m.sent, m.acknowledged, m.refused, m.lost, cpu, figures(m.ack), figures(m.dispatch), figures(m.gap));
 }
 
 double cpu_seconds() {
@@ -262,7 +277,7 @@ int run(const Flags& flags) {
     const std::lock_guard lock(load.measured.mutex);
     if (load.measured.welcomed < static_cast<std::uint64_t>(flags.workers))
       fmt::print(stderr, "only {} of {} workers are welcome so far\n", load.measured.welcomed, flags.workers);
-    load.measured.ack.clear(), load.measured.gap.clear();
+    load.measured.ack.clear(), load.measured.dispatch.clear(), load.measured.gap.clear();
     load.measured.acknowledged = 0;
   }
   const double cpu = cpu_seconds();

@@ -1,9 +1,12 @@
 // How the table's cases are judged: a renderer that is off by the band fails, and so do too few samples.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
+#include "cli/cases/endless.h"
 #include "cli/cases/run.h"
 #include "cli/cases/ways.h"
 #include "cli/validate_stats.h"
@@ -118,6 +121,35 @@ TEST(Cases, HaveIdsAndRowsOfTheirOwn) {
     EXPECT_TRUE(ids.insert(c.id).second) << c.id << " is there twice";
     EXPECT_FALSE(c.rows.empty() || c.about.empty()) << c.id;
   }
+}
+
+// Eight digits of the fluence of a point, by quadrature of its Fourier transform: a way of its own.
+TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
+  constexpr double kRadii[] = {.25, 1, 2, 5};
+  const std::map<double, std::array<double, 4>> known = {{.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
+                                                         {.5, {1.2648813, .058695138, .0079276237, 1.2913241e-4}},
+                                                         {.8, {1.5188779, .10741259, .022065806, 9.5217959e-4}},
+                                                         {.9, {1.6393113, .14328386, .037126399, .0029151251}},
+                                                         {.99, {1.8031446, .22019457, .084976895, .019841736}},
+                                                         {.999, {1.8404525, .24795726, .10858551, .036265014}}};
+  for (const auto& [c, phi] : known)
+    for (std::size_t i = 0; i < 4; ++i)  // digits given: half of the last of eight is 5e-8 at most
+      EXPECT_NEAR(endless_fluence(c, kRadii[i], 0), phi[i], 6e-8 * phi[i]) << c << ' ' << kRadii[i];
+}
+
+// Over a ball: the mean of points' fluence, here along the ball's shells (midpoints; the angle in closed form would be
+// what is tested). 40 x 40 midpoints of a function that curves by about 1 per unit of each: off by h^2 = 6e-4 of it.
+TEST(EndlessMedium, FluenceOfABallIsTheMeanOfItsPoints) {
+  constexpr double kRadius = .5, kDistance = 1, kAlbedo = .8;
+  constexpr int kSteps = 40;
+  double sum = 0, weight = 0;
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      const double a = kRadius * (i + .5) / kSteps, mu = -1 + 2 * (j + .5) / kSteps;
+      const double s = std::sqrt(kDistance * kDistance + a * a - 2 * a * kDistance * mu);
+      sum += a * a * endless_fluence(kAlbedo, s, 0), weight += a * a;
+    }
+  EXPECT_NEAR(endless_fluence(kAlbedo, kDistance, kRadius), sum / weight, 1e-3 * sum / weight);
 }
 
 }  // namespace
