@@ -108,6 +108,9 @@ def check_confinement():
     so([b["HostIp"] for b in bindings["8080/tcp"]] == ["127.0.0.1"], "the dashboard is published on localhost only")
     so(not bindings.get("50051/tcp"), "the workers' port is not published")
     worker = containers("worker")[0]
+    host = json.loads(docker("inspect", worker))[0]["HostConfig"]
+    so(0 < host["Memory"] == host["MemorySwap"] and host["PidsLimit"] > 0 and host["OomScoreAdj"] > 0,
+       f"a worker has at most {host['Memory'] >> 20} MiB and {host['PidsLimit']} processes and threads, and is the first to go")
     reach = "exec 3<>/dev/tcp/{}"
     so(docker("exec", worker, "timeout", "3", "bash", "-c", reach.format("coordinator/50051"), check=False).returncode == 0,
        "a worker reaches the coordinator")

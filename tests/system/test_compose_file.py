@@ -45,3 +45,14 @@ def test_every_volume_network_and_target_is_there():
         assert {v.split(":")[0] for v in service["volumes"]} <= set(COMPOSE["volumes"])
         assert set(service.get("networks", [])) <= set(COMPOSE["networks"])
         assert service.get("build", {}).get("target", "redis") in targets
+
+
+def test_a_hungry_worker_ends_neither_redis_nor_the_coordinator():
+    worker = SERVICES["worker"]
+    variable = re.fullmatch(r"\$\{(\w+):-(\d+)g\}", worker["mem_limit"])
+
+    assert variable and int(variable[2]) >= 2 and variable[1] in (ROOT / "docs" / "operations.md").read_text()
+    assert worker["memswap_limit"] == worker["mem_limit"], "no swap besides"
+    assert worker["oom_score_adj"] > max(SERVICES[name].get("oom_score_adj", 0) for name in ("redis", "coordinator"))
+    # Docker's client of docker-compose 1.29 takes an int only, and a variable's value is text.
+    assert isinstance(worker["pids_limit"], int) and worker["pids_limit"] > 256, "as many threads as a worker may have, and more"
