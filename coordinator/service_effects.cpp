@@ -48,7 +48,7 @@ void Service::carry_out(const Effect& effect, Todo& todo) {
 void Service::on(const UnitsFreed& e, Todo&) {
   const auto entry = find_locked(e.job);
   if (!entry) return;
-  figures_.units_freed[e.why] += e.units.size();
+  figures_.units_freed[e.cause] += e.units.size();
   for (const UnitKey& unit : e.units) {
     const auto held = entry->leased.find({unit.tile, unit.round});
     if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())

@@ -10,6 +10,7 @@
 #include "common/base/digest.h"
 #include "common/base/id.h"
 #include "common/protocol/messages.h"
+#include "coordinator/domain/freed_cause.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
@@ -20,14 +21,14 @@ struct Send {
   ToWorker message;
 };
 
-// These units are no longer lent under this lease and wait for another worker (unless another lease holds
-// them too).
+// These units are no longer lent under this lease. Those that are still wanted wait for another worker (unless
+// another lease holds them too).
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
   WorkerId worker;
   std::vector<UnitKey> units;
-  std::string why;  // "worker lost", "deadline passed", "returned", "failed", "cancelled"
+  FreedCause cause = FreedCause::worker_lost;
 };
 
 // This result is the unit's accepted one: record it (unit, worker, digest).

@@ -112,7 +112,7 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
     const LeaseRecord& lease = *leases.find(seq);
     const bool concerned = std::any_of(lease.units.begin(), lease.units.end(),
                                        [&](UnitCode unit) { return round_of(unit) >= last; });
-    if (concerned) free_lease(seq, "round is rendered again in full", true);
+    if (concerned) free_lease(seq, FreedCause::round_reopened, true);
   }
   close_audits(job, [&](UnitCode code, const Audit&) { return round_of(code) >= last; });
   for (TileIndex t = 0; t < job.units.tiles(); ++t) job.queue.rewind(t, last);

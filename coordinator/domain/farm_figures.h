@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <map>
-#include <string>
+
+#include "coordinator/domain/freed_cause.h"
 
 namespace ls::coordinator {
 
@@ -12,9 +13,7 @@ struct FarmFigures {
   // ---- leases ----
   std::uint64_t leases_granted = 0, units_lent = 0;
   std::uint64_t leases_now = 0, units_lent_now = 0;  // as it is now
-  // Units that a worker had and that went back to wait for another, by cause: "worker lost", "deadline
-  // passed", "returned", "failed", "cancelled" (UnitsFreed::why).
-  std::map<std::string, std::uint64_t> units_freed;
+  std::map<FreedCause, std::uint64_t> units_freed;  // that a worker had and did not hand in
   // ---- results ----
   std::uint64_t accepted = 0;
   std::uint64_t equal = 0;       // second results of a unit, with the bits of the first

@@ -103,7 +103,7 @@ void Farm::State::on(const JobPaused& event) {
   // What is in hand is finished; the rest comes back at once. The last first: a lease waits behind earlier ones.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
-    if (untouched(*leases.find(*seq))) free_lease(*seq, "paused", true);
+    if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
   refresh(*job);
 }
 
@@ -178,7 +178,7 @@ void Farm::State::end(Job& job) {
   std::set<WorkerIndex> told;
   for (const LeaseSeq seq : leases_of(job)) {
     Worker& worker = *leases.find(seq)->worker;
-    free_lease(seq, "job ended", false);
+    free_lease(seq, FreedCause::job_ended, false);
     if (!worker.connected || !told.insert(worker.index).second) continue;
     effects.emplace_back(Send{worker.id, CancelJob{job.plan.brief.job}});
     worker.briefed.erase(job.seq);

@@ -147,7 +147,7 @@ void Farm::State::settle_unit(Job& job, UnitCode code, const Worker* by) {
   }
 }
 
-void Farm::State::free_lease(LeaseSeq seq, std::string_view why, bool tell_worker) {
+void Farm::State::free_lease(LeaseSeq seq, FreedCause why, bool tell_worker) {
   if (LeaseRecord* lease = leases.find(seq))
     free_units(*lease, why, tell_worker, [](UnitCode) { return true; });
 }

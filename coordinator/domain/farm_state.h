@@ -73,7 +73,7 @@ struct Farm::State {
   void on(const ResultsWait& event);
   void on(const LeaseCameBack& event);
   void on(const Tick& event);
-  void lose(Worker& worker, std::string_view why);
+  void lose(Worker& worker, FreedCause why);
   void touch(Worker& worker);
   void grown(Worker& worker);  // it has finished something
   void expire_leases();
@@ -120,7 +120,7 @@ struct Farm::State {
   void stop_at_level(Job& job);
   // Shortly before its time is up: the rounds that each tile ends with, from what units have cost so far.
   void plan_end(Job& job, TimePoint limit);
-  void give_back_beyond(Job& job, std::string_view why);  // units leased beyond the tiles' ends
+  void give_back_beyond(Job& job);                        // units leased beyond the tiles' ends
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);  // under which it holds it
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
@@ -140,8 +140,8 @@ struct Farm::State {
   void settle_unit(Job& job, UnitCode code, const Worker* by);
   // Units of the lease (those for which `which` is true) wait again; an empty lease ends.
   template <class Which>
-  void free_units(LeaseRecord& lease, std::string_view why, bool tell_worker, Which&& which);
-  void free_lease(LeaseSeq seq, std::string_view why, bool tell_worker);
+  void free_units(LeaseRecord& lease, FreedCause why, bool tell_worker, Which&& which);
+  void free_lease(LeaseSeq seq, FreedCause why, bool tell_worker);
   void close(LeaseRecord& lease, bool tell_worker);
   std::vector<LeaseSeq> leases_of(const Job& job) const;
   void renew(LeaseRecord& lease);
@@ -167,9 +167,9 @@ struct Farm::State {
 };
 
 template <class Which>
-void Farm::State::free_units(LeaseRecord& lease, std::string_view why, bool tell_worker, Which&& which) {
+void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool tell_worker, Which&& which) {
   Job& job = *lease.job;
-  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, std::string(why)};
+  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why};
   for (const UnitCode code : lease.units) {
     if (!has(lease, code) || !which(code)) continue;
     if (!lease.audit) freed.units.push_back(job.key(code));

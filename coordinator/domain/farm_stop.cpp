@@ -63,7 +63,7 @@ void Farm::State::stop_at_level(Job& job) {
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
-  give_back_beyond(job, "beyond the last round");
+  give_back_beyond(job);
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
 }
 
@@ -101,9 +101,10 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
   refresh(job);
 }
 
-void Farm::State::give_back_beyond(Job& job, std::string_view why) {
+void Farm::State::give_back_beyond(Job& job) {
   for (const LeaseSeq seq : leases_of(job))
-    free_units(*leases.find(seq), why, true, [&](UnitCode code) { return !job.queue.plans(code); });
+    free_units(*leases.find(seq), FreedCause::not_wanted, true,
+               [&](UnitCode code) { return !job.queue.plans(code); });
   close_audits(job, [&](UnitCode code, const Audit&) { return !job.queue.plans(code); });
 }
 

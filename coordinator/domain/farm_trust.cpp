@@ -86,7 +86,7 @@ void Farm::State::close_audits(Job& job, const std::function<bool(UnitCode, cons
     if (which(code, audit)) closed.push_back(code);
   if (!closed.empty()) audits_changed.insert(job.plan.brief.job);
   for (const UnitCode code : closed) {
-    free_lease(job.audits.at(code).lease, "no longer asked for", true);
+    free_lease(job.audits.at(code).lease, FreedCause::not_wanted, true);
     job.audits.erase(code);
     ++audited.dropped;
   }
@@ -113,7 +113,7 @@ void Farm::State::settle_audits(Job& job) {
 }
 
 void Farm::State::audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease) {
-  free_lease(lease.seq, "failed", false);
+  free_lease(lease.seq, FreedCause::failed, false);
   job.audits.at(code).tried.push_back(worker.index);
   settle_audits(job);
 }
@@ -169,7 +169,7 @@ void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool
   for (const auto& before : {audit.second, audit.claim})
     if (before && by == before->first) return distrust(with.unit, by, contradiction(with, before->second));
   if (!asked) return;
-  free_lease(audit.lease, "decided", true);
+  free_lease(audit.lease, FreedCause::not_wanted, true);
   job.audits.erase(code);
   audits_changed.insert(job.plan.brief.job);
   if (!audit.second) ++audited.equal;
@@ -253,7 +253,7 @@ void Farm::State::distrust(const UnitKey& unit, WorkerIndex liar, std::string ev
 void Farm::State::bar(const WorkerId& id, const std::string& why) {
   if (Worker* worker = workers.find(id)) {
     workers.bar(*worker);
-    while (!worker->leases.empty()) free_lease(*worker->leases.begin(), "the worker renders wrong pixels", true);
+    while (!worker->leases.empty()) free_lease(*worker->leases.begin(), FreedCause::worker_barred, true);
     workers.settle(*worker);
     effects.emplace_back(WorkerStateChanged{id, worker->state(), "barred: " + why});
   }

@@ -112,7 +112,7 @@ void Farm::State::on(const UnitFailed& event) {
   LeaseRecord* lease = lease_of(*job, code, *worker);
   if (lease == nullptr) return;
   if (lease->audit) return audit_failed(*job, code, *worker, *lease);
-  free_units(*lease, "failed", false, [&](UnitCode unit) { return unit == code; });
+  free_units(*lease, FreedCause::failed, false, [&](UnitCode unit) { return unit == code; });
   count_failure(*job, code, *worker, event.failure);
 }
 

@@ -18,7 +18,7 @@ void Farm::State::on(const WorkerJoined& event) {
   Worker& worker = workers.get(event.worker);
   if (worker.connected) {
     if (event.epoch <= worker.epoch) return;  // an older stream's greeting, overtaken
-    lose(worker, "replaced by a newer stream");
+    lose(worker, FreedCause::newer_stream);
   }
   worker.epoch = event.epoch;
   worker.name = event.name.empty() ? event.worker.value : event.name;
@@ -55,15 +55,15 @@ void Farm::State::on(const WorkerBarred& event) {
 void Farm::State::on(const WorkerLost& event) {
   Worker* worker = workers.find(event.worker);
   if (worker == nullptr || !worker->connected || worker->epoch != event.epoch) return;
-  lose(*worker, "worker lost");
+  lose(*worker, FreedCause::worker_lost);
 }
 
-void Farm::State::lose(Worker& worker, std::string_view why) {
+void Farm::State::lose(Worker& worker, FreedCause why) {
   workers.connected(worker, false);
   worker.lost_at = now;
   while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
   workers.settle(worker);
-  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(why)});
+  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
   work_appeared = true;  // units kept from others because this worker could take them
 }
 
@@ -116,7 +116,7 @@ void Farm::State::on(const LeaseCameBack& event) {
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
   work_appeared = true;  // also what others left to this worker
-  free_units(*lease, "returned", false, [&](UnitCode code) { return back.contains(code); });
+  free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
 }
 
 void Farm::State::on(const Tick&) {
@@ -146,7 +146,7 @@ void Farm::State::expire_leases() {
     worker.pause = now - worker.grown_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
     // The worker is not told: if it wakes up and finishes before the others, its results are welcome.
-    free_lease(lease->seq, "deadline passed", false);
+    free_lease(lease->seq, FreedCause::deadline_passed, false);
   }
 }
 

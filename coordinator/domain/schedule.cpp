@@ -67,7 +67,7 @@ bool Farm::State::take_back_for_idle() {
     const Worker& idle = workers.at(index);
     if (!idle.available() || idle.covered()) continue;
     if (LeaseRecord* lease = longest_waiting_for(idle)) {
-      free_lease(lease->seq, "moved to an idle worker", true);
+      free_lease(lease->seq, FreedCause::moved, true);
       return true;
     }
   }

@@ -81,14 +81,13 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
   single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_lent);
   head(out, "lightshaft_units_freed_total", "counter",
-       "Units that a worker had and that went back to wait for another, by cause.");
+       "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
   // All causes, so that a rate is known from the first one on.
-  auto freed = f.units_freed;
-  for (const char* cause : {"worker lost", "deadline passed", "returned", "failed", "cancelled"})
-    freed[cause];
-  for (const auto& [cause, count] : freed)
-    fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", cause,
-                   count);
+  for (const auto& [cause, word] : coordinator::kFreedCauses) {
+    const auto count = f.units_freed.find(cause);
+    fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,
+                   count == f.units_freed.end() ? 0 : count->second);
+  }
 }
 
 void write_results(std::string& out, const coordinator::FarmFigures& f) {

@@ -77,6 +77,18 @@ def test_metrics_count_retries_by_their_cause(farm):
     farm.wait_for_job(job)
 
 
+def test_units_of_a_cancelled_job_are_counted_under_a_cause_that_is_documented(farm):
+    farm.add_worker("--fake-delay", 50)
+    job = farm.submit(SCENE, **SPEC)
+    farm.wait_for_progress(job, 2)
+    farm.request("PATCH", f"/api/v1/jobs/{job}", b'{"state": "cancelled"}')
+
+    freed = {cause: count for name, count in metrics(farm).items() for cause in re.findall(r'units_freed_total\{cause="(.*)"', name)}
+    (row,) = [line for line in (ROOT / "docs" / "operations.md").read_text().splitlines() if line.startswith("| `lightshaft_units_freed_total{cause}`")]
+    assert freed["job ended"] > 0
+    assert set(re.findall(r"`([a-z ]+)`", row.split("|")[2])) == set(freed), "documented are those that there are"
+
+
 # ---- logs ----
 
 def test_logs_are_lines_of_json_with_the_keys_of_job_and_worker(tmp_path):

@@ -87,7 +87,7 @@ TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
     clock->advance(std::chrono::seconds(5));
     coordinator->tick();
   }
-  EXPECT_EQ(coordinator->figures().units_freed["deadline passed"], 0u);
+  EXPECT_EQ(coordinator->figures().units_freed[FreedCause::deadline_passed], 0u);
 
   clock->shut(false);
   const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
