@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Writes all that a coordinator keeps in its --data folder to one archive, while it works or not. Its secrets are in it: the
-# archive is readable by its owner only. What the farm accepts while this runs may be missing in the archive: after a restore it
-# is rendered again, to the same bits.
-#   deploy/backup.sh DATA OUT.tar.gz          needs python3 (for SQLite's online backup)
+# Writes all that a coordinator keeps in its --data folder, and in its --secrets folder where it has one, to one archive, while it
+# works or not. Its secrets are in it: the archive is readable by its owner only. What the farm accepts while this runs may be
+# missing in the archive: after a restore it is rendered again, to the same bits.
+#   deploy/backup.sh DATA OUT.tar.gz [SECRETS]          needs python3 (for SQLite's online backup)
 set -euo pipefail
-[ $# = 2 ] || { echo "usage: deploy/backup.sh DATA OUT.tar.gz" >&2; exit 2; }
-data="$1" out="$2"
+[ $# = 2 ] || [ $# = 3 ] || { echo "usage: deploy/backup.sh DATA OUT.tar.gz [SECRETS]" >&2; exit 2; }
+data="$1" out="$2" secrets="${3:-}"
 [ -e "$data/jobs.sqlite" ] || { echo "error: $data is no coordinator's folder: it has no jobs.sqlite" >&2; exit 1; }
 
 umask 077
@@ -30,10 +30,17 @@ source.backup(target)
 target.close()
 END
 kept=()
-for name in blobs webhooks token tokens join-token webhook-secret tls; do
+for name in blobs webhooks node-id token tokens join-token webhook-secret tls; do
   if [ -e "$data/$name" ]; then kept+=("$name"); fi
 done
+if [ -n "$secrets" ]; then
+  mkdir "$stage/secrets"
+  for name in token tokens join-token tls; do
+    if [ -e "$secrets/$name" ]; then cp -a "$secrets/$name" "$stage/secrets/"; fi
+  done
+  [ -e "$stage/secrets/token" ] || { echo "error: $secrets is no folder of secrets: it has no token" >&2; exit 1; }
+fi
 # Status 1: something changed while it was read, such as an upload in progress, which nobody needs.
-tar -czf "$out.new" --exclude '*.tmp' -C "$stage" jobs jobs.sqlite -C "$(realpath "$data")" "${kept[@]}" 2>/dev/null || [ $? = 1 ]
+tar -czf "$out.new" --exclude '*.tmp' -C "$stage" jobs jobs.sqlite ${secrets:+secrets} -C "$(realpath "$data")" "${kept[@]}" 2>/dev/null || [ $? = 1 ]
 mv "$out.new" "$out"
 echo "$out: $(du -h "$out" | cut -f 1), $(find "$stage/jobs" -mindepth 1 -maxdepth 1 | wc -l) jobs"

@@ -1,11 +1,25 @@
 #!/usr/bin/env bash
-# Makes a coordinator's --data folder of an archive of deploy/backup.sh. The folder must be new or empty. Run it as the user that
-# the coordinator runs as.
-#   deploy/restore.sh BACKUP.tar.gz DATA
+# Makes a coordinator's --data folder of an archive of deploy/backup.sh, and its --secrets folder where it had one. The folders
+# must be new or empty. Run it as the user that the coordinator runs as, and never let two coordinators of one archive run: each
+# would be the other, by its node-id.
+#   deploy/restore.sh BACKUP.tar.gz DATA [SECRETS]          without SECRETS these are in DATA/secrets
 set -euo pipefail
-[ $# = 2 ] || { echo "usage: deploy/restore.sh BACKUP.tar.gz DATA" >&2; exit 2; }
-if [ -e "$2" ] && [ -n "$(ls -A "$2")" ]; then echo "error: $2 is not empty; a restore makes a new folder" >&2; exit 1; fi
+[ $# = 2 ] || [ $# = 3 ] || { echo "usage: deploy/restore.sh BACKUP.tar.gz DATA [SECRETS]" >&2; exit 2; }
+data="$2" secrets="${3:-}"
+for folder in "${@:2}"; do
+  if [ -e "$folder" ] && [ -n "$(ls -A "$folder")" ]; then echo "error: $folder is not empty; a restore makes a new folder" >&2; exit 1; fi
+done
 umask 077
-mkdir -p "$2"
-tar -xzf "$1" -C "$2" --no-same-owner
-echo "$2: start lightshaft-coordinator --data $2"
+mkdir -p "$data"
+tar -xzf "$1" -C "$data" --no-same-owner
+if [ ! -d "$data/secrets" ]; then
+  [ -z "$secrets" ] || echo "$1 has no secrets of a folder of their own: nothing is written to $secrets" >&2
+  echo "$data: start lightshaft-coordinator --data $data"
+  exit 0
+fi
+if [ -n "$secrets" ]; then
+  mkdir -p "$secrets"
+  cp -a "$data/secrets/." "$secrets/"
+  rm -r "$data/secrets"
+fi
+echo "$data: start lightshaft-coordinator --data $data --secrets ${secrets:-$data/secrets}"

@@ -107,6 +107,24 @@ def test_logs_are_lines_of_json_with_the_keys_of_job_and_worker(tmp_path):
     assert any(line["text"] == "joined the coordinator" for line in said)
 
 
+def test_a_result_that_is_refused_is_logged_with_job_tile_round_and_worker(tmp_path):
+    """Cut short on its way by the meddler of the storms."""
+    pytest.importorskip("grpc")
+    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
+    from meddler import Meddler
+    with LocalFarm(tmp_path, flags=["--log-format", "json"]) as farm, Meddler(tmp_path, f"127.0.0.1:{farm.grpc}", 1, most_cut=1, cut=1) as meddler:
+        farm.add_worker("--log-format", "json", coordinator=f"127.0.0.1:{meddler.port}")
+        job = farm.submit(SCENE, **SPEC)
+        farm.wait_for_job(job)
+        warned = [line for line in map(json.loads, farm.coordinator.output().splitlines()) if line["level"] == "warning"]
+        said = [line for line in map(json.loads, farm.workers[0].output().splitlines()) if line["level"] == "warning"]
+        tiles = farm.get(f"/api/v1/jobs/{job}/tiles")["tiles"]
+
+    assert len(warned) == len(said) == 1, (warned, said)
+    assert warned[0]["job"] == said[0]["job"] == job and warned[0]["worker"].startswith("w-")
+    assert warned[0]["tile"] == said[0]["tile"] and 0 <= int(warned[0]["tile"]) < len(tiles) and int(warned[0]["round"]) >= 0
+
+
 def test_the_log_of_a_job_tells_its_life(farm):
     farm.add_worker()
     job = farm.submit(SCENE, **SPEC)
@@ -233,8 +251,12 @@ def test_a_webhook_that_is_no_address_is_refused_at_the_start(tmp_path):
 
 # ---- backup and restore ----
 
-def backup(farm, to):
-    subprocess.run([ROOT / "deploy" / "backup.sh", farm.data, to], check=True, capture_output=True)
+def backup(farm, to, *more):
+    subprocess.run([ROOT / "deploy" / "backup.sh", farm.data, to, *more], check=True, capture_output=True)
+
+
+def restore(archive, *to):
+    subprocess.run([ROOT / "deploy" / "restore.sh", archive, *to], check=True, capture_output=True)
 
 
 def test_a_farm_restored_from_a_backup_made_while_it_worked_finishes_the_job(farm, tmp_path, expected):
@@ -248,7 +270,7 @@ def test_a_farm_restored_from_a_backup_made_while_it_worked_finishes_the_job(far
         process.kill()
     shutil.rmtree(farm.data)
 
-    subprocess.run([ROOT / "deploy" / "restore.sh", tmp_path / "backup.tar.gz", farm.data], check=True, capture_output=True)
+    restore(tmp_path / "backup.tar.gz", farm.data)
     assert (farm.data / "token").read_text().strip() == farm.token and (farm.data / "tokens").exists()
     farm.start_coordinator()
 
@@ -257,12 +279,47 @@ def test_a_farm_restored_from_a_backup_made_while_it_worked_finishes_the_job(far
     assert farm.pixels(job) == expected
 
 
-def test_a_restore_does_not_touch_a_folder_that_has_a_farm_in_it(farm, tmp_path):
-    backup(farm, tmp_path / "backup.tar.gz")
+def test_a_restored_coordinator_of_several_is_who_it_was_and_knows_users_and_workers(tmp_path, expected):
+    """Redis says whose a job is by the name in DATA/node-id; tokens and certificates are in the folder of secrets."""
+    with RedisServer(tmp_path) as redis:
+        flags = ["--shared", "--store", redis.url, "--blobs", tmp_path / "blobs"]
+        with LocalFarm(tmp_path / "farm", flags=flags, tls=True, secrets=tmp_path / "secrets") as farm:
+            farm.add_worker("--fake-delay", 10)
+            user = json.loads(farm.request("POST", "/api/v1/tokens", b'{"role": "submit", "user": "ann"}'))["token"]
+            job = farm.submit(SCENE, **SPEC)
+            farm.wait_for_progress(job, 8)
+            backup(farm, tmp_path / "backup.tar.gz", farm.secrets)
+            farm.coordinator.kill()
+            shutil.rmtree(farm.data)
+            shutil.rmtree(farm.secrets)
 
-    refused = subprocess.run([ROOT / "deploy" / "restore.sh", tmp_path / "backup.tar.gz", farm.data], capture_output=True, text=True)
+            restore(tmp_path / "backup.tar.gz", farm.data, farm.secrets)
+            farm.start_coordinator()
 
-    assert refused.returncode == 1 and "not empty" in refused.stderr
+            assert farm.job(job)["units_done"] >= 8 and redis.ask("HGET", f"lightshaft:job:{job}", "fence") == "1"
+            assert json.loads(farm.request("GET", "/api/v1/jobs", token=user))["jobs"] == []
+            assert farm.pixels(job) == expected, "its worker, with its old certificate and token, comes back"
+
+
+def test_secrets_that_were_kept_elsewhere_are_restored_beside_the_rest_where_no_folder_is_named(tmp_path):
+    with LocalFarm(tmp_path / "farm", secrets=tmp_path / "secrets") as farm:
+        backup(farm, tmp_path / "backup.tar.gz", farm.secrets)
+        restore(tmp_path / "backup.tar.gz", tmp_path / "new")
+
+        assert (tmp_path / "new" / "secrets" / "token").read_text().strip() == farm.token
+
+
+@pytest.mark.parametrize("folder", ["data", "secrets"])
+def test_a_restore_does_not_touch_a_folder_that_has_a_farm_in_it(tmp_path, folder):
+    with LocalFarm(tmp_path / "farm", secrets=tmp_path / "secrets") as farm:
+        backup(farm, tmp_path / "backup.tar.gz", farm.secrets)
+        to = {"data": tmp_path / "new", "secrets": tmp_path / "new-secrets", folder: getattr(farm, folder)}
+
+        refused = subprocess.run([ROOT / "deploy" / "restore.sh", tmp_path / "backup.tar.gz", to["data"], to["secrets"]], capture_output=True, text=True)
+
+        assert refused.returncode == 1 and "not empty" in refused.stderr
+        assert farm.get("/api/v1/jobs")["jobs"] == []
+    assert not (tmp_path / "new").exists(), "all or nothing"
 
 
 # ---- upgrade ----
