@@ -89,6 +89,22 @@ def test_units_of_a_cancelled_job_are_counted_under_a_cause_that_is_documented(f
     assert set(re.findall(r"`([a-z ]+)`", row.split("|")[2])) == set(freed), "documented are those that there are"
 
 
+def test_prometheus_is_told_how_to_reach_each_kind_of_farm(tmp_path):
+    jobs = {j["job_name"]: j for j in pytest.importorskip("yaml").safe_load((ROOT / "deploy" / "grafana" / "prometheus.yml").read_text())["scrape_configs"]}
+    with LocalFarm(tmp_path / "plain") as plain, LocalFarm(tmp_path / "tls", tls=True) as tls:
+        for job in jobs.values():
+            farm = tls if job.get("scheme") == "https" else plain
+            assert farm.url().startswith(job.get("scheme", "http") + ":") and ("ca_file" in job.get("tls_config", {})) == farm.tls
+            assert b"lightshaft_jobs" in farm.request("GET", job["metrics_path"]) and job["authorization"]["type"] == "Bearer"
+
+    host = {name: job["static_configs"][0]["targets"][0].split(":")[0] for name, job in jobs.items()}
+    assert f",{host['lightshaft-tls']}," in (ROOT / "deploy" / "container" / "make-secrets.sh").read_text(), "a name in the certificate"
+    assert f",{host['lightshaft-kubernetes']}," in (ROOT / "deploy" / "kubernetes" / "make-secrets.sh").read_text()
+    labels = jobs["lightshaft-kubernetes"]["static_configs"][0]["labels"]
+    asked = re.findall(r'(\w+)="(\w+)"', (ROOT / "deploy" / "kubernetes" / "autoscaling-keda.yaml").read_text())
+    assert asked and set(asked) == set(labels.items()), "what KEDA's query selects by"
+
+
 # ---- logs ----
 
 def test_logs_are_lines_of_json_with_the_keys_of_job_and_worker(tmp_path):
