@@ -8,6 +8,7 @@
 
 #include "common/base/log.h"
 #include "common/base/secret.h"
+#include "coordinator/every.h"
 #include "coordinator/service_impl.h"
 #include "coordinator/store/memory_blobs.h"
 #include "coordinator/store/open_blobs.h"
@@ -33,6 +34,7 @@ JoinCheck join_check(std::string token) {
 }
 
 namespace {
+constexpr Duration kBlobsLookedAt = std::chrono::seconds(5);  // whether their store answers
 
 Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options, const std::string& node) {
   if (auto known = check_store(options.store); !known) return tl::unexpected(known.error());
@@ -119,14 +121,12 @@ void Service::start_threads() {
   if (!options_.tick) return;
   if (on_disk())
     threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
-  threads_.emplace_back([this, every = *options_.tick](const std::stop_token& token) {
-    std::mutex mutex;
-    std::condition_variable_any woken;
-    std::unique_lock lock(mutex);
-    while (!woken.wait_for(lock, token, every, [&] { return token.stop_requested(); }) &&
-           !token.stop_requested())
-      tick();
-  });
+  if (!options_.blobs_at.empty())
+    threads_.emplace_back([this](const std::stop_token& token) {
+      every(kBlobsLookedAt, token, [&] { look_at_blobs(); });
+    });
+  threads_.emplace_back(
+      [this](const std::stop_token& token) { every(*options_.tick, token, [&] { tick(); }); });
 }
 
 // What has been accepted is durable already and what has not been acknowledged comes again: nothing is
@@ -159,8 +159,19 @@ void Service::tick() {
 
 bool Service::ready(std::string* why_not) const {
   const std::lock_guard lock(mutex_);
-  if (why_not) *why_not = store_trouble_;
-  return store_trouble_.empty();
+  const std::string& trouble = store_trouble_.empty() ? blobs_trouble_ : store_trouble_;
+  if (why_not) *why_not = trouble;
+  return trouble.empty();
+}
+
+// Nobody may ask for a blob for hours: whether the place where they are kept answers has to be asked for itself.
+void Service::look_at_blobs() {
+  const auto answer = blobs_->answers();
+  const std::string trouble = answer ? "" : "the store of blobs does not answer: " + answer.error().message;
+  const std::lock_guard lock(mutex_);
+  if (trouble.empty() != blobs_trouble_.empty())
+    trouble.empty() ? log_info("", "the store of blobs answers again") : log_warn("", trouble);
+  blobs_trouble_ = trouble;
 }
 
 std::shared_ptr<void> Service::subscribe(std::uint64_t after_id,

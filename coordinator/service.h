@@ -197,6 +197,8 @@ class BlobStore {
   virtual bool has(const Digest& digest) const = 0;
   // The same, where it matters why not: an error says that it cannot be found out now.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
+  // Whether the place where they are kept answers, asked once; may take seconds.
+  virtual Result<void> answers() const { return {}; }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <condition_variable>
 
 #include "common/base/log.h"
+#include "coordinator/every.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -46,12 +46,7 @@ void Service::collect() {
 
 void Service::collect_loop(const std::stop_token& token) {
   const Duration pause = std::min(options_.keep_unused.value_or(kLongestPause) / kSweepsPerTime, kLongestPause);
-  std::mutex mutex;
-  std::condition_variable_any woken;
-  std::unique_lock lock(mutex);
-  while (!woken.wait_for(lock, token, pause, [&] { return token.stop_requested(); }) &&
-         !token.stop_requested())
-    collect();
+  every(pause, token, [this] { collect(); });
 }
 
 }  // namespace ls::coordinator

@@ -189,6 +189,7 @@ class Service final : public Coordinator {
   // ---- collection (service_collect.cpp) ----
   std::optional<std::set<Digest>> needed_blobs() const;
   void collect_loop(const std::stop_token& token);
+  void look_at_blobs();
 
   // ---- several coordinators (service_shared.cpp) ----
   void look_for_moved_jobs();
@@ -344,6 +345,7 @@ class Service final : public Coordinator {
   std::vector<BarredWorker> barred_unsaved_;  // found, and not stored yet: no result may be
   std::vector<Inheritance> inherited_;        // to be taken over again later; under mutex_
   std::string store_trouble_;     // the last result that could not be stored
+  std::string blobs_trouble_;     // why blobs cannot be asked for; empty: they can
   std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
   bool restoring_ = false;
   FarmFigures figures_;  // what is as it is now is filled in by figures()

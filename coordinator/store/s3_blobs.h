@@ -23,6 +23,7 @@ class S3Blobs final : public BlobStore {
 
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
+  Result<void> answers() const override { return link_.answers(); }
   Result<std::uint64_t> size(const Digest& digest) const override;
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                       std::uint64_t length) const override;

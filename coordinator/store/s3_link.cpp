@@ -17,6 +17,7 @@ namespace {
 
 constexpr long kConnectSeconds = 10;
 constexpr long kStallSeconds = 30;              // without a byte
+constexpr long kAnswerSeconds = 5;              // whoever does not answer by then, does not
 constexpr std::size_t kMaxText = 8u << 20;      // of an answer that is no object: a list, an error
 constexpr std::size_t kShownText = 300;         // of it in a message
 constexpr std::size_t kMaxListed = 10'000'000;  // keys
@@ -156,6 +157,7 @@ Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
   curl_easy_setopt(curl.get(), CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl.get(), CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(curl.get(), CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+  curl_easy_setopt(curl.get(), CURLOPT_TIMEOUT, request.most_seconds);
   curl_easy_setopt(curl.get(), CURLOPT_LOW_SPEED_LIMIT, 1L);
   curl_easy_setopt(curl.get(), CURLOPT_LOW_SPEED_TIME, kStallSeconds);
   curl_easy_setopt(curl.get(), CURLOPT_WRITEFUNCTION, &Receiver::receive);
@@ -208,6 +210,15 @@ Error S3Link::error_of(const Request& request, const Answer& answer) const {
                 "machine's clock"};
   if (answer.status == 507) return {Errc::resource_exhausted, said};
   return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, said};
+}
+
+// Of an object that nobody has: that it is not there is an answer.
+Result<void> S3Link::answers() const {
+  const Request request{.method = "HEAD", .key = "answers", .most_seconds = kAnswerSeconds};
+  const auto answer = ask_once(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status != 200 && answer->status != 404) return tl::unexpected(error_of(request, *answer));
+  return {};
 }
 
 Result<std::uint64_t> S3Link::size(const std::string& key) const {

@@ -47,6 +47,8 @@ class S3Link {
  public:
   explicit S3Link(S3Options options);
 
+  // Whether it answers: one question, asked once, which ends within seconds.
+  Result<void> answers() const;
   // Bytes of an object; not_found.
   Result<std::uint64_t> size(const std::string& key) const;
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;

@@ -15,6 +15,7 @@ struct S3Link::Request {
   std::uint64_t offset = 0, bytes = 0;
   std::string body = {};           // of a POST
   std::string payload = kNoBytes;  // digest of what is sent
+  long most_seconds = 0;           // for all of it; 0: as long as bytes come
   const Sink* sink = nullptr;
   const std::function<Result<void>()>* restart = nullptr;
 };

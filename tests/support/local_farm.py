@@ -3,6 +3,7 @@
 Every system test uses it. Conditions are waited for by looking again until a deadline, never by a fixed sleep.
 """
 
+import http.client
 import json
 import os
 import pathlib
@@ -185,6 +186,18 @@ class LocalFarm:
 
     def get(self, path):
         return json.loads(self.request("GET", path))
+
+    def ask(self, path):
+        """(status, Location), redirects not followed; of a coordinator without TLS."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.http, timeout=30)
+        connection.request("GET", path, headers={"Authorization": f"Bearer {self.token}"})
+        answer = connection.getresponse()
+        answer.read()
+        return answer.status, answer.headers.get("Location")
+
+    def has(self, job):
+        """Itself, not one of those that share its Redis."""
+        return self.ask(f"/api/v1/jobs/{job}")[0] == 200
 
     def submit(self, scene, **spec):
         """A self-contained scene (text); spec as in the HTTP contract's query. The job's id."""

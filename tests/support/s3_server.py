@@ -82,6 +82,14 @@ class S3Server:
         self.http.shutdown()
         self.http.server_close()
 
+    def next_refusal(self, command, key):
+        """The status to refuse a request with, or None. That a coordinator asks now and then whether the store answers is no request
+        that tests count: it is refused like the next one, which stays the next."""
+        if key.endswith("/answers"):
+            return self.refuse[0] if self.refuse else None
+        self.requests.append((command, key))
+        return self.refuse.pop(0) if self.refuse else None
+
     @property
     def endpoint(self):
         return f"http://127.0.0.1:{self.http.server_address[1]}"
@@ -115,8 +123,7 @@ class Request(http.server.BaseHTTPRequestHandler):
         path, _, query = self.path.partition("?")
         bucket, _, key = urllib.parse.unquote(path).lstrip("/").partition("/")
         with state.lock:
-            state.requests.append((self.command, key))
-            status = state.refuse.pop(0) if state.refuse else None
+            status = state.next_refusal(self.command, key)
         if status:
             return self.refuse(status, "SlowDown")
         if state.gate and self.command == "GET" and key:

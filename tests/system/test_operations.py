@@ -12,7 +12,7 @@ import sys
 import threading
 
 import pytest
-from local_farm import ROOT, SCENE, LocalFarm, Process, wait_until
+from local_farm import ROOT, SCENE, HttpError, LocalFarm, Process, wait_until
 from redis_server import RedisServer
 
 SPEC = dict(spp=24, seed=5)
@@ -160,6 +160,31 @@ def test_readiness_tells_that_redis_is_away(tmp_path):
 
         wait_until(lambda: b"but" in farm.request("GET", "/readyz"), "it is told")
         redis.start()
+
+
+def test_readiness_tells_that_the_disk_is_full_until_results_can_be_stored_again(tmp_path, expected):
+    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
+    from chaos_kit import SmallDisk
+    from weather import Skip
+    try:
+        disk = SmallDisk(tmp_path / "data", 64)
+    except Skip as why:
+        pytest.skip(str(why))
+    with disk, LocalFarm(tmp_path) as farm:
+        farm.add_worker("--fake-delay", 20)
+        job = farm.submit(SCENE, **SPEC)
+        farm.wait_for_progress(job, 2)
+        disk.fill()
+        farm.wait_for_job(job, states=("paused",))
+
+        with pytest.raises(HttpError) as refused:
+            farm.request("GET", "/readyz")
+        assert refused.value.status == 503 and re.search("No space left|disk is full", refused.value.body)
+
+        disk.free()
+        farm.request("PATCH", f"/api/v1/jobs/{job}", b'{"state": "running"}')
+        assert farm.pixels(job) == expected
+        assert farm.request("GET", "/readyz") == b"ready\n"
 
 
 # ---- webhooks ----

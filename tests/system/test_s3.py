@@ -9,7 +9,7 @@ import threading
 
 import farm_rpc
 import pytest
-from local_farm import SCENE, LocalFarm, Process, bin_dir, wait_until
+from local_farm import SCENE, HttpError, LocalFarm, Process, bin_dir, wait_until
 from s3_server import ENVIRONMENT, S3Server
 
 
@@ -122,6 +122,29 @@ def test_an_object_that_breaks_off_comes_again_and_one_that_is_damaged_is_not_be
     s3.cut = 1
 
     assert s3_farm.pixels(job) == expected
+
+
+def readiness(farm):
+    """(status, text)"""
+    try:
+        return 200, farm.request("GET", "/readyz").decode()
+    except HttpError as error:
+        return error.status, error.body
+
+
+def test_a_coordinator_whose_store_does_not_answer_says_that_it_is_not_ready_and_goes_on(s3, s3_farm, expected):
+    s3_farm.add_worker("--fake-delay", 20)
+    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    s3_farm.wait_for_progress(job, 1)
+    assert readiness(s3_farm) == (200, "ready\n")
+
+    s3.refuse = [503] * 1_000_000
+    status, why = wait_until(lambda: (r := readiness(s3_farm))[0] != 200 and r, "it is noticed, though nobody asks for a blob")
+    assert status == 503 and "the store of blobs does not answer" in why and "SlowDown" not in why and "status 503" in why
+    assert s3_farm.pixels(job) == expected, "what needs no blob goes on"
+
+    s3.refuse = []
+    wait_until(lambda: readiness(s3_farm)[0] == 200, "it is noticed by itself")
 
 
 LARGE = 12 << 20  # three parts of 5, 5 and 2 MiB
