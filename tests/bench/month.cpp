@@ -24,6 +24,8 @@ std::uint64_t resident_kib() {
 
 using Sizes = std::vector<std::pair<std::string, std::size_t>>;
 
+std::size_t allocated_kib() { return mallinfo2().uordblks >> 10; }  // of simulation and coordinators together
+
 void raise(std::map<std::string, std::size_t>& most, const Sizes& sizes) {
   for (const auto& [what, size] : sizes) most[what] = std::max(most[what], size);
 }
@@ -31,9 +33,10 @@ void raise(std::map<std::string, std::size_t>& most, const Sizes& sizes) {
 void print(int day, const ls::coordinator::Month::Counts& c, const std::map<std::string, std::size_t>& most) {
   fmt::print("| {} | {} | {} | {} | {} | {} | {} + {} | {} | {} |", day, c.events, c.ended, c.units,
              c.workers, c.failures, c.restarts, c.takeovers, c.audits, c.barred);
-  for (const char* what : {"jobs", "units", "leases", "workers", "of workers", "names", "shares"})
+  for (const char* what : {"jobs", "units", "leases", "workers", "of workers", "names", "shares",
+                           "allocated KiB"})
     fmt::print(" {} |", most.at(what));
-  fmt::print(" {} | {} |\n", mallinfo2().uordblks >> 10, resident_kib());
+  fmt::print(" {} |\n", resident_kib());
   std::fflush(stdout);
 }
 
@@ -59,6 +62,7 @@ int main(int argc, char** argv) {
     for (int hour = 0; hour < 24; ++hour) {
       if (const std::string wrong = month.hour(); !wrong.empty()) return fmt::print("wrong: {}\n", wrong), 1;
       raise(most, month.sizes());
+      raise(most, {{"allocated KiB", allocated_kib()}});
     }
     const Sizes sizes(most.begin(), most.end());
     if (day <= days / 3) raise(early, sizes);

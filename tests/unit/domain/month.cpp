@@ -102,7 +102,8 @@ void Month::send(int home, const Event& event) {
     to_fold_.pop_front();
     handle(folded);
   }
-  for (const JobId& id : farm.take_changed_audits()) audits_[id] = farm.open_audits(id);
+  for (const JobId& id : farm.take_changed_audits())
+    if (const auto job = jobs_.find(id); job != jobs_.end()) job->second.audits = farm.open_audits(id);
   std::vector<std::string> names;
   for (const auto& [name, worker] : workers_)
     if (worker.connected && worker.home == home) names.push_back(name);
@@ -317,7 +318,7 @@ void Month::coordinator_dies() {
     if (!orphans.empty())  // their records say who has lied
       for (const std::string& liar : barred_[kDies])
         if (barred_[kLives].insert(liar).second) send(kLives, WorkerBarred{{liar}, "lied"});
-    for (const JobId& id : orphans) give(kLives, id, false, {});
+    for (const JobId& id : orphans) give(kLives, id, false);
     later(60s, What::coordinator_back);
   }
   for (const std::string& name : cut_off)
@@ -332,15 +333,16 @@ void Month::come_back(int home, bool with_results) {
   for (const auto& [id, job] : jobs_)
     if (job.home == home && !job.ended) own.push_back(id);
   std::erase_if(jobs_, [&](const auto& j) { return j.second.home == home && j.second.ended; });
-  for (const JobId& id : own) give(home, id, with_results, audits_[id]);
+  for (const JobId& id : own) give(home, id, with_results);
 }
 
-void Month::give(int home, const JobId& id, bool with_results, std::vector<JobRestored::Audit> audits) {
+void Month::give(int home, const JobId& id, bool with_results) {
   StoredJob& job = jobs_.at(id);
   JobRestored event{.plan = job.plan, .state = JobState::running};
   event.numeric_class = digest_number(1);
   if (!with_results) {
     job.accepted.clear();
+    job.audits.clear();
     job.film.assign(job.film.size(), {});
     job.folded.assign(job.folded.size(), 0);
   }
@@ -349,7 +351,7 @@ void Month::give(int home, const JobId& id, bool with_results, std::vector<JobRe
   for (const auto& [unit, r] : job.accepted)
     event.accepted.push_back({unit.first, unit.second, r.samples, r.digest, r.worker});
   event.folded = job.folded;
-  event.audits = std::move(audits);
+  event.audits = job.audits;
   send(home, event);
 }
 

@@ -49,6 +49,7 @@ class Month {
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> asked, folded;
     std::vector<std::vector<Digest>> film;
+    std::vector<JobRestored::Audit> audits;  // that are open
   };
   enum class What { submit, user, tick, arrive, leave, rendered, coordinator_dies, coordinator_back, forget };
   struct Due {
@@ -82,7 +83,7 @@ class Month {
   void rendered(const std::string& name, const Rig::Held& unit);
   void coordinator_dies();
   void come_back(int home, bool with_results);
-  void give(int home, const JobId& id, bool with_results, std::vector<JobRestored::Audit> audits);
+  void give(int home, const JobId& id, bool with_results);
 
   std::mt19937_64 random_;
   int starts_ = 0;  // before the farms, whose making counts it
@@ -93,7 +94,6 @@ class Month {
   std::priority_queue<Due> due_;
   std::map<std::string, Worker> workers_;
   std::map<JobId, StoredJob> jobs_;
-  std::map<JobId, std::vector<JobRestored::Audit>> audits_;  // as stored
   std::set<std::string> liars_;
   std::array<std::set<std::string>, 2> barred_;  // by the coordinator that knows
   std::deque<std::pair<int, UnitFolded>> to_fold_;
