@@ -73,13 +73,14 @@ PAGE = """# Storms
 `/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
 same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
 
-*Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
+*Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun; after a takeover also what the dead owner had done. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
 
 | storm | repetitions | hash equal | units again, at most | seconds lost |
 |---|---|---|---|---|
 {table}
 
 "Killed at STEP": the process kills itself with SIGKILL when it comes to that step of a unit's life for the n-th time, n random (`common/base/step.h`). Workers behind bad networks are in a network namespace, and every packet of theirs passes through `tests/chaos/weather.py`; full disks are small file systems; the wall clock is libfaketime's.
+A lease that is cut in its middle may still read as a shorter one: its other units wait for its deadline, ten seconds at least. A takeover takes some six seconds ([decisions/0024](decisions/0024-several-coordinators.md)). "Older": Redis is killed and started with what it had saved before, as a replica that was behind.
 {skipped}"""
 
 

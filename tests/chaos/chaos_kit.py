@@ -24,6 +24,7 @@ class ChaosFarm(LocalFarm):
 
     def __init__(self, *arguments, **options):
         self._again_before, self._again = 0, 0
+        self.done_seen = 0  # units of the storm's job
         super().__init__(*arguments, **options)
 
     def start_coordinator(self):
@@ -62,8 +63,15 @@ class ChaosFarm(LocalFarm):
                 view = self.job(self.storm_job)
             except (OSError, HttpError):
                 return False
+            self.done_seen = view["units_done"]
             return view["units_done"] >= share * self.total or view["state"] in ("done", "failed", "cancelled")
         wait_until(come, f"{share:.0%} of the job")
+
+    def goes_on_with(self, other):
+        """This coordinator has taken the storm's job over from the other one, and begins again what that one had done."""
+        for name in ("storm_began", "storm_size", "storm_job", "total"):
+            setattr(self, name, getattr(other, name))
+        self._again_before += other._again_before + other._again + other.done_seen
 
     def finish(self):
         """(pixels_sha256, units rendered again at most, seconds, size) of the storm's job."""
@@ -133,5 +141,5 @@ class Storm:
     def __exit__(self, *error):
         self._folder.cleanup()
 
-    def farm(self, **options):
-        return ChaosFarm(self.folder / "farm", **dict(self._options, **options))
+    def farm(self, name="farm", **options):
+        return ChaosFarm(self.folder / name, **dict(self._options, **options))

@@ -1,5 +1,5 @@
-"""Stands between workers and coordinator, speaks the protocol (proto/farm.proto) with both, and meddles with what workers say:
-results come twice, in another order, cut short, or far too large. Needs Debian's python3-grpcio, python3-protobuf and protoc."""
+"""Stands between workers and coordinator, speaks the protocol (proto/farm.proto) with both, and meddles with what they say:
+results, leases and acknowledgements come twice, in another order, cut short, or far too large. Needs Debian's python3-grpcio, python3-protobuf and protoc."""
 
 import concurrent.futures
 import importlib
@@ -34,15 +34,16 @@ def load_protocol(folder):
 
 
 class Meddler:
-    """`chances`: of "doubled", "held" (sent after the next one), "cut", "oversized", for each result. `most_cut`: results that may be
-    cut short in all, since each counts against its worker."""
+    """`chances`: of "doubled", "held" (sent after the next one), "cut", "oversized", for each result; of "to_doubled", "to_held",
+    "to_cut", for each lease and acknowledgement that a worker is sent. `most_cut`: results that may be cut short in all, since each
+    counts against its worker."""
 
     def __init__(self, folder, coordinator, seed, most_cut=2, **chances):
         self.grpc, self.protocol = None, load_protocol(folder)
         import grpc
         self.grpc = grpc
         self.dice, self.chances, self.cuts_left = random.Random(seed), chances, most_cut
-        self.done = dict.fromkeys(("doubled", "held", "cut", "oversized"), 0)
+        self.done = dict.fromkeys(chances, 0)
         self.lock = threading.Lock()
         limits = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
         self.channel = grpc.insecure_channel(coordinator, options=limits)
@@ -67,12 +68,13 @@ class Meddler:
         with self.lock:
             if what == "cut" and self.cuts_left == 0:
                 return False
-            hit = self.dice.random() < self.chances.get(what, 0)
-            self.done[what] += hit
+            hit = what in self.chances and self.dice.random() < self.chances[what]
+            if hit:
+                self.done[what] += 1
             self.cuts_left -= hit and what == "cut"
             return hit
 
-    def _meddled(self, raw, held):
+    def _to_coordinator(self, raw, held):
         """What is sent on instead of this message."""
         message = self.protocol.FromWorker.FromString(raw)
         if message.WhichOneof("message") != "result":
@@ -85,46 +87,61 @@ class Meddler:
         if self._chance("cut"):
             short = self.protocol.FromWorker.FromString(raw)
             short.result.exr = short.result.exr[:self.dice.randrange(len(short.result.exr))]
-            out.append(short.SerializeToString())
-        elif self._chance("held"):
+            return out + [short.SerializeToString()]
+        return out + self._moved(raw, held, "")
+
+    def _to_worker(self, raw, held, acknowledged):
+        """`acknowledged`: what has been in this stream. Nothing is cut before: what is left of a lease may read as a shorter one, whose
+        other units wait for its deadline, and that is two minutes later before a worker's first result."""
+        what = self.protocol.ToWorker.FromString(raw).WhichOneof("message")
+        if what not in ("assign", "ack"):
+            return [raw]
+        if acknowledged and self._chance("to_cut"):
+            return [raw[:self.dice.randrange(1, len(raw))]]
+        if what == "ack":
+            acknowledged.append(raw)
+        return self._moved(raw, held, "to_")
+
+    def _moved(self, raw, held, prefix):
+        if self._chance(prefix + "held"):
             held.append(raw)
-        else:
-            out += [raw] * (2 if self._chance("doubled") else 1)
-            out += held
-            held.clear()
+            return []
+        out = [raw] * (2 if self._chance(prefix + "doubled") else 1) + held
+        held.clear()
         return out
 
-    def _work(self, requests, context):
-        outgoing, held, end = queue.Queue(), [], object()
+    @staticmethod
+    def _relay(messages, meddled):
+        """The messages as `meddled(message, held)` has them; what it holds goes when nothing follows."""
+        incoming, held, end = queue.Queue(), [], object()
 
         def listen():
             try:
-                for raw in requests:
-                    for sent in self._meddled(raw, held):
-                        outgoing.put(sent)
-            except Exception:  # the worker's stream broke
+                for raw in messages:
+                    incoming.put(raw)
+            except Exception:  # the stream broke: whoever asked for it sees why
                 pass
-            outgoing.put(end)
+            incoming.put(end)
 
-        def sent():
-            while True:
-                try:
-                    message = outgoing.get(timeout=0.3)
-                except queue.Empty:  # nothing follows: what was held goes now
-                    yield from held
-                    held.clear()
-                    continue
-                if message is end:
-                    return
-                yield message
-
-        call = self.work(sent())
-        context.add_callback(call.cancel)
         threading.Thread(target=listen, daemon=True).start()
-        try:
-            yield from call
-        except self.grpc.RpcError as error:
-            context.abort(error.code(), error.details())
+        while True:
+            try:
+                raw = incoming.get(timeout=0.3)
+            except queue.Empty:
+                yield from held
+                held.clear()
+                continue
+            if raw is end:
+                return
+            yield from meddled(raw, held)
+
+    def _work(self, requests, context):
+        call = self.work(self._relay(requests, self._to_coordinator))
+        context.add_callback(call.cancel)
+        acknowledged = []
+        yield from self._relay(call, lambda raw, held: self._to_worker(raw, held, acknowledged))
+        if call.code() != self.grpc.StatusCode.OK:
+            context.abort(call.code(), call.details())
 
     def _fetch(self, request, context):
         try:

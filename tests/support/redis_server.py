@@ -1,5 +1,6 @@
 """A real Redis server of a test's own, on a port of the loopback that the system chose."""
 
+import signal
 import socket
 import subprocess
 
@@ -23,7 +24,7 @@ class RedisServer:
         return f"redis://127.0.0.1:{self.port}/0"
 
     def start(self):
-        """On the same port, knowing nothing; returns when it says that it takes connections."""
+        """On the same port, knowing nothing but what was saved (a dump in its folder); returns when it says that it takes connections."""
         self.popen = subprocess.Popen(
             ["redis-server", "--port", str(self.port), "--bind", "127.0.0.1", "--save", "", "--appendonly", "no", "--dir", str(self.folder)],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -39,6 +40,13 @@ class RedisServer:
         self.popen.kill()
         self.popen.wait()
         self.popen.stdout.close()
+
+    def freeze(self):
+        """It takes connections, and answers nothing."""
+        self.popen.send_signal(signal.SIGSTOP)
+
+    def resume(self):
+        self.popen.send_signal(signal.SIGCONT)
 
     def ask(self, *words):
         """The answer of redis-cli to one command."""
