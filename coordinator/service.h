@@ -92,6 +92,7 @@ struct JobView {
   std::optional<double> eta_seconds;
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
+  std::optional<std::pair<double, double>> eta_with_more_ci95;  // as eta_ci95
   std::string error;                                  // why it failed
   std::vector<std::string> warnings;                  // of the scene
   FrameSize size;

@@ -29,6 +29,7 @@
 #include "coordinator/domain/limits.h"
 #include "coordinator/event_hub.h"
 #include "coordinator/limits.h"
+#include "coordinator/outlook.h"
 #include "coordinator/service.h"
 #include "coordinator/store/collected_blobs.h"
 #include "coordinator/store/job_store.h"
@@ -315,6 +316,7 @@ class Service final : public Coordinator {
   EntryPtr find_locked(const JobId& id) const;
   Result<EntryPtr> entry_locked(const JobId& id) const;
   JobView view_locked(const JobEntry& entry) const;
+  Outlook outlook_locked(const JobEntry& entry, const JobFigures& figures, const JobView& v) const;
   WorkerView view_locked(const WorkerId& id, const WorkerEntry& entry) const;
   struct Picture {
     Film film;
