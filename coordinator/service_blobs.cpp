@@ -55,17 +55,16 @@ void Service::blob_lacking(const Digest& digest, const Error& why) {
     if (!entry->dormant && !entry->finishing && (waits || is_open(shown_state(*entry))) && file_of(entry->stored, digest))
       waiting.push_back(entry);
   }
-  for (const EntryPtr& entry : waiting) {
-    const bool first = is_open(shown_state(*entry));
-    log_job(entry->stored.id, why.message);
-    await_locked(*entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
-    if (first) {
-      run_locked(JobPaused{entry->stored.id});
-    } else {
+  if (waiting.empty()) return;
+  (void)save_together_locked([&] {  // what cannot be stored is known again at the next start
+    for (const EntryPtr& entry : waiting) {
+      log_job(entry->stored.id, why.message);
+      await_locked(*entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
+      if (is_open(shown_state(*entry))) run_locked(JobPaused{entry->stored.id});
       persist_locked(*entry);
       publish_job_locked(*entry);
     }
-  }
+  });
 }
 
 // Under the lock only their names are collected: whether they are here may take a network to tell.
@@ -94,12 +93,15 @@ void Service::look_for(const std::set<Digest>& awaited) {
     if (std::erase_if(left, [&](const Digest& digest) { return here.contains(digest); }) > 0 && left.empty())
       complete.push_back(entry);
   }
-  for (const EntryPtr& entry : complete) {
-    log_info(fmt::format("job={}", entry->stored.id.value), "its files are here again");
-    log_job(entry->stored.id, "its files are here again");
-    if (auto resumed = become_locked(entry, JobState::running); !resumed)
-      log_error(fmt::format("job={}", entry->stored.id.value), resumed.error().message);
-  }
+  if (complete.empty()) return;
+  (void)save_together_locked([&] {
+    for (const EntryPtr& entry : complete) {
+      log_info(fmt::format("job={}", entry->stored.id.value), "its files are here again");
+      log_job(entry->stored.id, "its files are here again");
+      if (auto resumed = become_locked(entry, JobState::running); !resumed)
+        log_error(fmt::format("job={}", entry->stored.id.value), resumed.error().message);
+    }
+  });
 }
 
 }  // namespace ls::coordinator

@@ -216,6 +216,7 @@ class Service final : public Coordinator {
   Result<std::vector<EntryPtr>> may_retarget_locked(const JobId& id, const std::vector<EntryPtr>& sound,
                                                     double target_error) const;
   Result<std::vector<EntryPtr>> may_extend_locked(const Sequence& sequence, std::uint64_t spp) const;
+  Result<void> save_together_locked(const std::function<void()>& changes);
   Result<void> become_together_locked(const std::vector<EntryPtr>& frames, JobState asked);
   Result<void> remove_sequence_locked(const JobId& id, const Sequence& sequence);
   JobView sequence_view_locked(const JobId& id, const Sequence& sequence, bool with_frames) const;
