@@ -116,6 +116,10 @@ void Service::start_threads() {
     while (!token.stop_requested())
       for (auto& comparison : comparisons_.pop(1, token)) comparison();
   });
+  threads_.emplace_back([this](const std::stop_token& token) {
+    while (!token.stop_requested())
+      for (const auto& awaited : looks_.pop(1, token)) look_for(awaited);
+  });
   if (!options_.tick) return;
   if (on_disk())
     threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
@@ -151,6 +155,7 @@ void Service::tick() {
   for (const auto& [id, worker] : workers_)
     if (worker.connection && worker.connection->open && worker.connection->held_back) run_locked(ResultsWait{id});
   run_locked(Tick{});
+  look_for_awaited_locked();
   for (const auto& [id, entry] : entries_)
     if (entry->progress_due) publish_progress_locked(*entry);
   for (const auto& [id, sequence] : sequences_)

@@ -191,13 +191,19 @@ class WorkerSession {
   virtual void disconnected() = 0;
 };
 
-// Bytes by digest. put() verifies; a blob is visible only when complete.
+// Bytes by digest. put() verifies; a blob is visible only when complete. What is damaged is never read: see prove().
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
   // The same, where it matters why not: an error says that it cannot be found out now.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
+  // That it is there with the bytes of its digest: read once in a process and when its file has changed since, or, if
+  // a reader has found it wrong, `again`. not_found; failed_precondition: it was damaged, is out of the way now and
+  // counts as missing.
+  virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
+    return has(digest) ? Result<void>() : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
+  }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
@@ -331,6 +337,8 @@ class Coordinator {
   virtual Result<std::optional<Elsewhere>> elsewhere(const JobId&) { return std::nullopt; }
   virtual AuditFigures audits() const { return {}; }
   virtual FarmFigures figures() const { return {}; }
+  // A worker asked for a blob that is not here, or was damaged: the jobs that need it wait until it is here again.
+  virtual void blob_lacking(const Digest&, const Error&) {}
   virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // to a worker: to be counted
   virtual void tick() = 0;
   // Removes blobs that no job needs, and unfinished uploads, whose time is over (Options::keep_unused). With
