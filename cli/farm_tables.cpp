@@ -28,6 +28,13 @@ std::string time_of(const json& object, const char* key) {
   return value ? show_seconds(*value) : "-";
 }
 
+// With its interval, where it has one.
+std::string time_left(const json& job, const char* key, const char* interval) {
+  const auto ci = pair_field(job, interval);
+  return time_of(job, key) +
+         (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());
+}
+
 std::string percent(const json& object, const char* key) {
   const auto value = number_field(object, key);
   return value ? fmt::format("{:.0f} %", 100 * *value) : "-";
@@ -136,12 +143,9 @@ std::string job_text(const json& job) {
   rows.push_back({"relMSE", relmse});
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
-  std::string left = time_of(job, "eta_seconds");
-  if (const auto ci = pair_field(job, "eta_ci95"))
-    left += fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second));
-  rows.push_back({"left", left});
+  rows.push_back({"left", time_left(job, "eta_seconds", "eta_ci95")});
   if (number_field(job, "eta_with_8_more"))
-    rows.push_back({"with 8 more workers", time_of(job, "eta_with_8_more")});
+    rows.push_back({"with 8 more workers", time_left(job, "eta_with_8_more", "eta_with_8_more_ci95")});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)

@@ -38,13 +38,13 @@ void LocalLink::close() {
   session_.reset();
 }
 
-Result<void> LocalLink::fetch_blob(const Digest& digest, std::uint64_t offset,
+Result<void> LocalLink::fetch_blob(const worker::BlobRequest& wanted,
                                    const std::function<Result<void>(std::span<const std::byte>)>& sink) {
-  const auto size = coordinator_.blobs().size(digest);
+  const auto size = coordinator_.blobs().size(wanted.digest);
   if (!size) return tl::unexpected(size.error());
-  while (offset < *size) {
+  for (std::uint64_t offset = wanted.offset; offset < *size;) {
     const auto length = std::min<std::uint64_t>(limits::kBlobChunkBytes, *size - offset);
-    const auto bytes = coordinator_.blobs().read(digest, offset, length);
+    const auto bytes = coordinator_.blobs().read(wanted.digest, offset, length);
     if (!bytes) return tl::unexpected(bytes.error());
     if (auto taken = sink(*bytes); !taken) return taken;
     offset += length;

@@ -20,7 +20,7 @@ class LocalLink final : public worker::CoordinatorLink {
   Result<void> connect(const WorkerHello& hello, std::shared_ptr<worker::LinkObserver> observer) override;
   void send(FromWorker message) override;
   void close() override;
-  Result<void> fetch_blob(const Digest& digest, std::uint64_t offset,
+  Result<void> fetch_blob(const worker::BlobRequest& wanted,
                           const std::function<Result<void>(std::span<const std::byte>)>& sink) override;
 
  private:

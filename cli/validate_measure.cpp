@@ -1,5 +1,7 @@
 #include "cli/validate_measure.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -75,6 +77,18 @@ void collect(const render::TileResult& frame, const std::vector<double>& weights
 
 std::uint64_t samples_gone_wrong(const render::Health& health) {
   return health.nonfinite + health.negative + health.majorant_violations;
+}
+
+std::string told(const render::Health& health) {
+  std::string text;
+  for (const auto& [cause, entry] : health.causes) {
+    if (effect_of(cause) == HealthEffect::input) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", entry.count, to_string(cause));
+    if (!entry.first.empty())
+      text += fmt::format(", first at pixel ({}, {}), sample {}", entry.first[0].x, entry.first[0].y,
+                          entry.first[0].sample);
+  }
+  return text;
 }
 
 void add(render::Health& sum, const render::Health& h) { sum.merge(h); }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "worker/render/render.h"
 
@@ -12,6 +13,8 @@ namespace ls::cli {
 
 // Of every cause.
 std::uint64_t samples_gone_wrong(const render::Health& health);
+// What went wrong, and where first: "1 majorant_violation, first at pixel (3, 5), sample 17".
+std::string told(const render::Health& health);
 void add(render::Health& sum, const render::Health& h);
 
 // Every pixel of `size` of a world, one row a task; the sums' planes are those of the whole frame.

@@ -14,6 +14,7 @@ inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;   // one 
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // in one read()
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;               // kept to be gone on with
 inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
+inline constexpr Duration kAwaitedLook = std::chrono::seconds(1);  // between two looks for blobs that jobs wait for
 
 // ---- submission ----
 inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;

@@ -67,14 +67,14 @@ std::string trouble_of(std::span<const JobView> frames) {
   return id ? fmt::format("frame {}: {}", id->frame, found->error) : found->error;
 }
 
-struct Outlook {
+struct WorkLeft {
   double core_left = 0, core_queued = 0;
 };
 
 // A frame that has not begun costs what the others cost, by the share of them that is done.
-Outlook outlook(std::span<const JobView> frames) {
+WorkLeft work_left(std::span<const JobView> frames) {
   double spent = 0, progress = 0;
-  Outlook out;
+  WorkLeft out;
   for (const JobView& f : frames)
     if (f.units_done > 0) spent += f.core_seconds, progress += f.progress;
   const double each = progress > 0 ? spent / progress : 0;
@@ -161,7 +161,7 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   v.submitted_unix = first.submitted_unix;
   add_up(v, frames);
   if (v.state == JobState::done) v.progress = 1;
-  const Outlook out = outlook(frames);
+  const WorkLeft out = work_left(frames);
   v.queued_core_seconds = out.core_queued;
   const bool goes_on = v.state == JobState::running || v.state == JobState::queued;
   if (goes_on && out.core_left > 0 && facts.threads > 0) v.eta_seconds = out.core_left / facts.threads;

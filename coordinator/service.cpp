@@ -118,13 +118,16 @@ void Service::start_threads() {
     while (!token.stop_requested())
       for (auto& comparison : comparisons_.pop(1, token)) comparison();
   });
+  threads_.emplace_back([this](const std::stop_token& token) {
+    while (!token.stop_requested())
+      for (const auto& awaited : looks_.pop(1, token)) look_for(awaited);
+  });
   if (!options_.tick) return;
   if (on_disk())
     threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
   if (!options_.blobs_at.empty())
-    threads_.emplace_back([this](const std::stop_token& token) {
-      every(kBlobsLookedAt, token, [&] { look_at_blobs(); });
-    });
+    threads_.emplace_back(
+        [this](const std::stop_token& token) { every(kBlobsLookedAt, token, [&] { look_at_blobs(); }); });
   threads_.emplace_back(
       [this](const std::stop_token& token) { every(*options_.tick, token, [&] { tick(); }); });
 }
@@ -151,6 +154,7 @@ void Service::tick() {
   for (const auto& [id, worker] : workers_)
     if (worker.connection && worker.connection->open && worker.connection->held_back) run_locked(ResultsWait{id});
   run_locked(Tick{});
+  look_for_awaited_locked();
   for (const auto& [id, entry] : entries_)
     if (entry->progress_due) publish_progress_locked(*entry);
   for (const auto& [id, sequence] : sequences_)
@@ -164,7 +168,8 @@ bool Service::ready(std::string* why_not) const {
   return trouble.empty();
 }
 
-// Nobody may ask for a blob for hours: whether the place where they are kept answers has to be asked for itself.
+// Nobody may ask for a blob for hours: whether the place where they are kept answers has to be asked for
+// itself.
 void Service::look_at_blobs() {
   const auto answer = blobs_->answers();
   const std::string trouble = answer ? "" : "the store of blobs does not answer: " + answer.error().message;

@@ -92,6 +92,7 @@ struct JobView {
   std::optional<double> eta_seconds;
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
+  std::optional<std::pair<double, double>> eta_with_more_ci95;  // as eta_ci95
   std::string error;                                  // why it failed
   std::vector<std::string> warnings;                  // of the scene
   FrameSize size;
@@ -190,7 +191,7 @@ class WorkerSession {
   virtual void disconnected() = 0;
 };
 
-// Bytes by digest. put() verifies; a blob is visible only when complete.
+// Bytes by digest. put() verifies; a blob is visible only when complete. What is damaged is never read: see prove().
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
@@ -199,6 +200,12 @@ class BlobStore {
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
   // Whether the place where they are kept answers, asked once; may take seconds.
   virtual Result<void> answers() const { return {}; }
+  // That it is there with the bytes of its digest: read once in a process and when its file has changed since, or, if
+  // a reader has found it wrong, `again`. not_found; failed_precondition: it was damaged, is out of the way now and
+  // counts as missing.
+  virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
+    return has(digest) ? Result<void>() : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
+  }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
@@ -332,6 +339,8 @@ class Coordinator {
   virtual Result<std::optional<Elsewhere>> elsewhere(const JobId&) { return std::nullopt; }
   virtual AuditFigures audits() const { return {}; }
   virtual FarmFigures figures() const { return {}; }
+  // A worker asked for a blob that is not here, or was damaged: the jobs that need it wait until it is here again.
+  virtual void blob_lacking(const Digest&, const Error&) {}
   virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // to a worker: to be counted
   virtual void tick() = 0;
   // Removes blobs that no job needs, and unfinished uploads, whose time is over (Options::keep_unused). With

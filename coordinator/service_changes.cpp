@@ -81,7 +81,11 @@ Result<void> Service::become_locked(const EntryPtr& entry, JobState asked) {
   if (asked == JobState::cancelled) {
     if (state != asked) run_locked(JobCancelled{id});
   } else if (asked == JobState::paused) {
-    if (state != asked) run_locked(JobPaused{id});
+    entry->stored.awaited.clear();  // now it is its user who has it wait
+    if (state != asked)
+      run_locked(JobPaused{id});
+    else
+      persist_locked(*entry);
   } else if (entry->finishing) {  // its image could not be written
     entry->finishing = ++last_final_;
     entry->trouble.clear();

@@ -167,6 +167,7 @@ void Service::on(const JobStateChanged& e, Todo&) {
   if (!entry || entry->removed || e.to == JobState::done) return;  // removed: it goes on elsewhere, or nowhere
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
+  if (e.to != JobState::paused) entry->stored.awaited.clear();
   log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
   log_job(e.job, fmt::format("{}", to_string(e.to)));
   if (e.to == JobState::running && !entry->pin_unsaved) entry->trouble.clear();

@@ -29,6 +29,7 @@
 #include "coordinator/domain/limits.h"
 #include "coordinator/event_hub.h"
 #include "coordinator/limits.h"
+#include "coordinator/outlook.h"
 #include "coordinator/service.h"
 #include "coordinator/store/collected_blobs.h"
 #include "coordinator/store/job_store.h"
@@ -140,6 +141,7 @@ class Service final : public Coordinator {
   Result<std::optional<Elsewhere>> elsewhere(const JobId& id) override;
   AuditFigures audits() const override;
   FarmFigures figures() const override;
+  void blob_lacking(const Digest& digest, const Error& why) override;
   void blob_sent(std::uint64_t bytes) override { blob_bytes_ += bytes; }
   void tick() override;
   void collect() override;
@@ -174,8 +176,8 @@ class Service final : public Coordinator {
 
   // ---- restart (service_restore.cpp) ----
   EntryPtr make_entry(StoredJob stored) const;
-  // `files`: whether all that the job needs is among the blobs.
-  Result<void> take_up_locked(JobEntry& entry, JobState state, const Result<void>& files);
+  // `missing`: what the job needs and is not among the blobs. It waits for that.
+  Result<void> take_up_locked(JobEntry& entry, JobState state, const Result<std::vector<BlobRef>>& missing);
   void set_aside_locked(JobEntry& entry, const Error& why);
   bool image_is_lost(const StoredJob& job) const;
   static void begin_again(StoredJob& job);
@@ -183,8 +185,13 @@ class Service final : public Coordinator {
   // Opens the log and loads what is folded, without what barred workers have rendered.
   Result<void> load_locked(JobEntry& entry);
   void remove_strangers(const std::vector<StoredJob>& jobs) const;
-  Result<void> files_are_there(const StoredJob& job) const;
   void remove_leftovers() const;
+
+  // ---- files that jobs wait for (service_blobs.cpp) ----
+  Result<std::vector<BlobRef>> lacking(const StoredJob& job) const;
+  void await_locked(JobEntry& entry, const BlobRef& file, bool damaged);
+  void look_for_awaited_locked();
+  void look_for(const std::set<Digest>& awaited);
 
   // ---- collection (service_collect.cpp) ----
   std::optional<std::set<Digest>> needed_blobs() const;
@@ -211,6 +218,7 @@ class Service final : public Coordinator {
   Result<std::vector<EntryPtr>> may_retarget_locked(const JobId& id, const std::vector<EntryPtr>& sound,
                                                     double target_error) const;
   Result<std::vector<EntryPtr>> may_extend_locked(const Sequence& sequence, std::uint64_t spp) const;
+  Result<void> save_together_locked(const std::function<void()>& changes);
   Result<void> become_together_locked(const std::vector<EntryPtr>& frames, JobState asked);
   Result<void> remove_sequence_locked(const JobId& id, const Sequence& sequence);
   JobView sequence_view_locked(const JobId& id, const Sequence& sequence, bool with_frames) const;
@@ -316,6 +324,7 @@ class Service final : public Coordinator {
   EntryPtr find_locked(const JobId& id) const;
   Result<EntryPtr> entry_locked(const JobId& id) const;
   JobView view_locked(const JobEntry& entry) const;
+  Outlook outlook_locked(const JobEntry& entry, const JobFigures& figures, const JobView& v) const;
   WorkerView view_locked(const WorkerId& id, const WorkerEntry& entry) const;
   struct Picture {
     Film film;
@@ -357,6 +366,8 @@ class Service final : public Coordinator {
   WorkQueue<Arrived> arrived_;
   WorkQueue<Checked> checked_;
   WorkQueue<std::function<void()>> chores_, comparisons_;
+  WorkQueue<std::set<Digest>> looks_;  // for blobs that jobs wait for: the store may be away, and then only this waits
+  TimePoint last_look_{};
   std::shared_ptr<const Reference> reference_;  // the last one compared with
   Digest reference_digest_;
   std::unique_ptr<EventHub> hub_;

@@ -49,20 +49,24 @@ Result<void> Service::restore() {
     register_locked(entry);
     if (entry->stored.damaged)
       set_aside_locked(*entry, {Errc::internal, entry->stored.error});
-    else if (auto taken = take_up_locked(*entry, state, ended ? Result<void>() : files_are_there(entry->stored)); !taken)
+    else if (auto taken = take_up_locked(*entry, state, ended ? std::vector<BlobRef>() : lacking(entry->stored)); !taken)
       set_aside_locked(*entry, taken.error());
   }
   restoring_ = false;
   return {};
 }
 
-Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Result<void>& files) {
+Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Result<std::vector<BlobRef>>& missing) {
   const JobId& id = entry.stored.id;
   auto points = store_->points(id);
   if (!points) return tl::unexpected(points.error());
   entry.points = std::move(*points);
   if (entry.dormant) return {};
-  if (!files) return files;
+  if (!missing) return tl::unexpected(missing.error());
+  if (state != JobState::paused || !entry.stored.awaited.empty()) {  // one that its user paused stays so
+    for (const BlobRef& file : *missing) await_locked(entry, file, false);
+    if (!missing->empty()) state = entry.stored.state = JobState::paused;
+  }
   if (auto loaded = load_locked(entry); !loaded) return loaded;
   auto event = restored_locked(entry, state);
   if (!event) return tl::unexpected(event.error());
@@ -115,21 +119,6 @@ void Service::begin_again(StoredJob& job) {
   job.state = JobState::queued;
   job.stopped.reset();
   job.totals = {};
-}
-
-Result<void> Service::files_are_there(const StoredJob& job) const {
-  std::vector<BlobRef> files = job.assets;
-  files.push_back({job.scene, 0, job.name});
-  for (const BlobRef& file : files) {
-    const auto there = blobs_->find(file.digest);
-    if (!there) return tl::unexpected(there.error());
-    if (!*there)
-      return fail(Errc::not_found,
-                  fmt::format("its file '{}' ({}) is not among the blobs in --data; send the job again, or bring "
-                              "the folder back",
-                              file.name, file.digest.hex()));
-  }
-  return {};
 }
 
 void Service::set_aside_locked(JobEntry& entry, const Error& why) {

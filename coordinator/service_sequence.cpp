@@ -235,26 +235,33 @@ Result<std::vector<Service::EntryPtr>> Service::may_extend_locked(const Sequence
   return chosen;
 }
 
+// What the changes have to store of jobs, in one transaction: a sequence may have thousands of frames.
+Result<void> Service::save_together_locked(const std::function<void()>& changes) {
+  std::set<EntryPtr> unsaved;
+  unsaved_ = &unsaved;
+  changes();
+  unsaved_ = nullptr;
+  std::vector<StoredJob> records;
+  for (const EntryPtr& entry : unsaved) records.push_back(entry->stored);
+  auto put = store_->put_jobs(records);
+  if (put) return put;
+  store_trouble_ = put.error().message;
+  log_error("", put.error().message);
+  return put;
+}
+
 // Their new states are stored together. One whose image is being written is left to end, unless its writing
 // is to be tried again.
 Result<void> Service::become_together_locked(const std::vector<EntryPtr>& frames, JobState asked) {
-  std::set<EntryPtr> unsaved;
-  unsaved_ = &unsaved;
   Result<void> done;
-  for (const EntryPtr& frame : frames) {
-    if (frame->finishing && (asked != JobState::running || frame->trouble.empty())) continue;
-    if (auto became = become_locked(frame, asked); !became && done)
-      done = tl::unexpected(in_frame(frame->stored.id, became.error()));
-  }
-  unsaved_ = nullptr;
-  std::vector<StoredJob> records;
-  for (const EntryPtr& frame : unsaved) records.push_back(frame->stored);
-  if (const auto put = store_->put_jobs(records); !put) {
-    store_trouble_ = put.error().message;
-    log_error("", put.error().message);
-    if (done) done = put;
-  }
-  return done;
+  const auto saved = save_together_locked([&] {
+    for (const EntryPtr& frame : frames) {
+      if (frame->finishing && (asked != JobState::running || frame->trouble.empty())) continue;
+      if (auto became = become_locked(frame, asked); !became && done)
+        done = tl::unexpected(in_frame(frame->stored.id, became.error()));
+    }
+  });
+  return done ? saved : done;
 }
 
 // As a job: one that goes on is cancelled and stays; one that has ended goes, with every frame.

@@ -74,9 +74,9 @@ void Service::leave_sequence_locked(const EntryPtr& entry) {
 void Service::take_over(Inheritance inheritance) {
   StoredJob job = inheritance.job.job;
   // Without the lock: a store of blobs may be a network away.
-  const auto files = files_are_there(job);
-  if (!files && files.error().code != Errc::not_found) {
-    log_warn(fmt::format("job={}", job.id.value), "cannot be taken over now, and is tried again: " + files.error().message);
+  const auto missing = lacking(job);
+  if (!missing) {
+    log_warn(fmt::format("job={}", job.id.value), "cannot be taken over now, and is tried again: " + missing.error().message);
     const std::lock_guard lock(mutex_);
     inheritance.again = now() + kTakeOverPause;
     inherited_.push_back(std::move(inheritance));
@@ -97,7 +97,7 @@ void Service::take_over(Inheritance inheritance) {
   entry->dormant = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
   restoring_ = true;
   register_locked(entry);
-  if (auto taken = take_up_locked(*entry, state, files); !taken) set_aside_locked(*entry, taken.error());
+  if (auto taken = take_up_locked(*entry, state, missing); !taken) set_aside_locked(*entry, taken.error());
   restoring_ = false;
   log_job(id, fmt::format("taken over from coordinator {}, which is gone; what it had rendered since and not "
                           "written to a shared place is rendered again, to the same bits",

@@ -59,52 +59,30 @@ namespace {
 
 double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
 
-struct Outlook {
-  double progress = 0;
-  std::optional<double> eta_seconds;
-  std::optional<std::pair<double, double>> eta_ci95;
-  double core_seconds = 0;  // that eta_seconds comes from; 0: from the clock
-};
-
-// The forecast of the time to the target error, where that comes before what was `out`'s end.
-void look_at_target(const JobEntry& entry, double target, int threads, Outlook& out) {
-  const ConvergencePoint& last = entry.points.back();
-  const auto forecast = forecast_of(error_points(entry.points), target);
-  if (!forecast || threads <= 0) return;
-  const double more = std::max(0.0, forecast->spp - last.spp);
-  out.progress = std::max(out.progress, last.spp / (last.spp + more));
-  const double seconds = forecast->core_seconds / threads;
-  if (seconds >= out.eta_seconds.value_or(INFINITY)) return;
-  out.eta_seconds = seconds;
-  out.eta_ci95 = {forecast->core_seconds_lo / threads, forecast->core_seconds_hi / threads};
-  out.core_seconds = forecast->core_seconds;
-}
-
 // Of samples: units of late rounds hold many times those of the first.
 double done_of(const StoredJob& job, double spp_done) {
   return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
 }
 
-// Whichever of samples, target and time comes first.
-Outlook outlook(const JobEntry& entry, const JobFigures& f, double spp_done, double elapsed, int threads) {
-  Outlook out;
-  const double core_left = f.core_seconds_left;
-  out.progress = done_of(entry.stored, spp_done);
-  if (threads > 0 && core_left > 0) {
-    out.eta_seconds = core_left / threads;
-    out.core_seconds = core_left;
-  }
-  const auto& spec = entry.stored.spec;
-  if (spec.target_error && !entry.points.empty()) look_at_target(entry, *spec.target_error, threads, out);
-  if (spec.time) {
-    out.progress = std::max(out.progress, std::min(1.0, elapsed / *spec.time));
-    const double left = std::max(0.0, *spec.time - elapsed);
-    if (left < out.eta_seconds.value_or(INFINITY)) out = {out.progress, left, std::nullopt, 0};
-  }
-  return out;
-}
-
 }  // namespace
+
+// `v`: with the clocks and the samples so far.
+Outlook Service::outlook_locked(const JobEntry& entry, const JobFigures& figures, const JobView& v) const {
+  const StoredJob& job = entry.stored;
+  OutlookFacts facts;
+  facts.done = done_of(job, v.spp_done);
+  facts.core_seconds = v.core_seconds;
+  facts.core_left = figures.core_seconds_left;
+  facts.core_to_limit = figures.core_seconds_to_limit;
+  facts.target = job.spec.target_error;
+  facts.time = job.spec.time;
+  facts.elapsed = v.elapsed_seconds;
+  const int threads = farm_.threads_connected(), workers = farm_.workers_connected();
+  facts.threads = figures.threads > 0 ? figures.threads : threads;
+  const bool may_grow = !job.spec.max_workers || static_cast<std::uint32_t>(workers) < *job.spec.max_workers;
+  if (workers > 0 && may_grow) facts.threads_with_more = facts.threads + static_cast<double>(kMoreWorkers) * threads / workers;
+  return outlook_of(facts, error_points(entry.points));
+}
 
 JobView Service::view_locked(const JobEntry& entry) const {
   const StoredJob& job = entry.stored;
@@ -146,14 +124,13 @@ JobView Service::view_locked(const JobEntry& entry) const {
     v.units_done = figures->units_done;
     v.units_total = figures->units_total;
     v.queued_core_seconds = figures->core_seconds_queued;
-    const Outlook out = outlook(entry, *figures, v.spp_done, v.elapsed_seconds, farm_.threads_connected());
+    const Outlook out = outlook_locked(entry, *figures, v);
     v.progress = out.progress;
     if (v.state == JobState::running || v.state == JobState::queued) {
-      v.eta_seconds = out.eta_seconds;
-      v.eta_ci95 = out.eta_ci95;
-      const int workers = farm_.workers_connected();
-      if (out.core_seconds > 0 && workers > 0)
-        v.eta_with_more = out.eta_seconds.value_or(0) * workers / (workers + kMoreWorkers);
+      v.eta_seconds = out.seconds;
+      v.eta_ci95 = out.ci95;
+      v.eta_with_more = out.with_more;
+      v.eta_with_more_ci95 = out.with_more_ci95;
     }
     if (v.error.empty() && !entry.finishing && figures->units_leased == 0)
       v.error = farm_.why_waiting(job.id);

@@ -11,6 +11,9 @@ namespace {
 using nlohmann::json;
 
 json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+json pair_or_null(const std::optional<std::pair<double, double>>& v) {
+  return v ? json{number(v->first), number(v->second)} : json();
+}
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 // Names come from strangers: what is not UTF-8 is replaced.
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
@@ -49,8 +52,9 @@ json to_value(const JobView& v) {
          {"spp_done", number(v.spp_done)},
          {"target_error", v.target_error ? number(*v.target_error) : json()},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
-         {"eta_ci95", v.eta_ci95 ? json{number(v.eta_ci95->first), number(v.eta_ci95->second)} : json()},
+         {"eta_ci95", pair_or_null(v.eta_ci95)},
          {"eta_with_8_more", v.eta_with_more ? number(*v.eta_with_more) : json()},
+         {"eta_with_8_more_ci95", pair_or_null(v.eta_with_more_ci95)},
          {"error", text_or_null(v.error)},
          {"warnings", v.warnings},
          {"size", {v.size.width, v.size.height}},

@@ -82,8 +82,8 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
   const auto link = link_to(options);
   auto cache = worker::BlobCache::open(
       options.cache, options.cache_limit,
-      [&link](const Digest& digest, std::uint64_t offset, const worker::BlobCache::Sink& sink) {
-        return link->fetch_blob(digest, offset, sink);
+      [&link](const worker::BlobRequest& wanted, const worker::BlobCache::Sink& sink) {
+        return link->fetch_blob(wanted, sink);
       });
   if (!cache) return failed(cache.error());
   // After the cache: its folder is what the child may read, so it must be there.

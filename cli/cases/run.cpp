@@ -64,7 +64,8 @@ class Runner {
   // A mean, what it should be, and in which error.
   struct Sight {
     Channels expected, got, error, freedom;
-    std::uint64_t unhealthy = 0, paths = 0;
+    render::Health health;
+    std::uint64_t paths = 0;
     double seconds = 0;
   };
 
@@ -78,7 +79,7 @@ class Runner {
   Result<Sight> with_expected(const Mean& mean, std::uint64_t paths, std::uint64_t seed) const {
     const auto m = look(mean.scene, paths, seed);
     if (!m) return tl::unexpected(m.error());
-    Sight s{mean.expected, {}, {}, {}, m->unhealthy(), m->paths, m->seconds};
+    Sight s{mean.expected, {}, {}, {}, m->health, m->paths, m->seconds};
     for (std::size_t k = 0; k < 3; ++k) {
       s.got[k] = case_->options.complement ? 1 - m->mean[k] : m->mean[k];
       s.error[k] = m->standard_error[k];
@@ -91,7 +92,8 @@ class Runner {
     const auto a = look(same.scene, paths, seed), b = look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
     if (!b) return tl::unexpected(b.error());
-    Sight s{{}, {}, {}, {}, a->unhealthy() + b->unhealthy(), a->paths + b->paths, a->seconds + b->seconds};
+    Sight s{{}, {}, {}, {}, a->health, a->paths + b->paths, a->seconds + b->seconds};
+    cli::add(s.health, b->health);
     for (std::size_t k = 0; k < 3; ++k) {
       const double va = a->standard_error[k] * a->standard_error[k],
                    vb = b->standard_error[k] * b->standard_error[k];
@@ -161,11 +163,12 @@ class Runner {
     c.band = band();
     c.level = level_;
     c.band_level = kBandLevel;
-    c.nonfinite = s.unhealthy;
+    c.nonfinite = cli::samples_gone_wrong(s.health);
     c.paths = s.paths;
     c.seconds = s.seconds / static_cast<double>(lines_of(*case_));
     cli::judge_equivalence(c, s.freedom[k], unknown(c.expected), kRounding * std::abs(c.expected),
                            kLeastFreedom);
+    if (c.nonfinite > 0) c.why += ": " + cli::told(s.health);
     wide = wide || c.too_wide;
     return c;
   }

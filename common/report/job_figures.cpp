@@ -17,12 +17,12 @@ struct Part {
   const char* meaning;
 };
 constexpr std::array kParts{
-    Part{"load", "load", "reading what the scene names"},
+    Part{"load", "load", "fetching and reading what the scene names"},
     Part{"build", "build", "making it ready to trace"},
     Part{"render", "render", "tracing"},
-    Part{"transfer", "transfer", "on the network"},
+    Part{"transfer", "transfer", "packing results to be sent"},
     Part{"merge", "merge", "folding and measuring, in the coordinator"},
-    Part{"idle", "idle", "lent threads without work"},
+    Part{"idle", "idle", "threads between two units of the job"},
 };
 
 std::string fact(const char* name, const std::string& value, const std::string& note,

@@ -196,16 +196,24 @@ RoundIndex AdaptiveStop::foreseen(TileIndex tile) const {
   return std::min(groups_[group_of_[tile]].foreseen, last_) + 1;
 }
 
+double AdaptiveStop::samples_lacking(const Group& g, RoundIndex last) const {
+  const auto samples_to = [this](std::size_t round) {
+    return static_cast<double>(cut_range(static_cast<RoundIndex>(round), spp_).s1);
+  };
+  const double there = g.sums.empty() ? 0 : samples_to(g.sums.size() - 1);
+  return g.pixels * std::max(0., samples_to(last) - there);
+}
+
 std::optional<double> AdaptiveStop::samples_left() const {
   if (!foreseen_) return std::nullopt;
   double samples = 0;
-  for (const Group& g : groups_) {
-    const double there =
-        g.sums.empty() ? 0
-                       : static_cast<double>(cut_range(static_cast<RoundIndex>(g.sums.size() - 1), spp_).s1);
-    const double wanted = static_cast<double>(cut_range(std::min(g.foreseen, last_), spp_).s1);
-    samples += g.pixels * std::max(0., wanted - there);
-  }
+  for (const Group& g : groups_) samples += samples_lacking(g, std::min(g.foreseen, last_));
+  return samples;
+}
+
+double AdaptiveStop::samples_to_limit() const {
+  double samples = 0;
+  for (const Group& g : groups_) samples += samples_lacking(g, last_);
   return samples;
 }
 

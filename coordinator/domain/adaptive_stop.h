@@ -86,6 +86,7 @@ class AdaptiveStop {
   RoundIndex foreseen(TileIndex tile) const;
   // Samples of all pixels that these still lack; nothing: not foreseen yet.
   std::optional<double> samples_left() const;
+  double samples_to_limit() const;  // that all pixels lack to the most there are
   std::uint64_t rounds_seen() const { return rounds_seen_; }  // of all groups
   std::size_t groups() const { return groups_.size(); }
 
@@ -99,6 +100,7 @@ class AdaptiveStop {
     bool settled = false;      // and it is this one, at this level
   };
   double variance(const Group& g, RoundIndex round) const;  // per sample, as told by rounds 0..round
+  double samples_lacking(const Group& g, RoundIndex last) const;  // of its pixels, with rounds up to this one
   double gain(const Group& g) const;                        // of one more round after `stop`
   double measured() const;  // relMSE with the last rounds, which must be known
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }

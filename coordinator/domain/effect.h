@@ -21,8 +21,8 @@ struct Send {
   ToWorker message;
 };
 
-// These units are no longer lent under this lease. Those that are still wanted wait for another worker (unless
-// another lease holds them too).
+// These units are no longer lent under this lease. Those that are still wanted wait for another worker
+// (unless another lease holds them too).
 struct UnitsFreed {
   JobId job;
   LeaseId lease;

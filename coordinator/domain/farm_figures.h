@@ -13,7 +13,7 @@ struct FarmFigures {
   // ---- leases ----
   std::uint64_t leases_granted = 0, units_lent = 0;
   std::uint64_t leases_now = 0, units_lent_now = 0;  // as it is now
-  std::map<FreedCause, std::uint64_t> units_freed;  // that a worker had and did not hand in
+  std::map<FreedCause, std::uint64_t> units_freed;   // that a worker had and did not hand in
   // ---- results ----
   std::uint64_t accepted = 0;
   std::uint64_t equal = 0;       // second results of a unit, with the bits of the first

@@ -93,10 +93,15 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
     return samples;
   };
   if (!job->ended()) {
-    const auto foreseen = job->steered() ? job->adaptive->samples_left() : std::nullopt;
+    const double planned = samples_of_last(f.units_total - f.units_done);
     f.core_seconds_left =
-        foreseen.value_or(samples_of_last(f.units_total - f.units_done)) * f.seconds_per_sample;
+        (job->steered() ? job->adaptive->samples_left().value_or(0) : planned) * f.seconds_per_sample;
+    f.core_seconds_to_limit = (job->steered() ? job->adaptive->samples_to_limit() : planned) * f.seconds_per_sample;
     f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
+  }
+  for (const auto& [index, leases] : job->load.leases_at) {
+    const Worker& w = *state_->workers.all().at(index);
+    f.threads += w.threads * static_cast<double>(leases) / static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
   }
   f.first_ray = job->first_ray;
   f.numeric_class = job->numeric_class;

@@ -120,7 +120,7 @@ struct Farm::State {
   void stop_at_level(Job& job);
   // Shortly before its time is up: the rounds that each tile ends with, from what units have cost so far.
   void plan_end(Job& job, TimePoint limit);
-  void give_back_beyond(Job& job);                        // units leased beyond the tiles' ends
+  void give_back_beyond(Job& job);  // units leased beyond the tiles' ends
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);  // under which it holds it
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 

@@ -144,7 +144,7 @@ Result<void> store(ArchiveReader& archive, const std::vector<BundleFile>& files,
     const bool is_file = (*entry)->kind == ArchiveEntry::Kind::file;
     if (is_file && next == files.size()) return fail(Errc::internal, "a bundle changed while it was read");
     std::unique_ptr<coordinator::BlobStore::Upload> upload;
-    if (is_file && !blobs.has(files[next].digest)) {
+    if (is_file && !blobs.prove(files[next].digest)) {
       auto begun = blobs.begin_upload(files[next].digest);
       if (!begun) return tl::unexpected(begun.error());
       upload = std::move(*begun);

@@ -45,7 +45,7 @@ class StoreSink final : public BodySink {
   std::uint64_t limit_, received_ = 0;
 };
 
-// The blob is there already: nothing is written, but a body that isn't it is still told so.
+// The blob is there already, undamaged: nothing is written, but a body that isn't it is still told so.
 class CompareSink final : public BodySink {
  public:
   CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
@@ -146,7 +146,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Requ
         400,
         "Content-Range must be 'bytes FIRST-LAST/SIZE', or 'bytes */SIZE' with an empty body when all "
         "was sent before");
-  if (blobs.has(digest)) return std::make_unique<IgnoreSink>(digest, range->bytes);
+  if (blobs.prove(digest)) return std::make_unique<IgnoreSink>(digest, range->bytes);
   const std::uint64_t there = blobs.received(digest);
   if (auto refused = over_limit(range->size, api.limits().blob_bytes)) return *refused;
   if (!range->possible)
@@ -172,7 +172,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
     return problem(415, "send the blob as it is: Content-Encoding is not decoded");
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
-  if (blobs.has(*digest)) {
+  if (blobs.prove(*digest)) {
     // One who waits for '100 Continue' has sent nothing yet and need not.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);

@@ -35,8 +35,9 @@ void BlobStream::open() {
   const auto digest = wire::digest_from(request_.digest(), "digest");
   if (!digest) return Finish(to_status(digest.error()));
   digest_ = *digest;
+  if (const auto right = blobs_.prove(digest_, request_.arrived_wrong()); !right) return refuse(right.error());
   const auto size = blobs_.size(digest_);
-  if (!size) return Finish(to_status(size.error()));
+  if (!size) return refuse(size.error());
   size_ = *size;
   offset_ = request_.offset();
   if (offset_ > size_)
@@ -49,12 +50,18 @@ void BlobStream::next() {
   if (offset_ == size_) return Finish(grpc::Status::OK);
   const auto bytes =
       blobs_.read(digest_, offset_, std::min<std::uint64_t>(limits::kBlobChunkBytes, size_ - offset_));
-  if (!bytes) return Finish(to_status(bytes.error()));
+  if (!bytes) return refuse(bytes.error());
   if (bytes->empty()) return Finish({grpc::StatusCode::INTERNAL, "the blob is shorter than its stated size"});
   offset_ += bytes->size();
   coordinator_.blob_sent(bytes->size());
   chunk_.set_data(bytes->data(), bytes->size());
   StartWrite(&chunk_);
+}
+
+// Told first, so that the jobs that need it wait before the worker gives its units back.
+void BlobStream::refuse(const Error& why) {
+  if (why.code == Errc::not_found || why.code == Errc::failed_precondition) coordinator_.blob_lacking(digest_, why);
+  Finish(to_status(why));
 }
 
 void BlobStream::OnWriteDone(bool ok) {

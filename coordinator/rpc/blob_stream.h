@@ -25,6 +25,7 @@ class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::B
  private:
   void open();
   void next();
+  void refuse(const Error& why);
 
   Coordinator& coordinator_;
   BlobStore& blobs_;

@@ -5,7 +5,7 @@
 
 namespace ls::coordinator::rpc {
 
-inline constexpr int kWorkStreams = 4096;  // workers connected at once
+inline constexpr int kWorkStreams = 16'384;  // workers connected at once, as many as the farm knows (kMaxWorkers)
 inline constexpr int kFetches = 512;  // blob transfers at once; a worker that finds none left tries again
 inline constexpr int kReadThreads = 64;  // that read blobs for them; most wait, where one must be fetched first
 inline constexpr std::size_t kQueuedMessages = 8192;  // to one worker that does not read; then it is cut off

@@ -21,6 +21,10 @@ Result<bool> CollectedBlobs::find(const Digest& digest) const {
   asked_for(digest);
   return inner_->find(digest);
 }
+Result<void> CollectedBlobs::prove(const Digest& digest, bool again) const {
+  asked_for(digest);
+  return inner_->prove(digest, again);
+}
 Result<std::uint64_t> CollectedBlobs::size(const Digest& digest) const {
   asked_for(digest);
   return inner_->size(digest);

@@ -2,33 +2,28 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <system_error>
 
+#include "common/base/log.h"
 #include "coordinator/limits.h"
 #include "coordinator/store/files.h"
 
 namespace ls::coordinator {
 namespace {
 
-Result<void> move_durably(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (auto made = make_folder(to.parent_path()); !made) return made;
-  if (::rename(from.c_str(), to.c_str()) != 0) return tl::unexpected(errno_error("rename to", to));
-  if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
-  return sync_folder(to.parent_path().parent_path());
-}
+std::filesystem::path damaged(std::filesystem::path path) { return path += ".damaged"; }
 
 class DiskUpload final : public BlobStore::Upload {
  public:
-  DiskUpload(Digest digest, File file, std::filesystem::path temporary, std::filesystem::path final_path)
+  DiskUpload(Digest digest, File file, std::filesystem::path temporary, UploadParts::Publish publish)
       : digest_(digest),
         file_(std::move(file)),
         temporary_(std::move(temporary)),
-        final_(std::move(final_path)) {}
+        publish_(std::move(publish)) {}
   ~DiskUpload() override {
     if (!temporary_.empty()) ::unlink(temporary_.c_str());
   }
@@ -62,12 +57,13 @@ class DiskUpload final : public BlobStore::Upload {
               "send it again",
               size_, got.hex(), digest_.hex()));
     if (::fsync(file_.fd()) != 0) return tl::unexpected(errno_error("sync", temporary_));
-    return move_durably(temporary_, final_);
+    return publish_(digest_, temporary_);
   }
 
   Digest digest_;
   File file_;
-  std::filesystem::path temporary_, final_;  // temporary_ is empty once the upload has ended
+  std::filesystem::path temporary_;  // empty once the upload has ended
+  UploadParts::Publish publish_;
   Sha256 hash_;
   std::uint64_t size_ = 0;
 };
@@ -86,7 +82,7 @@ Result<std::unique_ptr<DiskBlobs>> DiskBlobs::open(std::filesystem::path folder,
   auto parts =
       UploadParts::open(blobs->work_ / "unfinished",
                         [blobs = blobs.get()](const Digest& digest, const std::filesystem::path& whole) {
-                          return move_durably(whole, blobs->path(digest));
+                          return blobs->place(digest, whole);
                         });
   if (!parts) return tl::unexpected(parts.error());
   blobs->parts_ = std::move(*parts);
@@ -108,28 +104,88 @@ Result<bool> DiskBlobs::find(const Digest& digest) const {
   return fail(Errc::unavailable, error.message);
 }
 
-Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
-  struct stat info {};
-  if (::stat(path(digest).c_str(), &info) == 0) return static_cast<std::uint64_t>(info.st_size);
+Result<FileStamp> DiskBlobs::look_at(const Digest& digest) const {
+  if (const auto stamp = stamp_of(path(digest))) return *stamp;
   if (errno == ENOENT) return fail(Errc::not_found, fmt::format("there is no blob {}", digest.hex()));
   return tl::unexpected(errno_error("look at", path(digest)));
 }
 
+Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
+  const auto stamp = look_at(digest);
+  if (!stamp) return tl::unexpected(stamp.error());
+  return stamp->bytes;
+}
+
+// What is read whole is hashed every time; of a larger file, which is read in pieces, all of it before the first.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
-  const auto bytes = size(digest);
-  if (!bytes) return tl::unexpected(bytes.error());
-  if (offset > *bytes)
+  const auto seen = look_at(digest);
+  if (!seen) return tl::unexpected(seen.error());
+  if (offset > seen->bytes)
     return fail(Errc::invalid_argument,
-                fmt::format("blob {} has {} bytes; byte {} was asked for", digest.hex(), *bytes, offset));
+                fmt::format("blob {} has {} bytes; byte {} was asked for", digest.hex(), seen->bytes, offset));
+  const std::uint64_t n = std::min({length, seen->bytes - offset, limits::kMaxBlobRead});
+  const bool whole = n == seen->bytes;
+  if (!whole)
+    if (auto proven = prove(digest); !proven) return tl::unexpected(proven.error());
   auto file = File::open(path(digest), O_RDONLY);
   if (!file) return tl::unexpected(file.error());
-  const std::uint64_t n = std::min({length, *bytes - offset, limits::kMaxBlobRead});
-  return read_at(*file, offset, static_cast<std::size_t>(n), path(digest));
+  auto bytes = read_at(*file, offset, static_cast<std::size_t>(n), path(digest));
+  if (!bytes || !whole) return bytes;
+  if (const Digest got = sha256(*bytes); got != digest) return set_aside(digest, *seen, got);
+  proofs_.note(digest, *seen);
+  return bytes;
+}
+
+Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
+  const auto known = look_at(digest);
+  if (!known) return tl::unexpected(known.error());
+  if (!again && proofs_.proven(digest, *known)) return {};
+  const std::lock_guard lock(proving_);
+  // From before it is read: what changes meanwhile is read again.
+  const auto seen = look_at(digest);
+  if (!seen) return tl::unexpected(seen.error());
+  if (!again && proofs_.proven(digest, *seen)) return {};
+  const auto got = sha256_file(path(digest));
+  if (!got) return tl::unexpected(got.error());
+  if (*got != digest) return set_aside(digest, *seen, *got);
+  proofs_.note(digest, *seen);
+  return {};
+}
+
+tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const {
+  const auto from = path(digest), to = damaged(from);
+  const std::lock_guard lock(placing_);
+  if (stamp_of(from) != seen)
+    return fail(Errc::unavailable, fmt::format("{} changed while it was read; try again", from.string()));
+  proofs_.forget(digest);
+  const std::string what =
+      fmt::format("blob {} is damaged: the bytes in {} have the SHA-256 {}", digest.hex(), from.string(), got.hex());
+  if (::rename(from.c_str(), to.c_str()) != 0)
+    return fail(Errc::unavailable,
+                fmt::format("{}; {}; remove the file and upload it again", what, errno_error("move it aside to", to).message));
+  log_error("blob=" + digest.hex(), fmt::format("damaged, moved aside to {}; check this disk", to.string()));
+  return fail(Errc::failed_precondition,
+              fmt::format("{}; it is out of the way now ({}) and counts as missing: upload the file again, or hand in "
+                          "the same scene again with `lightshaft submit`",
+                          what, to.filename().string()));
+}
+
+Result<void> DiskBlobs::place(const Digest& digest, const std::filesystem::path& from) {
+  const auto to = path(digest);
+  if (auto made = make_folder(to.parent_path()); !made) return made;
+  {
+    const std::lock_guard lock(placing_);
+    if (::rename(from.c_str(), to.c_str()) != 0) return tl::unexpected(errno_error("rename to", to));
+    if (const auto stamp = stamp_of(to)) proofs_.note(digest, *stamp);
+    ::unlink(damaged(to).c_str());
+  }
+  if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
+  return sync_folder(to.parent_path().parent_path());
 }
 
 Result<void> DiskBlobs::put(const Digest& digest, std::span<const std::byte> bytes) {
-  if (has(digest)) return {};
+  if (prove(digest)) return {};
   auto upload = begin_upload(digest);
   if (!upload) return tl::unexpected(upload.error());
   if (auto done = (*upload)->append(bytes); !done) return done;
@@ -140,7 +196,9 @@ Result<std::unique_ptr<BlobStore::Upload>> DiskBlobs::begin_upload(const Digest&
   std::string name = (work_ / "tmp" / (digest.hex() + ".XXXXXX")).string();
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);
   if (fd < 0) return tl::unexpected(errno_error("make", name));
-  return std::make_unique<DiskUpload>(digest, File(fd), name, path(digest));
+  return std::make_unique<DiskUpload>(
+      digest, File(fd), name,
+      [this](const Digest& whole, const std::filesystem::path& from) { return place(whole, from); });
 }
 
 std::uint64_t DiskBlobs::received(const Digest& digest) const { return parts_->received(digest); }
@@ -167,6 +225,7 @@ Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
 }
 
 Result<void> DiskBlobs::remove(const Digest& digest) {
+  proofs_.forget(digest);
   if (::unlink(path(digest).c_str()) == 0 || errno == ENOENT) return {};
   return tl::unexpected(errno_error("remove", path(digest)));
 }

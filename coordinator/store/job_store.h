@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -61,6 +62,7 @@ struct StoredJob {
   JobTotals totals;
   // Workers that rendered wrong pixels, in records of earlier versions: now JobStore::barred().
   std::vector<WorkerId> distrusted;
+  std::set<Digest> awaited;    // blobs that are missing or damaged: it is paused until they are here again
   std::uint64_t revision = 0;  // number of the change, where a store counts them (Redis)
   std::uint64_t fence = 0;     // number of its owner, where several coordinators share a store
   bool damaged = false;  // its record can't be read: id, `failed` and `error` are all that is known

@@ -53,6 +53,7 @@ Result<std::unique_ptr<S3Blobs>> S3Blobs::open(const S3Options& options, std::fi
 void S3Blobs::note(const Digest& digest) const {
   const std::lock_guard lock(mutex_);
   there_.insert(digest);
+  damaged_.erase(digest);
 }
 
 Result<bool> S3Blobs::find(const Digest& digest) const {
@@ -60,29 +61,44 @@ Result<bool> S3Blobs::find(const Digest& digest) const {
     const std::lock_guard lock(mutex_);
     if (there_.contains(digest)) return true;
   }
-  const auto bytes = link_.size(key_of(digest));
-  if (bytes) {
+  const auto object = link_.look_at(key_of(digest));
+  if (object) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto known = damaged_.find(digest);
+      if (known != damaged_.end() && known->second == object->etag) return false;
+    }
     note(digest);
     return true;
   }
-  if (bytes.error().code == Errc::not_found) return false;
-  log_error("store=s3", bytes.error().message);
-  return fail(Errc::unavailable, bytes.error().message);
+  if (object.error().code == Errc::not_found) return false;
+  log_error("store=s3", object.error().message);
+  return fail(Errc::unavailable, object.error().message);
+}
+
+Result<void> S3Blobs::prove(const Digest& digest, bool again) const {
+  if (local_->has(digest))
+    if (auto proven = local_->prove(digest, again); proven || local_->has(digest)) return proven;
+  const auto there = find(digest);
+  if (!there) return tl::unexpected(there.error());
+  return *there ? Result<void>() : fail(Errc::not_found, fmt::format("there is no blob {}", digest.hex()));
 }
 
 Result<std::uint64_t> S3Blobs::size(const Digest& digest) const {
   if (local_->has(digest)) return local_->size(digest);
-  return link_.size(key_of(digest));
+  const auto object = link_.look_at(key_of(digest));
+  if (!object) return tl::unexpected(object.error());
+  return object->bytes;
 }
 
 Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t offset,
                                              std::uint64_t length) const {
-  // Between being fetched and being read it may have had to go for others.
+  // Between being fetched and being read it may have had to go for others; and a damaged copy is out of the way.
   for (int tries = 1;; ++tries) {
     if (!local_->has(digest))
       if (auto fetched = fetch(digest); !fetched) return tl::unexpected(fetched.error());
     auto bytes = local_->read(digest, offset, length);
-    if (!bytes && bytes.error().code == Errc::not_found && tries < kReadTries) continue;
+    if (!bytes && !local_->has(digest) && tries < kReadTries) continue;
     if (bytes) note_copy(digest);
     return bytes;
   }
@@ -126,12 +142,33 @@ Result<void> S3Blobs::fetch_now(const Digest& digest) const {
     return {};
   };
   const S3Link::Sink sink = [&](std::span<const std::byte> bytes) { return upload->append(bytes); };
-  if (auto got = link_.get(key_of(digest), restart, sink); !got) return got;
-  if (auto whole = upload->finish(); !whole)
-    return fail(Errc::internal, fmt::format("what {} has for blob {} is damaged: {}", link_.shown(),
-                                            digest.hex(), whole.error().message));
+  if (auto got = link_.get(key_of(digest), restart, sink); !got) {
+    if (got.error().code == Errc::not_found) note_lost(digest);
+    return got;
+  }
+  if (auto whole = upload->finish(); !whole) {
+    const bool damaged = whole.error().code == Errc::invalid_argument;
+    return tl::unexpected(damaged ? note_damaged(digest, whole.error()) : whole.error());
+  }
   note(digest);
   return {};
+}
+
+void S3Blobs::note_lost(const Digest& digest) const {
+  const std::lock_guard lock(mutex_);
+  there_.erase(digest);
+}
+
+// The object stays where it is: others may look at it, or put the right one in its place.
+Error S3Blobs::note_damaged(const Digest& digest, const Error& why) const {
+  const auto object = link_.look_at(key_of(digest));
+  const std::lock_guard lock(mutex_);
+  there_.erase(digest);
+  if (object) damaged_[digest] = object->etag;
+  return {Errc::failed_precondition,
+          fmt::format("what {} has for blob {} is damaged ({}) and counts as missing: upload the file again, or hand in "
+                      "the same scene again with `lightshaft submit`",
+                      link_.shown(), digest.hex(), why.message)};
 }
 
 Result<void> S3Blobs::send(const Digest& digest) {
@@ -144,7 +181,7 @@ Result<void> S3Blobs::send(const Digest& digest) {
 }
 
 Result<void> S3Blobs::put(const Digest& digest, std::span<const std::byte> bytes) {
-  if (has(digest)) return {};
+  if (prove(digest)) return {};
   if (auto kept = local_->put(digest, bytes); !kept) return kept;
   return send(digest);
 }

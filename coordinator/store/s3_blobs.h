@@ -1,6 +1,6 @@
 // Blobs in an S3-compatible store, so that they outlive this machine and others reach them: PREFIX/ab/<64 hex
 // digits>. A folder on this machine takes what arrives until it is whole and proven, and keeps what was read
-// (as much as S3Address::copies_bytes says): each object comes once, and its digest is checked. A blob counts as there when the store has it.
+// (as much as S3Address::copies_bytes says): each object comes once, and its digest is checked. A blob counts as there when the store has it, undamaged.
 #pragma once
 
 #include <condition_variable>
@@ -24,6 +24,8 @@ class S3Blobs final : public BlobStore {
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
   Result<void> answers() const override { return link_.answers(); }
+  // Of the copy here, which is fetched anew if it is damaged; what is not here is proven when it comes.
+  Result<void> prove(const Digest& digest, bool again = false) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                       std::uint64_t length) const override;
@@ -44,6 +46,8 @@ class S3Blobs final : public BlobStore {
   Result<void> fetch(const Digest& digest) const;
   Result<void> fetch_now(const Digest& digest) const;
   void note(const Digest& digest) const;
+  void note_lost(const Digest& digest) const;
+  Error note_damaged(const Digest& digest, const Error& why) const;
   // Used just now: others may have to go for it. What lies here and not there is no copy, and stays.
   void note_copy(const Digest& digest) const;
 
@@ -52,6 +56,8 @@ class S3Blobs final : public BlobStore {
   mutable LocalCopies copies_;
   mutable std::mutex mutex_;
   mutable std::set<Digest> there_;  // known to be in the store
+  // Damaged in the store, and what the store calls the object (ETag): it counts as missing until that changes.
+  mutable std::map<Digest, std::string> damaged_;
   struct Flight {
     std::condition_variable landed;
     std::optional<Result<void>> outcome;

@@ -221,12 +221,12 @@ Result<void> S3Link::answers() const {
   return {};
 }
 
-Result<std::uint64_t> S3Link::size(const std::string& key) const {
+Result<S3Link::Object> S3Link::look_at(const std::string& key) const {
   const Request request{.method = "HEAD", .key = key};
   const auto answer = ask(request);
   if (!answer) return tl::unexpected(answer.error());
   if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
-  return answer->length;
+  return Object{answer->length, answer->etag};
 }
 
 Result<void> S3Link::get(const std::string& key, const std::function<Result<void>()>& restart,

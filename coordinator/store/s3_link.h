@@ -49,8 +49,11 @@ class S3Link {
 
   // Whether it answers: one question, asked once, which ends within seconds.
   Result<void> answers() const;
-  // Bytes of an object; not_found.
-  Result<std::uint64_t> size(const std::string& key) const;
+  struct Object {
+    std::uint64_t bytes = 0;
+    std::string etag;  // another one after its bytes have changed
+  };
+  Result<Object> look_at(const std::string& key) const;  // not_found
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
   // All of it, in order. `restart` is called before the bytes come from the start again.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,

@@ -70,7 +70,7 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // The answer begins before the store is done: 200 may be followed by an error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
   // Asked again because an answer was lost: then it was done before, and its parts are known no longer.
-  if (const auto there = size(key); there && *there == bytes) return {};
+  if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));
 }
 

@@ -111,6 +111,8 @@ StoredJob stored_from(const json& j) {
   job.totals = totals_of(j.at("totals"));
   if (const auto distrusted = j.find("distrusted"); distrusted != j.end())
     for (const auto& worker : *distrusted) job.distrusted.push_back({worker.get<std::string>()});
+  if (const auto awaited = j.find("awaited"); awaited != j.end())
+    for (const auto& digest : *awaited) job.awaited.insert(digest_from(digest));
   job.revision = j.value("revision", std::uint64_t{0});
   job.fence = j.value("fence", std::uint64_t{0});
   return job;
@@ -143,6 +145,7 @@ std::string to_json(const StoredJob& job) {
          {"build", job.build},
          {"totals", to_value(job.totals)}};
   for (const WorkerId& worker : job.distrusted) j["distrusted"].push_back(worker.value);
+  for (const Digest& digest : job.awaited) j["awaited"].push_back(digest.hex());
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;
   // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.

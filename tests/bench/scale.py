@@ -90,13 +90,13 @@ def peak():
 
 
 def film():
-    """An UHD film: the coordinator's memory once every tile has a round, and once it has ten."""
+    """An UHD film: the coordinator's memory after as many results as make one to forty rounds of all tiles."""
     with LocalFarm() as farm:
         pid = farm.coordinator.popen.pid
         empty = memory(pid)[0]
         job = farm.submit(scene(3840, 2160), spp=60000)
         found = {"empty": empty}
-        for rounds in (1, 5, 10):
+        for rounds in (1, 5, 10, 20, 40):
             tiles = 120 * 68
             while (done := farm.job(job)["units_done"]) < rounds * tiles:  # some come twice, some are lost with their workers
                 drive(farm, 50, seconds=60, units=rounds * tiles - done + 500, warm_up=0)

@@ -6,7 +6,7 @@ changes the digest. What is random is drawn from the storm's seed.
 
 import os
 
-from chaos_kit import DELAY, SmallDisk, flip_bytes
+from chaos_kit import DELAY, SPEC, SmallDisk, flip_bytes
 from local_farm import SCENE, wait_until
 from storm_list import storm
 from weather import Skip
@@ -53,6 +53,20 @@ def a_workers_cache_damaged(s):
                 flip_bytes(file, s.dice)
         farm.count -= 1  # the same name and cache again
         farm.fast_worker()
+        yield farm
+
+
+@storm
+def a_blob_of_the_coordinator_damaged(s):
+    with s.farm() as farm:
+        farm.submit_storm()
+        for file in (farm.data / "blobs").glob("??/*"):
+            flip_bytes(file, s.dice)
+        farm.add_workers(3, "--fake-delay", DELAY)
+        view = wait_until(lambda: (v := farm.job(farm.storm_job))["state"] == "paused" and v["error"] and v, "the job waits for its scene")
+        assert "damaged" in view["error"], view["error"]
+        # The same scene again brings the same blob; this job of it is not looked at.
+        farm.submit(SCENE, **SPEC)
         yield farm
 
 

@@ -147,6 +147,13 @@ Coverage measure_coverage(const CoverageScene& scene, int count, int threads, st
   return out;
 }
 
+bool as_promised(const CoverageScene& scene, const Coverage& c) {
+  if (scene.fireflies) return c.heavy_tail >= .95;
+  const auto covered = [](double share) { return share >= .93 && share <= .97; };
+  const auto right = [](const Ratio& r) { return std::abs(r.value - 1) <= .03; };
+  return covered(c.rmse) && covered(c.relmse) && right(c.mse_ratio) && right(c.relmse_ratio);
+}
+
 std::string coverage_line(const CoverageScene& scene, const Coverage& c) {
   return fmt::format(
       "| {} | {:.0f} | {} | {:.2g} | {:.1f} % | {:.1f} % | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} | {:.1f} % |",

@@ -41,10 +41,28 @@ TEST_P(ShortCoverage, TheIntervalHoldsTheTrueErrorAndTheEstimateIsRightInTheMean
   EXPECT_LT(c.mse_ratio.sigma, .05);  // or the bounds would say nothing
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, ShortCoverage, ::testing::Values("surfaces, noisy", "media, noisy"),
+INSTANTIATE_TEST_SUITE_P(Scenes, ShortCoverage,
+                         ::testing::Values("surfaces, noisy", "media, noisy", "surfaces, smooth"),
                          [](const auto& info) {
-                           return std::string(info.index == 0 ? "Surfaces" : "Media");
+                           std::string name = info.param;
+                           std::erase_if(name, [](char c) { return c == ',' || c == ' '; });
+                           return name;
                          });
+
+// Jobs that stop at a target choose how long they go on by the very noise that they measure. Few jobs: it is the ratios
+// that would tell; of 40 shares four standard deviations are .14.
+TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
+  CoverageScene scene = scene_of("surfaces, smooth", 4096);
+  scene.target = 4e-4;
+  const Coverage c = measure_coverage(scene, 40, 2);
+  fmt::print("{}\n", coverage_line(scene, c));
+
+  EXPECT_GT(c.spp, 64) << "or no tile has chosen anything";
+  EXPECT_GE(c.relmse, kNominal - 4 * std::sqrt(.95 * .05 / 40) - .02);
+  EXPECT_NEAR(c.mse_ratio.value, 1, kRatio + 4 * c.mse_ratio.sigma);
+  EXPECT_NEAR(c.relmse_ratio.value, 1, kRatio + 4 * c.relmse_ratio.sigma);
+  EXPECT_LT(c.relmse_ratio.sigma, .05);
+}
 
 // Of 24 jobs that each say it with probability .95 or more, fewer than 19 do in one of 1,600 runs (binomial).
 TEST(ShortCoverage, FirefliesAreNotTrusted) {

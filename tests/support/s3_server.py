@@ -183,7 +183,7 @@ class Request(http.server.BaseHTTPRequestHandler):
     def s3_head(self, state, key, query, body):
         if key not in state.objects:
             return self.answer(404)
-        self.answer(200, state.objects[key])
+        self.answer(200, state.objects[key], ETag=self.etag(state.objects[key]))
 
     def s3_get(self, state, key, query, body):
         if not key:

@@ -83,9 +83,9 @@ void LinkRing::send(FromWorker message) {
 
 void LinkRing::close() { current().close(); }
 
-Result<void> LinkRing::fetch_blob(const Digest& digest, std::uint64_t offset,
+Result<void> LinkRing::fetch_blob(const BlobRequest& wanted,
                                   const std::function<Result<void>(std::span<const std::byte>)>& sink) {
-  return current().fetch_blob(digest, offset, sink);
+  return current().fetch_blob(wanted, sink);
 }
 
 }  // namespace ls::worker

@@ -37,6 +37,13 @@ tl::unexpected<Error> io_error(const char* what, const fs::path& path) {
   return fail(Errc::internal, fmt::format("{} {}: {}", what, path.string(), std::strerror(errno)));
 }
 
+// What the coordinator cannot give now, as it is missing there, damaged or refused to this worker, it may give later.
+Error passing(Error error) {
+  const bool says_so = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
+  if (!says_so) error.code = Errc::internal;
+  return error;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<BlobCache>> BlobCache::open(fs::path folder, std::uint64_t limit_bytes, Fetch fetch) {
@@ -57,18 +64,20 @@ BlobCache::BlobCache(fs::path folder, std::uint64_t limit_bytes, Fetch fetch)
 Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) {
   const std::lock_guard lock(mutex_);
   std::string reason;
+  bool arrived_wrong = false;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     auto file = open_verified(blob.digest);
     if (!file || *file) return file;
-    const auto fetched = download(blob);
+    const auto fetched = download(blob, arrived_wrong);
     reason = fetched ? "it was evicted by another worker" : fetched.error().message;
     if (!fetched && fetched.error().code != Errc::invalid_argument)
-      return tl::unexpected<Error>(fetched.error());
+      return tl::unexpected<Error>(passing(fetched.error()));
+    arrived_wrong = !fetched;
     if (!fetched) log_warn("blob=" + blob.digest.hex(), reason);
   }
   auto file = open_verified(blob.digest);
   if (!file || *file) return file;
-  return fail(Errc::invalid_argument,
+  return fail(Errc::internal,
               fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
 }
 
@@ -98,11 +107,11 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
   return file;
 }
 
-Result<void> BlobCache::download(const BlobRef& blob) {
+Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong) {
   verified_.erase(blob.digest);
   auto partial = PartialFile::open(folder_ / kPartialFolder / blob.digest.hex());
   if (!partial) return tl::unexpected<Error>(partial.error());
-  const auto received = receive(blob, *partial);
+  const auto received = receive(blob, arrived_wrong, *partial);
   // What came of a cut transfer is kept; anything else is not worth keeping.
   if (!received && received.error().code != Errc::unavailable) partial->discard();
   if (!received) return received;
@@ -112,9 +121,10 @@ Result<void> BlobCache::download(const BlobRef& blob) {
   return {};
 }
 
-Result<void> BlobCache::receive(const BlobRef& blob, PartialFile& partial) {
+Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial) {
   if (auto ok = make_room(std::max(blob.bytes, partial.size()), partial.path()); !ok) return ok;
-  return fetch_(blob.digest, partial.size(), [&](std::span<const std::byte> bytes) -> Result<void> {
+  const BlobRequest wanted{blob.digest, partial.size(), arrived_wrong};
+  return fetch_(wanted, [&](std::span<const std::byte> bytes) -> Result<void> {
     const std::uint64_t size = partial.size() + bytes.size();
     if (blob.bytes != 0 && size > blob.bytes)
       return fail(Errc::invalid_argument,

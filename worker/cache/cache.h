@@ -2,7 +2,8 @@
 //
 // A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone
 // on with. A file that no longer has its digest (bad disk, meddling) is found when it is first used by this
-// process, thrown away and fetched again. Above the limit, which counts what is on its way too, the least
+// process, thrown away and fetched again. One that arrives wrong is complained of, and tried again: no error of a
+// transfer is ever the job's fault. Above the limit, which counts what is on its way too, the least
 // recently used go first, never one in use: the file is held by a shared flock while a BlobFile lives, also
 // against other workers that use the same folder. Only files of the cache's own names at their own places are
 // ever removed; CACHEDIR.TAG tells backups to pass by.
@@ -18,6 +19,7 @@
 
 #include "common/base/error.h"
 #include "worker/agent/blob_files.h"
+#include "worker/link.h"
 
 namespace ls::worker {
 
@@ -26,8 +28,7 @@ class PartialFile;
 class BlobCache final : public BlobFiles {
  public:
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  // Streams a blob from an offset into the sink; see CoordinatorLink::fetch_blob.
-  using Fetch = std::function<Result<void>(const Digest&, std::uint64_t offset, const Sink& sink)>;
+  using Fetch = std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
 
   // limit_bytes 0: none. Makes the folder.
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
@@ -39,8 +40,9 @@ class BlobCache final : public BlobFiles {
  private:
   BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
   Result<std::shared_ptr<const BlobFile>> open_verified(const Digest& digest);
-  Result<void> download(const BlobRef& blob);
-  Result<void> receive(const BlobRef& blob, PartialFile& partial);
+  // `arrived_wrong`: of the blob, before.
+  Result<void> download(const BlobRef& blob, bool arrived_wrong);
+  Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
   // Until `bytes` fit beside everything but the file `but`.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 

@@ -83,7 +83,7 @@ class GrpcLink final : public CoordinatorLink {
     if (call) call->close(kCloseLimit);
   }
 
-  Result<void> fetch_blob(const Digest& digest, std::uint64_t offset,
+  Result<void> fetch_blob(const BlobRequest& wanted,
                           const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
     grpc::ClientContext context;
     {
@@ -92,8 +92,9 @@ class GrpcLink final : public CoordinatorLink {
       fetches_.insert(&context);
     }
     pb::FetchBlobRequest request;
-    request.set_digest(wire::digest_bytes(digest));
-    request.set_offset(offset);
+    request.set_digest(wire::digest_bytes(wanted.digest));
+    request.set_offset(wanted.offset);
+    request.set_arrived_wrong(wanted.arrived_wrong);
     request.set_join_token(join_token_);
     auto reader = stub_->FetchBlob(&context, request);
     pb::BlobChunk chunk;

@@ -115,16 +115,18 @@ class PathTracer {
     beta_ *= f.weight;
     if constexpr (F.chromatic) density_ *= f.density;
   }
-  // What a point at this distance from a surface along the ray lacks of the offset that keeps it clear of it.
-  V3 clear_of(const V3& offset, float distance) const {
-    const float share = distance * std::abs(dot(offset, d_)) / dot(offset, offset);
+  // What a point that lies so from a point of a surface lacks of the offset that keeps it clear of it. Beyond the
+  // surface it lacks more than all of it: a line that is nearly parallel to a curved surface leaves it before the line
+  // from the moved start does, along which the way was measured.
+  static V3 clear_of(const V3& offset, const V3& from_surface) {
+    const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
   // Where a ray is sent from that is scattered at t of a segment: as far from the surfaces at both ends as
   // rays that leave them. Rounding must not put it on the other side, where the medium has no end.
   V3 clear_of_ends(V3 p, Segment s, float t) const {
-    if (s.lead > 0) p += clear_of(o_ - start_, t);
-    const V3 from_end = s.end ? clear_of(offset_point(*s.end, -d_) - s.end->p, s.length - t) : V3(0);
+    const V3 from_end = s.end ? clear_of(offset_point(*s.end, -d_) - s.end->p, p - s.end->p) : V3(0);
+    if (s.lead > 0) p += clear_of(o_ - start_, d_ * t);
     p += from_end;
     if (s.lead < 0 && !(dot(from_end, from_end) > 0)) [[unlikely]]
       p += back_off(t);

@@ -34,7 +34,7 @@ class FetchedFiles final : public BlobFiles {
       std::filesystem::path file = "blob";
     };
     const auto ok =
-        link_.fetch_blob(blob.digest, 0, [](std::span<const std::byte>) { return Result<void>{}; });
+        link_.fetch_blob({blob.digest}, [](std::span<const std::byte>) { return Result<void>{}; });
     if (!ok) return tl::unexpected<Error>(ok.error());
     return std::make_shared<const File>();
   }

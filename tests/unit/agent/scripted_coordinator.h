@@ -110,7 +110,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   void close() override {
     change([&] { observer_.reset(); });
   }
-  Result<void> fetch_blob(const Digest& digest, std::uint64_t offset,
+  Result<void> fetch_blob(const BlobRequest& wanted,
                           const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
     std::string text;
     {
@@ -118,9 +118,9 @@ class ScriptedCoordinator final : public CoordinatorLink {
       ++fetches;
       if (std::exchange(cut_fetch_, false)) return fail(Errc::unavailable, "cut");
       if (fetch_error_) return tl::unexpected<Error>(*fetch_error_);
-      const auto it = blobs_.find(digest);
+      const auto it = blobs_.find(wanted.digest);
       if (it == blobs_.end()) return fail(Errc::not_found, "no such blob");
-      text = it->second.substr(offset);
+      text = it->second.substr(wanted.offset);
     }
     return sink(std::as_bytes(std::span(text)));
   }

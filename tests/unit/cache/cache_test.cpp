@@ -26,8 +26,10 @@ std::string content(const fs::path& path) {
 struct Source {
   std::map<Digest, std::string> blobs;
   std::vector<std::uint64_t> offsets;      // of each fetch
+  std::vector<bool> complaints;            // whether it said that the last one had brought other bytes
   std::optional<std::uint64_t> cut_after;  // bytes, once
   std::optional<std::string> lie;          // sent instead, once
+  bool damaged = false;                    // other bytes every time
   std::function<void()> meanwhile;         // before the first byte, once
 
   BlobRef add(const std::string& text) {
@@ -35,11 +37,14 @@ struct Source {
     blobs[digest] = text;
     return {digest, text.size(), "blob"};
   }
-  Result<void> fetch(const Digest& digest, std::uint64_t offset, const BlobCache::Sink& sink) {
+  Result<void> fetch(const BlobRequest& wanted, const BlobCache::Sink& sink) {
+    const auto& [digest, offset, arrived_wrong] = wanted;
     offsets.push_back(offset);
+    complaints.push_back(arrived_wrong);
     if (const auto happens = std::exchange(meanwhile, {})) happens();
     if (!blobs.contains(digest)) return fail(Errc::not_found, "no such blob");
-    const std::string text = lie ? *std::exchange(lie, {}) : blobs[digest];
+    std::string text = lie ? *std::exchange(lie, {}) : blobs[digest];
+    if (damaged) text[0] ^= 1;
     for (std::uint64_t at = offset; at < text.size(); at += 7) {
       if (cut_after && at - offset >= *cut_after) {
         cut_after.reset();
@@ -61,8 +66,8 @@ class Cache : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
   std::unique_ptr<BlobCache> open(std::uint64_t limit = 0) {
     auto cache =
-        BlobCache::open(folder_, limit, [this](const Digest& d, std::uint64_t o, const BlobCache::Sink& s) {
-          return source_.fetch(d, o, s);
+        BlobCache::open(folder_, limit, [this](const BlobRequest& wanted, const BlobCache::Sink& sink) {
+          return source_.fetch(wanted, sink);
         });
     return std::move(cache.value());
   }
@@ -97,6 +102,17 @@ TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
   source_.lie = "wrong";
 
   EXPECT_EQ(content(open()->acquire(blob).value()->path()), "right");
+  EXPECT_THAT(source_.complaints, testing::ElementsAre(false, true)) << "so that the coordinator looks at its own";
+}
+
+TEST_F(Cache, WhatKeepsArrivingWrongIsTroubleThatMayPassAndNotTheJobsFault) {
+  const BlobRef blob = source_.add("right");
+  source_.damaged = true;
+
+  const auto file = open()->acquire(blob);
+
+  EXPECT_EQ(file.error().code, Errc::internal);
+  EXPECT_THAT(file.error().message, testing::HasSubstr("arrived wrong 3 times"));
 }
 
 TEST_F(Cache, StopsATransferThatIsLongerThanAnnounced) {
@@ -240,8 +256,11 @@ TEST_F(Cache, KeepsTheFileInUseWhenTwoWorkersFetchTheSameAtOnce) {
   EXPECT_EQ(content(in_use->path()), "aaaaaaaaaa");
 }
 
-TEST_F(Cache, SaysThatABlobIsUnknown) {
-  EXPECT_EQ(open()->acquire({sha256(std::string_view("?")), 1, "x"}).error().code, Errc::not_found);
+TEST_F(Cache, ABlobThatTheCoordinatorLacksIsTroubleThatMayPassAndNotTheJobsFault) {
+  const auto file = open()->acquire({sha256(std::string_view("?")), 1, "x"});
+
+  EXPECT_EQ(file.error().code, Errc::internal);
+  EXPECT_THAT(file.error().message, testing::HasSubstr("no such blob"));
   EXPECT_TRUE(fs::is_empty(folder_ / "partial"));
 }
 

@@ -95,18 +95,18 @@ TEST_F(LocalLinkTest, FetchesBlobsFromAnOffset) {
   std::size_t got = 0;
 
   const auto fetched =
-      link.fetch_blob(sha256(text), 5, [&](std::span<const std::byte> bytes) -> Result<void> {
+      link.fetch_blob({sha256(text), 5}, [&](std::span<const std::byte> bytes) -> Result<void> {
         got += bytes.size();
         return {};
       });
 
   EXPECT_TRUE(fetched);
   EXPECT_EQ(got, text.size() - 5);
-  EXPECT_EQ(link.fetch_blob(sha256(text), 0, [](auto) { return fail(Errc::resource_exhausted, "full"); })
+  EXPECT_EQ(link.fetch_blob({sha256(text)}, [](auto) { return fail(Errc::resource_exhausted, "full"); })
                 .error()
                 .message,
             "full");
-  EXPECT_FALSE(link.fetch_blob(sha256("absent"), 0, [](auto) -> Result<void> { return {}; }));
+  EXPECT_FALSE(link.fetch_blob({sha256("absent")}, [](auto) -> Result<void> { return {}; }));
 }
 
 }  // namespace

@@ -192,6 +192,18 @@ TEST(Figures, TellWhatTheQueueWillCost) {
   EXPECT_NEAR(f.core_seconds_left, 9, 1e-9);
   EXPECT_NEAR(f.core_seconds_queued, static_cast<double>(f.units_queued), 1e-9);
   EXPECT_LT(f.units_queued, 9u) << "the worker holds some";
+  EXPECT_EQ(f.core_seconds_to_limit, f.core_seconds_left) << "no target ends it sooner";
+}
+
+TEST(Figures, TellWhoseThreadsWorkOnAJob) {
+  Rig rig;
+  rig.join("w", 4);
+  rig.submit(plan_of("j", 1000, 2));
+  EXPECT_EQ(rig.job().threads, 4);
+  rig.join("v", 2);
+  EXPECT_EQ(rig.job().threads, 6);
+  rig.lose("v");
+  EXPECT_EQ(rig.job().threads, 4);
 }
 
 }  // namespace

@@ -57,6 +57,22 @@ TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
   EXPECT_LT(e.standard_error[0], .02);
 }
 
+// A ray that enters a ball at so flat an angle that the line from its moved start leaves it farther on than the true
+// one does: a vertex between the two ends stands outside. Rays that are sent on from there must meet the ball; one
+// that does not has a medium without end ahead of it, which here gives off light: infinitely much.
+TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
+  SceneKit kit({32, 32});
+  const MediumIndex m =
+      kit.heterogeneous(kit.grid({7, 7, 7}, std::vector<float>(7 * 7 * 7, .5f), translate({-1, -1, -1}) * test::scale(2)),
+                        Rgb{.5, .5, .5}, 100);
+  kit.glow(m, {1, 1, 1});
+  kit.container(SphereShape{}, {}, kit.null(), m);
+  constexpr double kFromEdge = 1e-3;
+  kit.look({kFromEdge - 1, -5, 0}, {kFromEdge - 1, 0, 0}, 2 * kFromEdge);
+  const auto e = test::estimate(kit, 2048);
+  EXPECT_EQ(e.health.nonfinite, 0u);
+}
+
 // More null sheets than a ray may cross between a floor and its sun: a column over the little that the camera
 // sees of the floor, so that most paths leave the scene beside it after their shadow ray was cut off.
 TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {

@@ -99,6 +99,29 @@ TEST(Adaptive, EachTileSaysItsOwnErrorAndTheirMeanIsTheImages) {
   EXPECT_EQ(tiles[0]["relmse"], *coordinator->tiles(job)->front().relmse);
 }
 
+TEST(Adaptive, TimeLeftHasAnIntervalFromTheFirstCheckpointToTheTarget) {
+  auto coordinator = open_at({});
+  const JobId job = submit(*coordinator, spec_with(kTarget));
+  FakeFarm farm(*coordinator, 2);
+  int with = 0, without = 0;
+  farm.tamper = [&](UnitResult r) {
+    const JobView v = *coordinator->job(job);
+    if (v.state == JobState::running && v.error_now && v.error_now->relmse > kTarget && v.eta_seconds) {
+      ++(v.eta_ci95 ? with : without);
+      if (v.eta_ci95) {
+        EXPECT_LE(v.eta_ci95->first, *v.eta_seconds);
+        EXPECT_GE(v.eta_ci95->second, *v.eta_seconds);
+        EXPECT_LT(v.eta_with_more.value(), *v.eta_seconds + 1e-12);
+        EXPECT_TRUE(v.eta_with_more_ci95);
+      }
+    }
+    return std::vector<UnitResult>{std::move(r)};
+  };
+  ASSERT_TRUE(farm.finish(job));
+  EXPECT_GT(with, 50);
+  EXPECT_EQ(without, 0);
+}
+
 TEST(Adaptive, ShuffledDuplicatedAndLostResultsGiveTheSamePixels) {
   const Outcome expected = at_once(spec_with(kTarget));
   for (unsigned seed = 1; seed <= 4; ++seed) {

@@ -102,14 +102,21 @@ TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
   EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(16));
 }
 
-TEST_F(Shared, AFileThatIsNotThereIsStillToldAtOnce) {
+TEST_F(Shared, AFileThatIsNotThereIsToldAtOnceAndWaitedFor) {
   StoredJob job = foreign();
-  job.assets.push_back({sha256("nowhere"), 3, "fog.vol"});
+  job.assets.push_back({sha256("fog"), 3, "fog.vol"});
   inherit(job);
 
   ASSERT_TRUE(eventually([&] { return coordinator->job(job.id).has_value(); }));
-  EXPECT_EQ(coordinator->job(job.id)->state, JobState::failed);
+  EXPECT_EQ(coordinator->job(job.id)->state, JobState::paused);
   EXPECT_THAT(coordinator->job(job.id)->error, testing::HasSubstr("fog.vol"));
+
+  ASSERT_TRUE(blobs->put(sha256("fog"), std::as_bytes(std::span("fog", 3))));
+  EXPECT_TRUE(eventually([&] {
+    clock->advance(std::chrono::seconds(1));
+    coordinator->tick();
+    return coordinator->job(job.id)->state != JobState::paused;
+  }));
 }
 
 // What lies here of a job is from when this coordinator had it before; it may be of another numeric class, too.

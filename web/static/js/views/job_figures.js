@@ -21,11 +21,13 @@ export function figures(job) {
     fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
 }
 
+const between = (interval) => (Array.isArray(interval) ? ` (${duration(interval[0])} to ${duration(interval[1])})` : "");
+
 /** What the forecast leaves open, and what more workers would do. */
 function timeNotes(job) {
   return [
     job.eta_ci95 ? `95 %: ${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : `${duration(job.elapsed_seconds)} so far`,
-    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}` : null];
+    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}${between(job.eta_with_8_more_ci95)}` : null];
 }
 
 const trueFigures = ({ relmse, rmse, flip }) => [

@@ -4,8 +4,8 @@ import { duration, percent } from "../format.js";
 
 const kParts = ["load", "build", "render", "transfer", "merge", "idle"];
 const kMeanings = {
-  load: "reading what the scene names", build: "making it ready to trace", render: "tracing", transfer: "on the network",
-  merge: "folding and measuring, in the coordinator", idle: "lent threads without work",
+  load: "fetching and reading what the scene names", build: "making it ready to trace", render: "tracing", transfer: "packing results to be sent",
+  merge: "folding and measuring, in the coordinator", idle: "threads between two units of the job",
 };
 
 export function timeSplit(job) {

@@ -1,0 +1,56 @@
+#include "coordinator/outlook.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ls::coordinator {
+namespace {
+
+struct CoreSeconds {
+  double to_end = 0;
+  std::optional<std::pair<double, double>> ci95;
+};
+
+// Nothing: not known yet.
+std::optional<CoreSeconds> core_seconds_left(const OutlookFacts& facts, std::span<const ErrorPoint> points,
+                                             Outlook& out) {
+  const auto known = [](double core) { return core > 0 ? std::optional(CoreSeconds{core, {}}) : std::nullopt; };
+  const auto forecast = facts.target && !points.empty() ? forecast_of(points, *facts.target) : std::nullopt;
+  if (!forecast) return known(facts.core_left);
+  const ErrorPoint& last = points.back();
+  const double more = std::max(0.0, forecast->spp - last.spp);
+  if (last.spp > 0) out.progress = std::max(out.progress, last.spp / (last.spp + more));
+  const double spent = std::max(0.0, facts.core_seconds - last.core_seconds);
+  const double limit = facts.core_to_limit > 0 ? facts.core_to_limit : std::numeric_limits<double>::infinity();
+  if (forecast->core_seconds - spent >= limit) return known(limit);
+  const auto from_now = [&](double core) { return std::clamp(core - spent, 0.0, limit); };
+  return CoreSeconds{from_now(forecast->core_seconds),
+                     {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
+}
+
+}  // namespace
+
+Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points) {
+  Outlook out;
+  out.progress = facts.done;
+  const auto core = core_seconds_left(facts, points, out);
+  if (facts.threads > 0 && core) {
+    const auto on = [&](double threads) {
+      return core->ci95 ? std::optional(std::pair(core->ci95->first / threads, core->ci95->second / threads)) : std::nullopt;
+    };
+    out.seconds = core->to_end / facts.threads;
+    out.ci95 = on(facts.threads);
+    if (facts.threads_with_more > facts.threads) {
+      out.with_more = core->to_end / facts.threads_with_more;
+      out.with_more_ci95 = on(facts.threads_with_more);
+    }
+  }
+  if (!facts.time) return out;
+  out.progress = std::max(out.progress, std::min(1.0, facts.elapsed / *facts.time));
+  const double left = std::max(0.0, *facts.time - facts.elapsed);
+  if (!out.seconds || left < *out.seconds) return {out.progress, left, {}, {}, {}};
+  return out;
+}
+
+}  // namespace ls::coordinator

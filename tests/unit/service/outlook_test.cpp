@@ -1,0 +1,103 @@
+// When a job will be done: which end comes first, and what is known of it.
+#include "coordinator/outlook.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace ls::coordinator {
+namespace {
+
+// relMSE 1 / spp, .01 core seconds a sample: 1e-3 is down to after 10 core seconds.
+std::vector<ErrorPoint> points(double last) {
+  std::vector<ErrorPoint> all;
+  for (double n = 2; n <= last; n *= 2) all.push_back({n, n / 100, 1 / n, .95 / n, 1.05 / n});
+  return all;
+}
+
+// At 256 samples: 2.56 core seconds spent, 7.44 to the target, about 30 to the end of the samples.
+OutlookFacts facts() {
+  OutlookFacts f;
+  f.done = 256. / 3300;
+  f.core_seconds = 2.56;
+  f.core_left = 1;  // a steered job's own foresight
+  f.core_to_limit = 30;
+  f.target = 1e-3;
+  f.elapsed = 2;
+  f.threads = 2;
+  return f;
+}
+
+TEST(Outlook, OfATargetIsItsForecastWithAnIntervalWhateverTheJobForesees) {
+  const auto forecast = forecast_of(points(256), 1e-3);
+  ASSERT_TRUE(forecast);
+  const Outlook out = outlook_of(facts(), points(256));
+  ASSERT_TRUE(out.seconds && out.ci95);
+  EXPECT_DOUBLE_EQ(*out.seconds, forecast->core_seconds / 2);
+  EXPECT_DOUBLE_EQ(out.ci95->first, forecast->core_seconds_lo / 2);
+  EXPECT_DOUBLE_EQ(out.ci95->second, forecast->core_seconds_hi / 2);
+  EXPECT_NEAR(*out.seconds, 7.44 / 2, 1) << "about what the points say";
+  EXPECT_LT(out.ci95->first, *out.seconds);
+  EXPECT_GT(out.ci95->second, *out.seconds);
+  EXPECT_DOUBLE_EQ(out.progress, 256 / forecast->spp);
+}
+
+TEST(Outlook, TakesOffWhatWasSpentSinceTheLastPoint) {
+  OutlookFacts later = facts();
+  later.core_seconds += 2;
+  const Outlook before = outlook_of(facts(), points(256)), after = outlook_of(later, points(256));
+  EXPECT_DOUBLE_EQ(*after.seconds, *before.seconds - 1);
+  EXPECT_DOUBLE_EQ(after.ci95->second, before.ci95->second - 1);
+  later.core_seconds += 1000;
+  EXPECT_EQ(outlook_of(later, points(256)).seconds, 0);
+}
+
+TEST(Outlook, EndsWithTheSamplesWhereTheTargetIsFarther) {
+  OutlookFacts f = facts();
+  f.core_left = f.core_to_limit = 3;
+  const Outlook out = outlook_of(f, points(256));
+  EXPECT_EQ(out.seconds, 1.5);
+  EXPECT_FALSE(out.ci95) << "of the samples the count is known";
+  const auto forecast = forecast_of(points(256), 1e-3);
+  f.core_to_limit = (forecast->core_seconds + forecast->core_seconds_hi) / 2;
+  EXPECT_DOUBLE_EQ(outlook_of(f, points(256)).ci95->second, f.core_to_limit / 2);
+}
+
+TEST(Outlook, IsTheJobsOwnForesightUntilThereArePoints) {
+  const Outlook out = outlook_of(facts(), {});
+  EXPECT_EQ(out.seconds, .5);
+  EXPECT_FALSE(out.ci95);
+  EXPECT_DOUBLE_EQ(out.progress, facts().done);
+}
+
+TEST(Outlook, IsNothingWhereNothingIsMeasuredOrNobodyWorks) {
+  OutlookFacts f = facts();
+  f.threads = 0;
+  EXPECT_FALSE(outlook_of(f, points(256)).seconds);
+  EXPECT_FALSE(outlook_of({}, {}).seconds);
+}
+
+TEST(Outlook, OfTheClockNeedsNoForecast) {
+  OutlookFacts f = facts();
+  f.time = 2.5;
+  f.threads_with_more = 10;
+  const Outlook out = outlook_of(f, points(256));
+  EXPECT_EQ(out.seconds, .5);
+  EXPECT_FALSE(out.ci95);
+  EXPECT_FALSE(out.with_more) << "more workers do not turn the clock";
+  EXPECT_DOUBLE_EQ(out.progress, 2 / 2.5);
+  f.time = 100;
+  EXPECT_TRUE(outlook_of(f, points(256)).ci95) << "the target comes first";
+}
+
+TEST(Outlook, WithMoreWorkersIsShorterInProportion) {
+  OutlookFacts f = facts();
+  EXPECT_FALSE(outlook_of(f, points(256)).with_more) << "they would not help";
+  f.threads_with_more = 10;
+  const Outlook out = outlook_of(f, points(256));
+  EXPECT_DOUBLE_EQ(*out.with_more, *out.seconds / 5);
+  EXPECT_DOUBLE_EQ(out.with_more_ci95->second, out.ci95->second / 5);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
