@@ -122,7 +122,7 @@ def error_by_scale(cases, file):
 
 
 def fluence(cases, file):
-    plot = Plot("The light of a lamp in an endless medium of albedo c (lines: exact)", "mean free paths from the lamp", "mean radiance", (.2, 6), (1e-8, 1))
+    plot = Plot("The light of a glowing ball in an endless medium of albedo c (lines: exact)", "mean free paths from its middle", "mean radiance", (.1, 100), (1e-6, 1))
     albedos = {}
     for case in cases:
         found = re.match(r"7\.6e-fluence-c([\d.]+)-r([\d.]+)/", case["name"])
