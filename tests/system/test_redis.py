@@ -100,7 +100,7 @@ def test_a_lost_image_is_rendered_again_to_the_same_bits(redis, redis_farm, expe
     assert redis_farm.pixels(job) == expected
 
 
-def test_a_job_whose_files_are_lost_says_which(redis, redis_farm):
+def test_a_job_whose_files_are_lost_says_which_and_goes_on_when_they_are_sent_again(redis, redis_farm, expected):
     job = redis_farm.submit(SCENE, spp=64, seed=3)
     told(redis_farm)
 
@@ -109,8 +109,11 @@ def test_a_job_whose_files_are_lost_says_which(redis, redis_farm):
     redis_farm.start_coordinator()
 
     view = redis_farm.job(job)
-    assert view["state"] == "failed"
-    assert "blobs" in view["error"] and "send the job again" in view["error"]
+    assert view["state"] == "paused"
+    assert "it waits for its" in view["error"] and "scene.xml" in view["error"]
+    redis_farm.submit(SCENE, spp=2)
+    redis_farm.add_worker()
+    assert redis_farm.pixels(job) == expected
 
 
 def test_a_removed_job_stays_removed(redis, redis_farm):
