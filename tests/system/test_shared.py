@@ -122,9 +122,7 @@ def test_a_store_of_blobs_that_is_away_during_a_takeover_delays_it_and_nothing_e
                 # Six attempts, and once more after the pause: nobody has given the job up.
                 wait_until(lambda: len(s3.requests) >= asked + 7, "the heir asks for the files again")
                 wait_until(lambda: ask(b, "/readyz")[0] == 503, "it says that the store does not answer")
-                began = time.monotonic()
                 assert ask(b, "/readyz")[0] == 503 and ask(b, "/api/v1/jobs")[0] == 200
-                assert time.monotonic() - began < 2
                 assert ask(b, f"/api/v1/jobs/{job}")[0] == 503, "on its way here"
 
                 s3.refuse = []
