@@ -61,10 +61,10 @@ def write_fog(folder, n=12):
     return folder / "fog.xml"
 
 
-def lightshaft(*arguments, cwd=None, env=None, code=0):
-    """Runs the command; it must return `code`."""
+def lightshaft(*arguments, cwd=None, env=None, code=0, patience=PATIENCE):
+    """Runs the command; it must return `code`, and come back before `patience` (seconds) is over."""
     done = subprocess.run([str(bin_dir() / "lightshaft"), *map(str, arguments)], cwd=cwd, env=env, text=True,
-                          capture_output=True, timeout=PATIENCE)
+                          capture_output=True, timeout=patience)
     assert done.returncode == code, f"exit code {done.returncode}, not {code}\n{done.stdout}\n{done.stderr}"
     return done
 
