@@ -29,14 +29,14 @@ double endless_fluence(double albedo, double distance, double radius) {
   const double pole = 2 * k * k * (1 - k * k) / (albedo * (albedo - 1 + k * k)) * std::exp(-k * distance) *
                       of_ball(k * radius);
   // Over k > 1 along the cut, k = 1 + e^u: the integrand falls like e^u below and like e^(-k (r - a)) above.
-  constexpr double kLeast = -40, kDecades = 60;
+  constexpr double kLeast = -40, kMostExponent = 60;
   const auto cut = [&](double u) {
     const double above = std::exp(u), rate = 1 + above;
     const double real = 1 - albedo * (std::log(2 + above) - u) / (2 * rate),
                  imaginary = albedo * kPi / (2 * rate);
     return above * std::exp(-rate * distance) * of_ball(rate * radius) / (real * real + imaginary * imaginary);
   };
-  const double rest = integrate(cut, kLeast, std::log(kDecades / (distance - radius)), 4000);
+  const double rest = integrate(cut, kLeast, std::log(kMostExponent / (distance - radius)), 4000);
   return (pole + rest) / (4 * kPi * distance);
 }
 

@@ -90,8 +90,8 @@ SceneKit endless(double albedo, double r, MediumIndex* medium) {
 }
 
 // The fluence of a ball of 1 W and half the distance for its radius; what a camera of all directions shows is
-// that over 4 pi. A ball, because estimates of a point's light have no variance: towards the point radiance grows
-// like the inverse of the angle to it. At albedo .999 paths are a thousand segments long: a wider band.
+// that over 4 pi. A ball, because estimates of a point's light have no finite variance: towards the point radiance
+// grows like the inverse of the angle to it. At albedo .999 paths are a thousand segments long: a wider band.
 void endless_medium(Table& t) {
   for (const double c : {.3, .5, .8, .9, .99, .999}) {
     for (const double r : {.25, 1., 2., 5.}) {

@@ -2,10 +2,9 @@
 it is mended), or loudly (connections are reset, new ones are ended at once)."""
 
 import socket
-import struct
 import threading
 
-RESET_ON_CLOSE = struct.pack("ii", 1, 0)
+from breaking_proxy import RESET_ON_CLOSE
 
 
 class CutLine:

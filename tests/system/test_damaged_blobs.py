@@ -4,12 +4,12 @@ import hashlib
 import json
 import os
 import random
-import struct
 import subprocess
 import sys
 
 import farm_rpc
 import pytest
+import steam
 from local_farm import ROOT, HttpError, LocalFarm, bin_dir, wait_until
 from s3_server import ENVIRONMENT, S3Server
 
@@ -17,27 +17,12 @@ sys.path.insert(0, str(ROOT / "tests" / "chaos"))
 
 from chaos_kit import flip_bytes  # noqa: E402
 
-SCENE = """<scene version="3.0.0">
-  <integrator type="volpath"/>
-  <sensor type="perspective">
-    <sampler type="independent"><integer name="sample_count" value="4"/></sampler>
-    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film>
-  </sensor>
-  <shape type="cube">
-    <bsdf type="null"/>
-    <medium type="heterogeneous" name="interior">
-      <volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vol"/></volume>
-    </medium>
-  </shape>
-  <emitter type="constant"/>
-</scene>
-"""
+SCENE = steam.scene(samples=4)
 SIDE = 48  # 442 kB of grid: read by the coordinator in two pieces
 
 
 def grid():
-    return (b"VOL\x03" + struct.pack("<iiiii6f", 1, SIDE, SIDE, SIDE, 1, 0, 0, 0, 1, 1, 1) +
-            struct.pack(f"<{SIDE ** 3}f", *((i * 2654435761 >> 7) % 256 / 256 for i in range(SIDE ** 3))))
+    return steam.grid([(i * 2654435761 >> 7) % 256 / 256 for i in range(SIDE ** 3)])
 
 
 def sha256(data):

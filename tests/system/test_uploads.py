@@ -7,31 +7,16 @@ import struct
 import subprocess
 
 import pytest
+import steam
 from breaking_proxy import BreakingProxy
 from local_farm import LocalFarm, bin_dir, wait_until
 
-SCENE = """<scene version="3.0.0">
-  <integrator type="volpath"/>
-  <sensor type="perspective">
-    <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
-    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film>
-  </sensor>
-  <shape type="cube">
-    <bsdf type="null"/>
-    <medium type="heterogeneous" name="interior">
-      <volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vol"/></volume>
-    </medium>
-  </shape>
-  <emitter type="constant"/>
-</scene>
-"""
+SCENE = steam.scene(samples=2)
 SIDE = 112  # 5.4 MiB of grid
 
 
 def write_grid(path):
-    values = os.urandom(SIDE ** 3)
-    path.write_bytes(b"VOL\x03" + struct.pack("<iiiii6f", 1, SIDE, SIDE, SIDE, 1, 0, 0, 0, 1, 1, 1) +
-                     b"".join(struct.pack("<f", v / 256) for v in values))
+    path.write_bytes(steam.grid([v / 256 for v in os.urandom(SIDE ** 3)]))
 
 
 def digest(data):
