@@ -32,6 +32,18 @@ std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   return ErrorFigures{std::sqrt(square), relmse, relmse - std::sqrt(below), relmse + std::sqrt(above)};
 }
 
+// One frame that is not to be trusted would disappear in the mean of all.
+std::optional<Judgement> worst_of(std::span<const JobView> frames) {
+  std::optional<Judgement> worst;
+  for (const JobView& f : frames) {
+    if (!f.judgement || (worst && (!worst->trusted || f.judgement->trusted))) continue;
+    worst = f.judgement;
+    if (const auto id = frame_of(f.id); id && !worst->trusted)
+      worst->words = fmt::format("frame {}: {}", id->frame, worst->words);
+  }
+  return worst;
+}
+
 FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   FramesView v;
   v.range = range;
@@ -151,7 +163,11 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   }
   v.spp = first.spp;
   v.target_error = first.target_error;
+  v.spp_asked = first.spp_asked;
   v.error_now = error_of(frames);
+  v.judgement = worst_of(frames);
+  for (const JobView& f : frames)
+    if (f.few_hits) v.few_hits = v.few_hits.value_or(0) + *f.few_hits;
   v.error = trouble_of(frames);
   v.warnings = facts.warnings;
   v.size = first.size;

@@ -34,7 +34,8 @@ inline constexpr int kMoreWorkers = 8;  // of JobView::eta_with_more
 struct ErrorFigures {  // of the image as folded up to one complete round over all tiles
   double rmse = 0;
   double relmse = 0;
-  double relmse_lo = 0, relmse_hi = 0;  // 95 % interval for the realised error
+  double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
+  double rmse_lo = 0, rmse_hi = 0;      // both 0: not known, of a version that did not store them
 };
 struct TrueFigures {  // against a reference, its own noise subtracted (common/image/reference.h)
   double rmse = 0, relmse = 0;
@@ -82,13 +83,17 @@ struct JobView {
   JobState state = JobState::queued;
   std::string stopped;                 // "spp", "error", "time", "user" once done
   double progress = 0;                 // 0..1
-  std::uint64_t spp = 0;               // asked
+  std::uint64_t spp = 0;               // asked, or the most that any job gets
+  bool spp_asked = true;               // false: its target or its time ends it
   std::optional<double> target_error;  // relMSE, asked
   double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
   std::optional<TrueFigures> truth;              // as of the last checkpoint that has it
   std::optional<Judgement> judgement;            // nothing: no sample yet
   std::optional<std::uint64_t> few_hits;         // pixels of the image as it is
+  std::optional<Trend> trend;                    // nothing: too few checkpoints
+  std::optional<double> efficiency;              // 1 / (relMSE x core seconds) at the last checkpoint
+  std::optional<std::uint64_t> pixels_without_samples;  // of the image as it is; nothing: not known
   std::optional<double> eta_seconds;
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are

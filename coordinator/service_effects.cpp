@@ -193,6 +193,7 @@ void Service::on(const JobStateChanged& e, Todo&) {
 void Service::on(const Checkpoint& e, Todo&) {
   const auto entry = find_locked(e.job);
   if (!entry || !entry->assembly) return;
+  const bool exact = entry->assembly->errors().knows(e.rounds);
   const ImageError error = image_error(entry->assembly->errors().at(e.rounds));
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
@@ -204,6 +205,8 @@ void Service::on(const Checkpoint& e, Todo&) {
     if (!compared) compare_locked(entry, e.rounds, error.spp);
     return;
   }
+  // A tile is rendered again, and of the others it is not known any more what they said so early.
+  if (!exact) return;
   double core = entry->stored.totals.core_seconds;
   const auto until =
       std::upper_bound(entry->replay.begin(), entry->replay.end(),
@@ -217,6 +220,19 @@ void Service::on(const Checkpoint& e, Todo&) {
     step("checkpoint-stored");
   });
   compare_locked(entry, e.rounds, error.spp);
+}
+
+// What was said of wrong or lost pixels: checkpoints are taken again as tiles are folded again.
+void Service::forget_curve_locked(JobEntry& entry) {
+  ++entry.curve;
+  entry.stored.totals.doubt.clear();
+  entry.stored.totals.few_hits.reset();
+  if (entry.points.empty()) return;
+  entry.points.clear();
+  chores_.push([this, id = entry.stored.id] {
+    if (const auto removed = store_->remove_points(id); !removed)
+      log_error(fmt::format("job={}", id.value), removed.error().message);
+  });
 }
 
 void Service::on(const ReopenRound& e, Todo&) {

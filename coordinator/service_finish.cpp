@@ -35,7 +35,8 @@ class ImageFile final : public ByteSink {
 }  // namespace
 
 // Not under the lock: mattes need the scene's names.
-Provenance Service::provenance_of(const StoredJob& job) const {
+Provenance Service::provenance_of(const ReportFacts& facts) const {
+  const StoredJob& job = facts.job;
   const Health& health = job.totals.health;
   const std::string note = job.stopped ? note_on(*job.stopped) : "";
   std::string stopped = job.stopped ? std::string(to_string(*job.stopped)) : "";
@@ -49,7 +50,9 @@ Provenance Service::provenance_of(const StoredJob& job) const {
           health.clean() ? "clean" : canonical_json(health),
           mattes_of(job),
           job.totals.core_seconds,
-          std::move(stopped)};
+          std::move(stopped),
+          judgement_of(facts),
+          header_figures(facts)};
 }
 
 MatteManifests Service::mattes_of(const StoredJob& job) const {
@@ -69,18 +72,15 @@ ReportFacts Service::facts_locked(const JobEntry& entry) const {
   ReportFacts facts;
   facts.job = entry.stored;
   facts.job.state = shown_state(entry);
+  if (facts.job.state == JobState::cancelled) facts.job.stopped = StopReason::user;
   facts.convergence = entry.points;
   facts.replay = replay_of(entry.stored);
   facts.reference_noise = entry.reference_noise;
   if (!entry.assembly) return facts;
   const Film& film = entry.assembly->film();
   facts.job.totals.health = entry.assembly->health().total();
-  facts.samples = film.samples();
-  facts.job.totals.spp_done =
-      static_cast<double>(facts.samples) /
-      static_cast<double>(std::int64_t{entry.grid.frame.width} * entry.grid.frame.height);
   if (entry.clock_zero) facts.job.totals.render_seconds = elapsed_locked(entry);
-  if (facts.samples > 0) facts.error = image_error(film.error());
+  put_film(facts, film);
   return facts;
 }
 
@@ -170,11 +170,11 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
 }
 
 // Returns how many values the image cannot hold.
-Result<std::uint64_t> Service::write_image(const Film& film, const StoredJob& job) {
-  auto file = AtomicFile::create(folder(job.id) / "image.exr");
+Result<std::uint64_t> Service::write_image(const Film& film, const ReportFacts& facts) {
+  auto file = AtomicFile::create(folder(facts.job.id) / "image.exr");
   if (!file) return tl::unexpected(file.error());
   ImageFile sink(*file);
-  const auto clamped = write_final_exr(film, provenance_of(job), job.spec.float_output, sink);
+  const auto clamped = write_final_exr(film, provenance_of(facts), facts.job.spec.float_output, sink);
   if (!clamped) return clamped;
   if (auto done = file->commit(); !done) return tl::unexpected(done.error());
   step("image-written");
@@ -203,7 +203,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   if (on_disk()) {
     const auto written = [&]() -> Result<void> {
       const auto where = folder(facts.job.id);
-      const auto clamped = write_image(film, facts.job);
+      const auto clamped = write_image(film, facts);
       if (!clamped) return tl::unexpected(clamped.error());
       facts.clamped_values = *clamped;
       facts.pixels = pixels_sha256(film);

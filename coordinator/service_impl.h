@@ -53,6 +53,7 @@ struct JobEntry {
   std::optional<TruthBook> truths;   // with a reference only, while there is an assembly
   std::optional<ReferenceNoise> reference_noise;  // as of the last comparison; nothing: not known
   std::vector<ConvergencePoint> points;
+  std::uint64_t curve = 0;      // number of the curve of these points: those of wrong or lost pixels are dropped
   bool dormant = false;         // has ended and is on the disk: the farm does not know it
   bool removed = false;         // by its user; nothing of it is stored any more
   bool pin_unsaved = false;     // its numeric class is not stored yet: no result of it may be
@@ -293,15 +294,16 @@ class Service final : public Coordinator {
   Result<void> write_snapshot_now(const EntryPtr& entry);
   void take_snapshot(const EntryPtr& entry);
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
-  Result<std::uint64_t> write_image(const Film& film, const StoredJob& job);
+  Result<std::uint64_t> write_image(const Film& film, const ReportFacts& facts);
   ReportFacts facts_locked(const JobEntry& entry) const;
-  Provenance provenance_of(const StoredJob& job) const;
+  void forget_curve_locked(JobEntry& entry);
+  Provenance provenance_of(const ReportFacts& facts) const;
   MatteManifests mattes_of(const StoredJob& job) const;
 
   // ---- references (service_truth.cpp); compare() and reference_of() on the comparing thread ----
   void compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
   void compare_last_locked(const EntryPtr& entry);
-  void compare(const EntryPtr& entry, double spp, const std::vector<TilePicture>& tiles, bool last);
+  void compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles, bool last);
   std::shared_ptr<const Reference> reference_of(const StoredJob& job);
   void after_comparisons(const EntryPtr& entry, std::function<void()> chore);
 
@@ -328,7 +330,7 @@ class Service final : public Coordinator {
   WorkerView view_locked(const WorkerId& id, const WorkerEntry& entry) const;
   struct Picture {
     Film film;
-    StoredJob job;
+    ReportFacts facts;
     bool final_on_disk = false;
   };
   Result<Picture> picture(const JobId& id) const;

@@ -68,6 +68,8 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Resu
     if (!missing->empty()) state = entry.stored.state = JobState::paused;
   }
   if (auto loaded = load_locked(entry); !loaded) return loaded;
+  const bool begins_again = entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
+  if (begins_again || has_barred_locked(entry)) forget_curve_locked(entry);
   auto event = restored_locked(entry, state);
   if (!event) return tl::unexpected(event.error());
   if (auto sound = check_plan(event->plan); !sound) return sound;

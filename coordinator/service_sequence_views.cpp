@@ -67,8 +67,17 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
                                           "time",
                                           "peak_rss_bytes",
                                           "rmse",
+                                          "rmse_ci95",
                                           "relmse",
                                           "relmse_ci95",
+                                          "verdict",
+                                          "verdict_kind",
+                                          "trusted",
+                                          "few_hits_pixels",
+                                          "slope",
+                                          "forecast",
+                                          "efficiency",
+                                          "efficiency_per_core",
                                           "nonfinite_samples",
                                           "health",
                                           "pixels_sha256",
@@ -124,6 +133,10 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
   j["rmse"] = e ? number(e->rmse) : json();
   j["relmse"] = e ? number(e->relmse) : json();
   j["relmse_ci95"] = e ? json{number(e->relmse_lo), number(e->relmse_hi)} : json();
+  j["trusted"] = view.judgement && view.judgement->trusted;
+  j["verdict"] = view.judgement ? json(view.judgement->words) : json();
+  j["verdict_kind"] = view.judgement ? json(to_string(view.judgement->kind)) : json();
+  j["few_hits_pixels"] = view.few_hits ? json(*view.few_hits) : json();
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

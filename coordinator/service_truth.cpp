@@ -22,7 +22,9 @@ void Service::compare_locked(const EntryPtr& entry, std::span<const RoundIndex> 
   auto tiles = entry->truths->at(rounds);
   entry->truths->checkpoint_taken(rounds);
   if (!tiles || comparisons_.size() >= kMaxComparisons) return;
-  comparisons_.push([this, entry, spp, tiles = std::move(*tiles)] { compare(entry, spp, tiles, false); });
+  comparisons_.push([this, entry, spp, curve = entry->curve, tiles = std::move(*tiles)] {
+    compare(entry, curve, spp, tiles, false);
+  });
 }
 
 // The image as it is handed out, so that the report has all figures of it.
@@ -30,8 +32,8 @@ void Service::compare_last_locked(const EntryPtr& entry) {
   if (!entry->truths || entry->points.empty()) return;
   auto tiles = entry->truths->latest();
   if (!tiles) return;
-  comparisons_.push([this, entry, spp = entry->points.back().spp, tiles = std::move(*tiles)] {
-    compare(entry, spp, tiles, true);
+  comparisons_.push([this, entry, curve = entry->curve, spp = entry->points.back().spp, tiles = std::move(*tiles)] {
+    compare(entry, curve, spp, tiles, true);
   });
 }
 
@@ -60,11 +62,13 @@ std::shared_ptr<const Reference> Service::reference_of(const StoredJob& job) {
   return reference_;
 }
 
-void Service::compare(const EntryPtr& entry, double spp, const std::vector<TilePicture>& tiles, bool last) {
+void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles,
+                      bool last) {
   std::unique_lock lock(mutex_);
   const auto of_spp = [&](const ConvergencePoint& p) { return p.spp == spp; };
   const auto known = std::find_if(entry->points.begin(), entry->points.end(), of_spp);
-  if (entry->removed || known == entry->points.end() || (known->truth && known->truth->flip)) return;
+  if (entry->removed || entry->curve != curve || known == entry->points.end() || (known->truth && known->truth->flip))
+    return;
   const StoredJob job = entry->stored;
   const bool flip = last || wants_flip(entry->points, spp);
   lock.unlock();
@@ -77,7 +81,7 @@ void Service::compare(const EntryPtr& entry, double spp, const std::vector<TileP
   if (flip) truth.flip = mean_of(hdr_flip({size, reference->rgb}, {size, image}));
   lock.lock();
   const auto point = std::find_if(entry->points.begin(), entry->points.end(), of_spp);
-  if (entry->removed || point == entry->points.end()) return;
+  if (entry->removed || entry->curve != curve || point == entry->points.end()) return;
   point->truth = truth;
   if (reference->error.empty())
     entry->reference_noise.reset();

@@ -64,6 +64,15 @@ double done_of(const StoredJob& job, double spp_done) {
   return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
 }
 
+// What the curve so far says.
+void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::string& doubt) {
+  const std::vector<ErrorPoint> points = error_points(all);
+  v.judgement = judge(points, doubt);
+  v.trend = trend_of(points);
+  const double cost = points.empty() ? 0 : points.back().relmse * points.back().core_seconds;
+  if (cost > 0) v.efficiency = 1 / cost;
+}
+
 }  // namespace
 
 // `v`: with the clocks and the samples so far.
@@ -79,8 +88,13 @@ Outlook Service::outlook_locked(const JobEntry& entry, const JobFigures& figures
   facts.elapsed = v.elapsed_seconds;
   const int threads = farm_.threads_connected(), workers = farm_.workers_connected();
   facts.threads = figures.threads > 0 ? figures.threads : threads;
-  const bool may_grow = !job.spec.max_workers || static_cast<std::uint32_t>(workers) < *job.spec.max_workers;
-  if (workers > 0 && may_grow) facts.threads_with_more = facts.threads + static_cast<double>(kMoreWorkers) * threads / workers;
+  const int room = job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
+  if (workers > 0)
+    facts.threads_with_more = facts.threads + static_cast<double>(std::min(room, kMoreWorkers)) * threads / workers;
+  if (job.spec.max_units) {  // each unit is one thread's
+    facts.threads = std::min<double>(facts.threads, *job.spec.max_units);
+    facts.threads_with_more = std::min<double>(facts.threads_with_more, *job.spec.max_units);
+  }
   return outlook_of(facts, error_points(entry.points));
 }
 
@@ -92,6 +106,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.owner = job.owner;
   v.state = shown_state(entry);
   v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
+  if (v.state == JobState::cancelled) v.stopped = to_string(StopReason::user);
   v.target_error = job.spec.target_error;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
@@ -108,13 +123,15 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.health = entry.assembly ? entry.assembly->health().total() : job.totals.health;
   v.notes = health_notes(v.health, replay_of(job));
   v.spp = even_spp(job.spp.value_or(kMaxSppWithoutLimit));
+  v.spp_asked = job.spp.has_value();
   v.spp_done = job.totals.spp_done;
   v.units_done = job.totals.units;
   v.units_total = std::max(job.totals.units, job.totals.units_planned);
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
   v.truth = last_truth(entry.points);
   v.few_hits = job.totals.few_hits;
-  if (v.few_hits) v.judgement = judge(error_points(entry.points), job.totals.doubt);
+  if (v.few_hits) put_curve(v, entry.points, job.totals.doubt);
+  if (entry.assembly) v.pixels_without_samples = entry.assembly->film().pixels_without_samples();
   if (entry.assembly)
     v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
   v.progress = done_of(job, v.spp_done);
@@ -126,14 +143,14 @@ JobView Service::view_locked(const JobEntry& entry) const {
     v.queued_core_seconds = figures->core_seconds_queued;
     const Outlook out = outlook_locked(entry, *figures, v);
     v.progress = out.progress;
-    if (v.state == JobState::running || v.state == JobState::queued) {
+    const std::string waits = !entry.finishing && figures->units_leased == 0 ? farm_.why_waiting(job.id) : "";
+    if (v.error.empty()) v.error = waits;
+    if (waits.empty() && (v.state == JobState::running || v.state == JobState::queued)) {
       v.eta_seconds = out.seconds;
       v.eta_ci95 = out.ci95;
       v.eta_with_more = out.with_more;
       v.eta_with_more_ci95 = out.with_more_ci95;
     }
-    if (v.error.empty() && !entry.finishing && figures->units_leased == 0)
-      v.error = farm_.why_waiting(job.id);
   }
   if (v.state == JobState::done) v.progress = 1;
   return v;
@@ -169,13 +186,15 @@ Result<Service::Picture> Service::picture(const JobId& id) const {
   std::unique_lock lock(mutex_);
   const auto entry = usable_locked(id);
   if (!entry) return tl::unexpected(entry.error());
-  if ((*entry)->assembly) return Picture{(*entry)->assembly->film(), facts_locked(**entry).job, false};
+  ReportFacts facts = facts_locked(**entry);
+  if ((*entry)->assembly) return Picture{(*entry)->assembly->film(), std::move(facts), false};
   JobEntry copy;
   copy.stored = (*entry)->stored;
   copy.grid = (*entry)->grid;
   lock.unlock();
   load_folded(copy);
-  return Picture{copy.assembly->film(), copy.stored, copy.stored.state == JobState::done};
+  put_film(facts, copy.assembly->film());
+  return Picture{copy.assembly->film(), std::move(facts), copy.stored.state == JobState::done};
 }
 
 Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
@@ -189,7 +208,7 @@ Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
   }
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
-  auto image = final_exr(shown->film, provenance_of(shown->job), shown->job.spec.float_output);
+  auto image = final_exr(shown->film, provenance_of(shown->facts), shown->facts.job.spec.float_output);
   if (!image) return tl::unexpected(image.error());
   return std::move(image->exr);
 }
@@ -230,16 +249,12 @@ Result<std::string> Service::report_json(const JobId& id) const {
     if (!bytes) return tl::unexpected(bytes.error());
     return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   }
-  ReportFacts facts = facts_locked(**entry);
   lock.unlock();
-  const auto shown = picture(id);
+  auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
+  ReportFacts& facts = shown->facts;
   facts.pixels = pixels_sha256(shown->film);
-  if (!shown->job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
-  if (facts.samples == 0 && shown->film.samples() > 0) {
-    facts.samples = shown->film.samples();
-    facts.error = image_error(shown->film.error());
-  }
+  if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
   return coordinator::report_json(facts);
 }
 

@@ -268,6 +268,7 @@ void Service::on(const TileDiscarded& e, Todo&) {
   if (!entry || !entry->assembly) return;
   entry->assembly->discard(e.tile);
   if (entry->truths) entry->truths->discard(e.tile);
+  forget_curve_locked(*entry);
   log_job(e.job, fmt::format("tile {} is rendered again from its first round", e.tile));
   if (restoring_) return;
   hub_->publish("tile", tile_event_json(e.job, e.tile, entry->grid.rect(e.tile), "free", 0, ""), e.job.value,

@@ -49,6 +49,7 @@ json to_value(const JobView& v) {
          {"stopped", text_or_null(v.stopped)},
          {"progress", number(v.progress)},
          {"spp", v.spp},
+         {"spp_asked", v.spp_asked ? json(v.spp) : json()},
          {"spp_done", number(v.spp_done)},
          {"target_error", v.target_error ? number(*v.target_error) : json()},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
@@ -75,6 +76,9 @@ json to_value(const JobView& v) {
   j["frame"] = frame ? json(frame->frame) : json();
   j["frames"] = v.frames ? to_value(*v.frames) : json();
   j["rmse"] = v.error_now ? number(v.error_now->rmse) : json();
+  j["rmse_ci95"] = v.error_now && v.error_now->rmse_hi > 0
+                       ? json{number(v.error_now->rmse_lo), number(v.error_now->rmse_hi)}
+                       : json();
   j["relmse"] = v.error_now ? number(v.error_now->relmse) : json();
   j["relmse_ci95"] =
       v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
@@ -83,8 +87,15 @@ json to_value(const JobView& v) {
                                   {"flip", v.truth->flip ? number(*v.truth->flip) : json()}}
                            : json();
   j["verdict"] =
-      v.judgement ? json{{"kind", to_string(v.judgement->kind)}, {"words", v.judgement->words}} : json();
+      v.judgement ? json{{"kind", to_string(v.judgement->kind)},
+                         {"words", v.judgement->words},
+                         {"trusted", v.judgement->trusted}}
+                  : json();
   j["few_hits"] = v.few_hits ? json(*v.few_hits) : json();
+  j["pixels_without_samples"] = v.pixels_without_samples ? json(*v.pixels_without_samples) : json();
+  j["slope"] = v.trend ? number(-v.trend->slope) : json();
+  j["slope_ci95"] = v.trend ? json{number(-v.trend->slope_hi), number(-v.trend->slope_lo)} : json();
+  j["efficiency_per_core"] = v.efficiency ? number(*v.efficiency) : json();
   return j;
 }
 
@@ -134,16 +145,17 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
   std::string csv =
-      "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n";
+      "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,rmse_lo,rmse_hi\n";
   const auto or_nothing = [](const auto& truth, auto figure) {
     return truth ? fmt::format("{}", figure(*truth)) : std::string();
   };
   for (const auto& p : points)
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
                        p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
                        or_nothing(p.truth, [](const TrueFigures& t) { return t.rmse; }),
                        or_nothing(p.truth, [](const TrueFigures& t) { return t.relmse; }),
-                       p.truth && p.truth->flip ? fmt::format("{}", *p.truth->flip) : std::string());
+                       p.truth && p.truth->flip ? fmt::format("{}", *p.truth->flip) : std::string(),
+                       p.error.rmse_lo, p.error.rmse_hi);
   return csv;
 }
 

@@ -239,16 +239,17 @@ const char* to_string(Judgement::Kind kind) {
 Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt) {
   using Kind = Judgement::Kind;
   const auto trend = trend_of(points);
-  if (!doubt.empty()) return {trend ? Kind::heavy_tail : Kind::early, doubt};
+  if (!doubt.empty()) return {trend ? Kind::heavy_tail : Kind::early, doubt, false};
   if (stands_on_a_floor(points))
     return {
         Kind::bias_floor,
         fmt::format("bias floor: the true relMSE stays near {:.2g} while the estimated one falls to {:.2g}: "
                     "image and reference do not agree, or the reference is noisy and brings no error of its "
                     "own",
-                    *points.back().true_relmse, points.back().relmse)};
+                    *points.back().true_relmse, points.back().relmse),
+        false};
   if (!trend) return {Kind::early, "too early to tell how it converges"};
-  if (trend->slope_hi < kSlow) return {Kind::heavy_tail, "don't trust yet: " + trend->verdict};
+  if (trend->slope_hi < kSlow) return {Kind::heavy_tail, "don't trust yet: " + trend->verdict, false};
   return {trend->slope_lo > kFast ? Kind::fast : Kind::converging, trend->verdict};
 }
 

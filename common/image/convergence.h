@@ -42,6 +42,7 @@ struct Judgement {
     bias_floor,  // with a reference: the true error stays while the estimated one falls
   } kind = Kind::early;
   std::string words;
+  bool trusted = true;  // false: the figures may be far off ("don't trust yet")
   bool operator==(const Judgement&) const = default;
 };
 const char* to_string(Judgement::Kind kind);

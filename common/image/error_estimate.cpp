@@ -207,9 +207,13 @@ double heaviness(const NoiseSums& s) {
   return s.flat_pairs > 0 ? flat / 3 / s.flat_pairs : std::numeric_limits<double>::infinity();
 }
 
-void judge(ImageError& out, const NoiseSums& sums, double pixels) {
+void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
   const double few = std::min(kFewPixels, pixels / kPartOfSmall);
-  if (out.effective_pixels == 0) {
+  if (!lit) {
+    out.verdict =
+        "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to find for so "
+        "few samples";
+  } else if (out.effective_pixels == 0) {
     out.trusted = out.spp >= 64;
     if (!out.trusted)
       out.verdict = "the two halves of the samples do not differ yet: too few samples to tell the error";
@@ -272,6 +276,7 @@ void TileError::add(const TileError& o) {
   pixels += o.pixels;
   samples += o.samples;
   few_hits += o.few_hits;
+  lit += o.lit;
   skew += o.skew;
   plain.add(o.plain);
   relative.add(o.relative);
@@ -289,6 +294,7 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   TileError out{.pixels = n, .samples = spp * n};
   for (int y = 0; y < h.height; ++y)
     for (int x = 0; x < h.width; ++x) out.few_hits += has_few_hits(h, x, y);
+  for (std::size_t i = 0; i < n; ++i) out.lit += light(h.a, i, n) != 0 || light(h.b, i, n) != 0;
   std::vector<double> d(3 * n);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
   const Weights w = weights(h);
@@ -333,7 +339,7 @@ ImageError image_error(const TileError& sums) {
     out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
     out.top_share = sums.relative.largest / sums.relative.squares;
   }
-  judge(out, sums.relative, pixels);
+  judge(out, sums.relative, pixels, sums.lit > 0);
   const double plain = half_width(sums.plain, out.trusted), relative = half_width(sums.relative, out.trusted);
   out.rmse_lo = out.rmse * std::exp(-plain / 2);
   out.rmse_hi = out.rmse * std::exp(plain / 2);

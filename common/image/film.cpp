@@ -193,6 +193,13 @@ TileAovs Film::aov_pixels(TileIndex index) const {
   return out;
 }
 
+std::uint64_t Film::pixels_without_samples() const {
+  std::uint64_t sum = 0;
+  for (TileIndex i = 0; i < tiles_.size(); ++i)
+    if (!tiles_[i]) sum += static_cast<std::uint64_t>(grid_.rect(i).pixels());
+  return sum;
+}
+
 std::uint64_t Film::samples() const {
   std::uint64_t sum = 0;
   for (TileIndex i = 0; i < tiles_.size(); ++i)
@@ -211,7 +218,8 @@ std::uint64_t Film::memory_bytes() const {
 
 TileError Film::error() const {
   TileError sum;
-  for (TileIndex i = 0; i < tiles_.size(); ++i) sum.add(error(i));
+  for (TileIndex i = 0; i < tiles_.size(); ++i)
+    if (tiles_[i]) sum.add(tiles_[i]->error);
   return sum;
 }
 

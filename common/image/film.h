@@ -83,7 +83,9 @@ class Film {
   // ---- the image ----
   std::uint64_t samples() const;       // over all pixels
   std::uint64_t memory_bytes() const;  // of the sums and identifiers
-  TileError error() const;             // over all tiles, in tile order
+  // Over all tiles that have a sample, in tile order: what is not there has no error that could be told.
+  TileError error() const;
+  std::uint64_t pixels_without_samples() const;
 
   // One row of tiles as a film of its own, with the same tiles: for what is made of an image band by band.
   Film row(int row) const;

@@ -110,24 +110,36 @@ ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool fl
   return picture;
 }
 
-std::map<std::string, std::string> strings_of(const Film& film, const Provenance& from) {
+std::string pair_text(double lo, double hi) { return fmt::format("{:.9g} {:.9g}", lo, hi); }
+
+// What the film says of its own error; of an empty one there is nothing to say.
+void put_error(std::map<std::string, std::string>& strings, const Film& film, const std::optional<Judgement>& judgement) {
+  if (const auto missing = film.pixels_without_samples(); missing > 0)
+    strings["lightshaft:pixels_without_samples"] = fmt::format("{}", missing);
+  if (film.samples() == 0) return;
   const ImageError error = image_error(film.error());
-  std::map<std::string, std::string> strings = {
-      {"lightshaft:scene", from.scene.hex()},
-      {"lightshaft:job", from.settings_json},
-      {"lightshaft:build", from.build},
-      {"lightshaft:class", from.numeric_class.hex()},
-      {"lightshaft:seed", fmt::format("{}", from.seed)},
-      {"lightshaft:relmse", fmt::format("{:.9g}", error.relmse)},
-      {"lightshaft:relmse_ci95", fmt::format("{:.9g} {:.9g}", error.relmse_lo, error.relmse_hi)},
-      {"lightshaft:rmse", fmt::format("{:.9g}", error.rmse)},
-      {"lightshaft:verdict", error.trusted ? "trusted" : error.verdict},
-      {"lightshaft:few_hits", fmt::format("{}", error.few_hits)},
-      {"lightshaft:seconds", fmt::format("{:.3f}", from.seconds)},
-      {"lightshaft:tiles", tile_digests(film)}};
+  const bool trusted = error.trusted && (!judgement || judgement->trusted);
+  strings["lightshaft:relmse"] = fmt::format("{:.9g}", error.relmse);
+  strings["lightshaft:relmse_ci95"] = pair_text(error.relmse_lo, error.relmse_hi);
+  strings["lightshaft:rmse"] = fmt::format("{:.9g}", error.rmse);
+  strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
+  strings["lightshaft:verdict"] = trusted ? "trusted" : error.trusted ? judgement->words : error.verdict;
+  strings["lightshaft:few_hits"] = fmt::format("{}", error.few_hits);
+}
+
+std::map<std::string, std::string> strings_of(const Film& film, const Provenance& from) {
+  std::map<std::string, std::string> strings = {{"lightshaft:scene", from.scene.hex()},
+                                                {"lightshaft:job", from.settings_json},
+                                                {"lightshaft:build", from.build},
+                                                {"lightshaft:class", from.numeric_class.hex()},
+                                                {"lightshaft:tiles", tile_digests(film)}};
+  put_error(strings, film, from.judgement);
+  if (from.seed) strings["lightshaft:seed"] = fmt::format("{}", *from.seed);
+  if (from.seconds) strings["lightshaft:seconds"] = fmt::format("{:.3f}", *from.seconds);
   if (!from.health.empty()) strings["lightshaft:health"] = from.health;
   if (from.core_seconds > 0) strings["lightshaft:core_seconds"] = fmt::format("{:.3f}", from.core_seconds);
   if (!from.stopped.empty()) strings["lightshaft:stopped"] = from.stopped;
+  for (const auto& [name, value] : from.figures) strings["lightshaft:" + name] = fmt::format("{:.9g}", value);
   return strings;
 }
 

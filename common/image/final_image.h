@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/image/aov_layers.h"
+#include "common/image/convergence.h"
 #include "common/image/film.h"
 
 namespace ls {
@@ -20,20 +22,23 @@ namespace ls {
 // row by row, little endian. Pixels not rendered yet are zero.
 Digest pixels_sha256(const Film& film);
 
-// The header strings `lightshaft:...` of the final EXR; `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`,
-// `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and `:tiles` come from the film.
+// The header strings `lightshaft:...` of the final EXR; docs/error.md lists them. `:relmse`, `:relmse_ci95` ("LOW
+// HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and `:tiles` come
+// from the film; of one without a sample only the last. `:pixels_without_samples` stands there if there are any.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  std::uint64_t seed = 0;
-  double seconds = 0;  // render time
+  std::optional<std::uint64_t> seed = {};  // nothing, here and below: not known, and not written
+  std::optional<double> seconds = {};      // render time
   // "clean", or canonical_json() of the Health; empty: not known, and not written.
   std::string health;
   MatteManifests manifests = {};
   double core_seconds = 0;   // CPU time of units; 0: not known, and not written
   std::string stopped = {};  // why there are no more samples, and what that means; empty: not written
+  std::optional<Judgement> judgement = {};          // knows of the curve, too, what the film alone does not
+  std::map<std::string, double> figures = {};       // more of them, by what follows "lightshaft:"
 };
 struct FinalImage {
   std::vector<std::byte> exr;

@@ -1,5 +1,7 @@
 #include "coordinator/assemble/report.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +11,8 @@ namespace {
 using nlohmann::json;
 
 json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
+json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
 // 64 rather than 64.0 where all pixels have the same.
 json spp_value(double spp) {
@@ -30,6 +34,8 @@ json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& tr
           {"rmse", truth ? number(truth->rmse) : json()},
           {"relmse", truth ? number(truth->relmse) : json()},
           {"flip", truth && truth->flip ? number(*truth->flip) : json()},
+          // The difference to the reference is no larger than its own noise: how wrong the image is it cannot tell.
+          {"below_noise", truth && noise && !(truth->relmse > 0)},
           {"noise_rmse", noise ? number(std::sqrt(noise->mse)) : json()},
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
@@ -65,6 +71,7 @@ json point(const ConvergencePoint& p) {
          {"rmse", number(p.error.rmse)},
          {"relmse", number(p.error.relmse)},
          {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
+  if (p.error.rmse_hi > 0) j["rmse_ci95"] = {number(p.error.rmse_lo), number(p.error.rmse_hi)};
   if (p.truth) put_truth(j, *p.truth);
   return j;
 }
@@ -104,7 +111,9 @@ TimeSplit split_of(const JobTotals& totals) {
   return split;
 }
 
-ErrorFigures figures_of(const ImageError& e) { return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi}; }
+ErrorFigures figures_of(const ImageError& e) {
+  return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi, e.rmse_lo, e.rmse_hi};
+}
 
 std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points) {
   std::vector<ErrorPoint> out;
@@ -119,6 +128,52 @@ std::optional<TrueFigures> last_truth(const std::vector<ConvergencePoint>& point
   std::optional<TrueFigures> out;
   for (auto p = points.rbegin(); p != points.rend() && !out; ++p) out = p->truth;
   return out;
+}
+
+void put_film(ReportFacts& facts, const Film& film) {
+  const FrameSize& size = film.grid().frame;
+  facts.samples = film.samples();
+  facts.pixels_without_samples = film.pixels_without_samples();
+  facts.job.totals.spp_done =
+      static_cast<double>(facts.samples) / static_cast<double>(std::int64_t{size.width} * size.height);
+  facts.error.reset();
+  if (facts.samples > 0) facts.error = image_error(film.error());
+}
+
+Judgement judgement_of(const ReportFacts& facts) {
+  if (!facts.error) return {Judgement::Kind::early, "no sample yet", false};
+  if (facts.pixels_without_samples > 0)
+    return {Judgement::Kind::early,
+            fmt::format("don't trust yet: {} pixels have no sample; the figures are of the others",
+                        facts.pixels_without_samples),
+            false};
+  return judge(error_points(facts.convergence), facts.error->verdict);
+}
+
+// Error reached per second of wall clock; per core second for comparisons between farms.
+Efficiency efficiency_of(const ReportFacts& facts) {
+  const auto over = [&](double seconds) -> std::optional<double> {
+    const double cost = facts.error ? facts.error->relmse * seconds : 0;
+    return cost > 0 ? std::optional(1 / cost) : std::nullopt;
+  };
+  return {over(facts.job.totals.render_seconds), over(facts.job.totals.core_seconds)};
+}
+
+std::map<std::string, double> header_figures(const ReportFacts& facts) {
+  std::map<std::string, double> figures;
+  const auto put = [&](const char* name, std::optional<double> value) {
+    if (value && std::isfinite(*value)) figures[name] = *value;
+  };
+  const Efficiency efficiency = efficiency_of(facts);
+  put("efficiency", efficiency.wall);
+  put("efficiency_per_core", efficiency.per_core);
+  put("target_error", facts.job.spec.target_error);
+  if (const auto trend = trend_of(error_points(facts.convergence))) put("slope", -trend->slope);
+  if (const auto truth = last_truth(facts.convergence)) {
+    put("true_rmse", truth->rmse);
+    put("true_relmse", truth->relmse);
+  }
+  return figures;
 }
 
 std::string report_json(const ReportFacts& facts) {
@@ -174,14 +229,16 @@ std::string report_json(const ReportFacts& facts) {
   j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
   j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
   j["forecast"] = forecast(facts);
-  j["trusted"] = known && e.trusted;
-  const Judgement judgement = judge(error_points(facts.convergence), e.verdict);
+  const Judgement judgement = judgement_of(facts);
+  j["trusted"] = judgement.trusted;
   j["verdict"] = judgement.words;
   j["verdict_kind"] = to_string(judgement.kind);
-  // Error reached per second of wall clock; per core second for comparisons between farms.
-  const double wall = e.relmse * totals.render_seconds, cores = e.relmse * totals.core_seconds;
-  j["efficiency"] = known && wall > 0 ? number(1 / wall) : json();
-  j["efficiency_per_core"] = known && cores > 0 ? number(1 / cores) : json();
+  const Efficiency efficiency = efficiency_of(facts);
+  j["efficiency"] = number(efficiency.wall);
+  j["efficiency_per_core"] = number(efficiency.per_core);
+  j["threads"] = totals.render_seconds > 0 ? number(totals.core_seconds / totals.render_seconds) : json();
+  j["pixels_without_samples"] = facts.pixels_without_samples;
+  j["error"] = text_or_null(job.error);
   j["adaptive"] = job.spec.target_error.has_value();
   if (const std::string note = job.stopped ? note_on(*job.stopped) : ""; !note.empty()) j["note"] = note;
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";

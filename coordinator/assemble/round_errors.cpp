@@ -27,6 +27,12 @@ TileError RoundErrors::at(std::span<const RoundIndex> rounds) const {
   return sum;
 }
 
+bool RoundErrors::knows(std::span<const RoundIndex> rounds) const {
+  for (std::size_t i = 0; i < tiles_.size(); ++i)
+    if (rounds[i] > 0 && (tiles_[i].rounds.empty() || tiles_[i].rounds.front().first >= rounds[i])) return false;
+  return true;
+}
+
 void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
     auto& kept = tiles_[i].rounds;

@@ -25,6 +25,8 @@ class RoundErrors {
   // Summed in tile order, `rounds` of each tile. One that has less counts with what it has; one of which only
   // later rounds are kept, since it was ahead at a checkpoint that has been taken, with the first of those.
   TileError at(std::span<const RoundIndex> rounds) const;
+  // Whether at() is what it was when these rounds were the last: nothing that it needs has been forgotten.
+  bool knows(std::span<const RoundIndex> rounds) const;
   void discard(TileIndex tile) { tiles_[tile] = {}; }  // it is folded again from round 0
   void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 

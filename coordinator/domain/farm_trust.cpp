@@ -280,6 +280,7 @@ void Farm::State::void_results(Job& job, WorkerIndex liar) {
   for (auto& [code, audit] : job.audits)
     if (audit.claim && audit.claim->first == liar) audit.claim.reset();
   for (const TileIndex tile : tiles) void_tile(job, tile);
+  if (!tiles.empty()) job.checkpoint_spp = 0;  // what was said of the image was said of wrong pixels, too
   if (!tiles.empty() && job.adaptive) steer_anew(job);
   if (!tiles.empty()) job.move_windows(workers.threads());
   finish_if_complete(job);

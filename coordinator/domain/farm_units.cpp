@@ -75,7 +75,7 @@ void Farm::State::on(const UnitFolded& event) {
 // Of an adaptive job only the rounds that all tiles get make checkpoints; then its levels do.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   const double spp = static_cast<double>(cut_range(round, job.spp).s1);
-  // Rounds that are folded a second time (a tile was void) make none again.
+  // A round that is folded a second time (a cut one that was reopened) makes none again.
   if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
       spp > job.checkpoint_spp) {
     job.checkpoint_spp = spp;

@@ -20,6 +20,7 @@ void Job::steer() {
   if (adaptive.has_value() == plan.target_error.has_value()) return;
   adaptive.reset();
   marks.clear();
+  marked_spp = 0;
   if (plan.target_error) adaptive.emplace(plan.grid, spp);
 }
 

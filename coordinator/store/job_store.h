@@ -99,6 +99,7 @@ class JobStore {
   // Of the point with these samples, in place of what was said of it before.
   virtual Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
+  virtual Result<void> remove_points(const JobId& job) = 0;  // their truths, too
 
   virtual Result<void> add_log(const JobId& job,
                                const LogLine& line) = 0;  // the oldest beyond kLogLinesKept go

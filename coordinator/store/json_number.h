@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/json_count.h"
+
 namespace ls::coordinator {
 
 inline double finite(double value) { return std::isfinite(value) ? value : 0; }

@@ -53,6 +53,11 @@ class MemoryJobStore final : public JobStore {
     const auto found = points_.find(job);
     return found == points_.end() ? std::vector<ConvergencePoint>{} : found->second;
   }
+  Result<void> remove_points(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    points_.erase(job);
+    return {};
+  }
   Result<void> add_log(const JobId& job, const LogLine& line) override {
     const std::lock_guard lock(mutex_);
     auto& lines = log_[job];

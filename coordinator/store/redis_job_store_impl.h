@@ -86,6 +86,9 @@ class RedisJobStore final : public JobStore {
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     return local_->points(job);
   }
+  Result<void> remove_points(const JobId& job) override {
+    return note(job, [&] { return local_->remove_points(job); }, [](Due& due) { due.points = true; });
+  }
 
   Result<void> add_log(const JobId& job, const LogLine& line) override {
     return note(job, [&] { return local_->add_log(job, line); }, [](Due& due) { due.log = true; });

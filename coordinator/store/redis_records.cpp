@@ -62,12 +62,11 @@ json truth_value(const std::optional<TrueFigures>& truth) {
 
 std::vector<ConvergencePoint> parse_points(const std::string& text) {
   std::vector<ConvergencePoint> points;
-  for (const json& p : json::parse(text))
-    points.push_back({number_of(p.at(0)),
-                      number_of(p.at(1)),
-                      number_of(p.at(2)),
-                      {number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)), number_of(p.at(6))},
-                      truth_of(p.at(7))});
+  for (const json& p : json::parse(text)) {
+    ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)), number_of(p.at(6))};
+    if (p.size() > 9) error.rmse_lo = number_of(p.at(8)), error.rmse_hi = number_of(p.at(9));  // not in earlier records
+    points.push_back({number_of(p.at(0)), number_of(p.at(1)), number_of(p.at(2)), error, truth_of(p.at(7))});
+  }
   return points;
 }
 
@@ -134,7 +133,7 @@ std::string points_json(const std::vector<ConvergencePoint>& points) {
   for (const auto& p : points)
     all.push_back({finite(p.seconds), finite(p.core_seconds), finite(p.spp), finite(p.error.rmse),
                    finite(p.error.relmse), finite(p.error.relmse_lo), finite(p.error.relmse_hi),
-                   truth_value(p.truth)});
+                   truth_value(p.truth), finite(p.error.rmse_lo), finite(p.error.rmse_hi)});
   return dumped(all);
 }
 

@@ -14,7 +14,7 @@ constexpr int kSchemaVersion = 1;
 constexpr const char* kSchema = R"(
 CREATE TABLE IF NOT EXISTS jobs(ordinal INTEGER PRIMARY KEY, id TEXT UNIQUE NOT NULL, state TEXT NOT NULL, record TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS points(n INTEGER PRIMARY KEY, job TEXT NOT NULL, seconds REAL, core_seconds REAL, spp REAL,
-  rmse REAL, relmse REAL, relmse_lo REAL, relmse_hi REAL);
+  rmse REAL, relmse REAL, relmse_lo REAL, relmse_hi REAL, rmse_lo REAL, rmse_hi REAL);
 CREATE INDEX IF NOT EXISTS points_of_job ON points(job);
 CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL, PRIMARY KEY(job, spp));
 CREATE TABLE IF NOT EXISTS log(n INTEGER PRIMARY KEY, job TEXT NOT NULL, unix REAL, text TEXT);
@@ -155,8 +155,8 @@ class SqliteJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     return Statement(
                db_.get(),
-               "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi) "
-               "VALUES(?, ?, ?, ?, ?, ?, ?, ?)")
+               "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi, "
+               "rmse_lo, rmse_hi) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
         .bind(job.value)
         .bind(p.seconds)
         .bind(p.core_seconds)
@@ -165,6 +165,8 @@ class SqliteJobStore final : public JobStore {
         .bind(p.error.relmse)
         .bind(p.error.relmse_lo)
         .bind(p.error.relmse_hi)
+        .bind(p.error.rmse_lo)
+        .bind(p.error.rmse_hi)
         .run("store a convergence point");
   }
 
@@ -181,7 +183,7 @@ class SqliteJobStore final : public JobStore {
     std::vector<ConvergencePoint> all;
     Statement rows(db_.get(),
                    "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
-                   "truths.rmse, truths.relmse, truths.flip "
+                   "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi "
                    "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
     rows.bind(job.value);
     auto row = rows.step("read the convergence");
@@ -189,13 +191,22 @@ class SqliteJobStore final : public JobStore {
       all.push_back({rows.real(0),
                      rows.real(1),
                      rows.real(2),
-                     {rows.real(3), rows.real(4), rows.real(5), rows.real(6)}});
+                     {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}});
       if (!rows.null(7))
         all.back().truth = TrueFigures{rows.real(7), rows.real(8),
                                        rows.null(9) ? std::nullopt : std::optional(rows.real(9))};
     }
     if (!row) return tl::unexpected(row.error());
     return all;
+  }
+
+  Result<void> remove_points(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    return all_or_nothing("remove the convergence of a job", [&]() -> Result<void> {
+      for (const char* sql : {"DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?"})
+        if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove the convergence of a job"); !done) return done;
+      return {};
+    });
   }
 
   Result<void> add_log(const JobId& job, const LogLine& line) override {
@@ -286,6 +297,18 @@ class SqliteJobStore final : public JobStore {
   std::uint64_t log_lines_ = 0;
 };
 
+// To a database of an earlier version, which goes on being able to read it.
+Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
+  for (const char* column : {"rmse_lo", "rmse_hi"}) {
+    Statement known(db, "SELECT 1 FROM pragma_table_info('points') WHERE name = ?");
+    const auto found = known.bind(column).step(what);
+    if (!found) return tl::unexpected(found.error());
+    if (*found) continue;
+    if (auto done = execute(db, fmt::format("ALTER TABLE points ADD COLUMN {} REAL", column).c_str(), what); !done) return done;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file) {
@@ -311,6 +334,7 @@ Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::p
             file.string(), found, kSchemaVersion));
   if (auto done = version.run(what); !done) return tl::unexpected(done.error());
   if (auto done = execute(raw, kSchema, what); !done) return tl::unexpected(done.error());
+  if (auto done = add_missing_columns(raw, what); !done) return tl::unexpected(done.error());
   if (auto done = execute(raw, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)
     return tl::unexpected(done.error());
   return std::make_unique<SqliteJobStore>(std::move(db));

@@ -28,6 +28,12 @@ json to_value(const JobTotals& t) {
           {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
 }
 
+// 0: not in records of earlier versions.
+std::uint64_t count_or_none(const json& j, const char* key) {
+  const auto found = j.find(key);
+  return found == j.end() ? 0 : count_of(*found);
+}
+
 Health health_of(const json& totals) {
   Health health;
   if (const auto causes = totals.find("health"); causes != totals.end()) {
@@ -36,9 +42,9 @@ Health health_of(const json& totals) {
     return std::move(*read);
   }
   // A record from before there were causes.
-  health.add(HealthCause::unnamed, totals.at("nonfinite").get<std::uint64_t>());
-  health.add(HealthCause::negative, totals.at("negative").get<std::uint64_t>());
-  health.add(HealthCause::majorant_violation, totals.at("majorant_violations").get<std::uint64_t>());
+  health.add(HealthCause::unnamed, count_of(totals.at("nonfinite")));
+  health.add(HealthCause::negative, count_of(totals.at("negative")));
+  health.add(HealthCause::majorant_violation, count_of(totals.at("majorant_violations")));
   return health;
 }
 
@@ -47,10 +53,10 @@ JobTotals totals_of(const json& j) {
   t.render_seconds = number_of(j.at("render_seconds"));
   t.core_seconds = number_of(j.at("core_seconds"));
   t.load_seconds = number_of(j.at("load_seconds"));
-  t.peak_rss_bytes = j.at("peak_rss_bytes");
+  t.peak_rss_bytes = count_of(j.at("peak_rss_bytes"));
   t.spp_done = j.at("spp_done");
-  t.units = j.at("units");
-  t.units_planned = j.value("units_planned", std::uint64_t{0});
+  t.units = count_of(j.at("units"));
+  t.units_planned = count_or_none(j, "units_planned");
   t.health = health_of(j);
   const json time = j.value("time", json::object());  // not in records of earlier versions
   for (const TimePart& part : kTimeParts)
@@ -59,7 +65,7 @@ JobTotals totals_of(const json& j) {
   t.ended_unix = j.value("ended_unix", 0.0);
   t.doubt = j.value("doubt", std::string());
   if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null())
-    t.few_hits = few->get<std::uint64_t>();
+    t.few_hits = count_of(*few);
   return t;
 }
 
@@ -92,9 +98,9 @@ StoredJob stored_from(const json& j) {
   job.scene = digest_from(j.at("scene"));
   job.settings = required(parse_render_settings(j.at("settings").get<std::string>()));
   job.spec = required(parse_job_spec(j.at("spec").get<std::string>()));
-  if (!j.at("spp").is_null()) job.spp = j.at("spp").get<std::uint64_t>();
+  if (!j.at("spp").is_null()) job.spp = count_of(j.at("spp"));
   for (const auto& a : j.at("assets"))
-    job.assets.push_back({digest_from(a.at("digest")), a.at("bytes"), a.at("name")});
+    job.assets.push_back({digest_from(a.at("digest")), count_of(a.at("bytes")), a.at("name")});
   job.warnings = j.at("warnings");
   job.features_used = j.at("features_used");
   job.features_left_out = j.at("features_left_out");
@@ -113,8 +119,8 @@ StoredJob stored_from(const json& j) {
     for (const auto& worker : *distrusted) job.distrusted.push_back({worker.get<std::string>()});
   if (const auto awaited = j.find("awaited"); awaited != j.end())
     for (const auto& digest : *awaited) job.awaited.insert(digest_from(digest));
-  job.revision = j.value("revision", std::uint64_t{0});
-  job.fence = j.value("fence", std::uint64_t{0});
+  job.revision = count_or_none(j, "revision");
+  job.fence = count_or_none(j, "fence");
   return job;
 }
 

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/base/json_count.h"
+
 namespace ls::worker::child {
 
 std::string to_text(const LocalJob& job) {
@@ -35,7 +37,7 @@ Result<LocalJob> from_text(std::string_view text) {
     job.brief.needs = json.at("needs").get<std::string>();
     job.scene = json.at("scene_file").get<std::string>();
     for (const auto& blob : json.at("blobs"))
-      job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
+      job.brief.assets.push_back({digest(blob.at(0)), count_of(blob.at(1)), blob.at(2)});
     for (const auto& [hex, path] : json.at("files").items())
       job.assets[digest(hex)] = path.get<std::string>();
     return job;

@@ -65,7 +65,13 @@ TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
   errors.checkpoint_taken(uneven);
   EXPECT_EQ(errors.at(second).relative.squares, 113)
       << "the first tile was ahead: it counts with what it had";
-  EXPECT_EQ(errors.relative(), (std::vector<std::vector<double>>{{10, 100}, {11, 101}, {12, 0}}));
+  EXPECT_FALSE(errors.knows(second)) << "and that is not what it said then";
+  EXPECT_TRUE(errors.knows(uneven));
+  errors.discard(1);
+  EXPECT_FALSE(errors.knows(uneven));
+  errors.folded(1, 0, e), errors.folded(1, 1, e);
+  EXPECT_TRUE(errors.knows(uneven));
+  EXPECT_EQ(errors.relative(), (std::vector<std::vector<double>>{{10, 101}, {11, 101}, {12, 0}}));
   EXPECT_EQ(RoundErrors::load(errors.save(), 2, true).value(), errors);
 }
 

@@ -221,6 +221,18 @@ TEST(ErrorEstimate, EqualHalvesHaveNoErrorAndAreBelievedOnlyAfterSomeSamples) {
   EXPECT_EQ(image_error(TileError{}).relmse, 0);
 }
 
+TEST(ErrorEstimate, IsNotBelievedWhereNoSampleHasFoundLight) {
+  std::vector<double> black(3 * kPixels), spark(3 * kPixels);
+  spark[17] = 1;
+
+  const ImageError dark = image_error(estimate_error({kSide, kSide, black, black}, 4096));
+
+  EXPECT_EQ(dark.relmse, 0);
+  EXPECT_FALSE(dark.trusted);
+  EXPECT_NE(dark.verdict.find("no sample has found any light"), std::string::npos) << dark.verdict;
+  EXPECT_TRUE(image_error(estimate_error({kSide, kSide, spark, spark}, 4096)).trusted);
+}
+
 TEST(ErrorEstimate, WorksOnTilesOfAnyShape) {
   for (const auto& [w, h] : {std::pair{1, 1}, {1, 9}, {9, 1}, {2, 2}, {5, 3}}) {
     const auto n = static_cast<std::size_t>(w * h);

@@ -1,5 +1,6 @@
 #include "common/image/final_image.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <png.h>
@@ -129,6 +130,42 @@ TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
 
   EXPECT_EQ(rgb[0], 0);
   EXPECT_NE(rgb[3 * 8], 0);
+}
+
+TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
+  const auto strings = [](const Film& film) {
+    return read_final_exr(final_exr(film, some_provenance(), true)->exr, "part").value().strings;
+  };
+  Film film = make_film(kGrid, 4);
+  const std::string whole = strings(film).at("lightshaft:relmse");
+  EXPECT_FALSE(strings(film).contains("lightshaft:pixels_without_samples"));
+  film.discard(0);
+
+  const auto part = strings(film), none = strings(Film(kGrid));
+
+  EXPECT_EQ(part.at("lightshaft:pixels_without_samples"), std::to_string(kGrid.rect(0).pixels()));
+  // That of the pixels that are there, rather than thinned by those that are not.
+  TileError rest;
+  for (TileIndex t = 1; t < kGrid.count(); ++t) rest.add(film.error(t));
+  EXPECT_EQ(part.at("lightshaft:relmse"), fmt::format("{:.9g}", image_error(rest).relmse));
+  for (const char* key : {"relmse", "relmse_ci95", "rmse", "rmse_ci95", "verdict", "few_hits"})
+    EXPECT_FALSE(none.contains(std::string("lightshaft:") + key)) << key;
+}
+
+TEST(FinalExr, IsTrustedNoMoreThanItsCurve) {
+  const Film film = make_film(kGrid, 4);
+  Provenance from = some_provenance();
+  from.judgement = Judgement{Judgement::Kind::heavy_tail, "don't trust yet: it falls too slowly", false};
+  from.figures = {{"slope", -.5}};
+  from.seed.reset();
+  from.seconds.reset();
+
+  const auto strings = read_final_exr(final_exr(film, from, true)->exr, "a tail").value().strings;
+
+  EXPECT_NE(strings.at("lightshaft:verdict"), "trusted");
+  EXPECT_EQ(strings.at("lightshaft:slope"), "-0.5");
+  EXPECT_FALSE(strings.contains("lightshaft:seed"));
+  EXPECT_FALSE(strings.contains("lightshaft:seconds"));
 }
 
 struct Decoded {

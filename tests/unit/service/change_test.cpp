@@ -176,6 +176,8 @@ TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
   EXPECT_EQ(coordinator->job(done).error().code, Errc::not_found);
   ASSERT_TRUE(coordinator->remove(running));
   EXPECT_EQ(coordinator->job(running)->state, JobState::cancelled);
+  EXPECT_EQ(coordinator->job(running)->stopped, "user");
+  EXPECT_EQ(report(*coordinator, running)["stopped"], "user");
   ASSERT_TRUE(coordinator->remove(running));
   EXPECT_EQ(coordinator->remove(running).error().code, Errc::not_found);
   EXPECT_TRUE(coordinator->jobs().empty());

@@ -134,18 +134,38 @@ TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
   v.id.value = "j-1";
   v.name = "bad \xff name";
   const auto j = nlohmann::json::parse(job_json(v));
-  for (const char* key : {"rmse", "relmse", "relmse_ci95", "eta_seconds", "stopped", "error", "target_error"})
+  for (const char* key : {"rmse", "rmse_ci95", "relmse", "relmse_ci95", "eta_seconds", "stopped", "error", "target_error",
+                          "verdict", "slope", "slope_ci95", "efficiency_per_core", "pixels_without_samples"})
     EXPECT_TRUE(j.at(key).is_null()) << key;
   EXPECT_EQ(j["state"], "queued");
   EXPECT_EQ(nlohmann::json::parse(jobs_json({v, v}))["jobs"].size(), 2u);
 }
 
+TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
+  JobView v;
+  v.spp = 65536, v.spp_asked = false;
+  v.error_now = ErrorFigures{.5, .25, .125, .375, .4, .6};
+  v.judgement = Judgement{Judgement::Kind::early, "don't trust yet", false};
+  v.trend = Trend{3, 1, .5, 1.5, "as expected"};
+  v.efficiency = 2;
+
+  const auto j = nlohmann::json::parse(job_json(v));
+
+  EXPECT_EQ(j["verdict"], (nlohmann::json{{"kind", "early"}, {"words", "don't trust yet"}, {"trusted", false}}));
+  EXPECT_EQ(j["rmse_ci95"], (nlohmann::json{.4, .6}));
+  EXPECT_EQ(j["slope"], -1);
+  EXPECT_EQ(j["slope_ci95"], (nlohmann::json{-1.5, -.5}));
+  EXPECT_EQ(j["efficiency_per_core"], 2);
+  EXPECT_TRUE(j["spp_asked"].is_null()) << "its target ends it";
+}
+
 TEST(Views, CsvHasOneLineForEachPoint) {
-  EXPECT_EQ(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}}}),
-            "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip\n"
-            "1.5,3,4,0.5,0.25,0.125,0.375,,,\n");
-  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}}).ends_with(",2,4,0.5\n"));
-  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,\n"));
+  EXPECT_EQ(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375, .375, .625}}}),
+            "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,"
+            "rmse_lo,rmse_hi\n"
+            "1.5,3,4,0.5,0.25,0.125,0.375,,,,0.375,0.625\n");
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}}).ends_with(",2,4,0.5,0,0\n"));
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,,0,0\n"));
 }
 
 }  // namespace

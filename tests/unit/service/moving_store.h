@@ -29,6 +29,7 @@ class MovingStore final : public JobStore {
     return inner_->set_truth(job, spp, truth);
   }
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override { return inner_->points(job); }
+  Result<void> remove_points(const JobId& job) override { return inner_->remove_points(job); }
   Result<void> add_log(const JobId& job, const LogLine& line) override { return inner_->add_log(job, line); }
   Result<std::vector<LogLine>> log(const JobId& job) const override { return inner_->log(job); }
   Result<void> bar(const BarredWorker& worker) override {

@@ -89,6 +89,21 @@ TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
   EXPECT_FALSE(whole(with({JobState::queued})).error_now);
 }
 
+TEST(SequenceView, IsTrustedNoMoreThanItsWorstFrame) {
+  auto frames = with({JobState::done, JobState::done, JobState::queued});
+  frames[0].judgement = Judgement{Judgement::Kind::converging, "as expected", true};
+  EXPECT_TRUE(whole(frames).judgement->trusted);
+  frames[0].few_hits = 2, frames[1].few_hits = 3;
+  frames[1].judgement = Judgement{Judgement::Kind::heavy_tail, "don't trust yet", false};
+
+  const JobView v = whole(frames);
+
+  EXPECT_FALSE(v.judgement->trusted);
+  EXPECT_EQ(v.judgement->kind, Judgement::Kind::heavy_tail);
+  EXPECT_TRUE(v.judgement->words.ends_with(": don't trust yet")) << v.judgement->words;
+  EXPECT_EQ(v.few_hits, 5u);
+}
+
 TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
   auto frames = with({JobState::done, JobState::running, JobState::queued, JobState::cancelled});
   frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;

@@ -35,6 +35,17 @@ TEST(StoredJob, RefusesDamagedJson) {
   EXPECT_FALSE(parse_stored_job("{}"));
 }
 
+TEST(StoredJob, RefusesCountsThatAreNone) {
+  const std::string text = to_json(sample_job("j-1"));
+  for (const std::string field : {"\"peak_rss_bytes\":", "\"units\":", "\"bytes\":"})
+    for (const std::string wrong : {"184467440737095516160", "-1", "1.5", "true"}) {
+      std::string changed = text;
+      const std::size_t at = changed.find(field) + field.size();
+      changed.replace(at, changed.find_first_of(",}", at) - at, wrong);
+      EXPECT_FALSE(parse_stored_job(changed)) << field << wrong;
+    }
+}
+
 TEST(StoredJob, WithASumThatIsInfiniteCanBeReadAgain) {
   StoredJob job = sample_job("j-1");
   job.totals.core_seconds = job.totals.time.load = std::numeric_limits<double>::infinity();
