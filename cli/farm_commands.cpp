@@ -67,7 +67,7 @@ int extend(FarmApi& api, const Flags& flags) {
 int watch(FarmApi& api, const Flags& flags) {
   const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json});
   if (!end) return say_rejected(end.error());
-  if (const int code = say_end(*end); code != kOk) return code;
+  if (const int code = say_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
   if (!flags.farm.json) print(job_text(*end));
   return kOk;
 }

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/say.h"
+#include "cli/verdict.h"
 #include "common/base/plain_text.h"
+#include "common/report/words.h"
 
 namespace ls::cli {
 namespace {
@@ -26,13 +29,6 @@ std::string number(const json& object, const char* key, const char* format) {
 std::string time_of(const json& object, const char* key) {
   const auto value = number_field(object, key);
   return value ? show_seconds(*value) : "-";
-}
-
-// With its interval, where it has one.
-std::string time_left(const json& job, const char* key, const char* interval) {
-  const auto ci = pair_field(job, interval);
-  return time_of(job, key) +
-         (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());
 }
 
 std::string percent(const json& object, const char* key) {
@@ -92,6 +88,53 @@ std::string frames_table(const json& frames) {
   return rows.size() == 1 ? "" : "\n" + table(rows);
 }
 
+bool is_over(const json& job) {
+  const std::string state = text_field(job, "state");
+  return state == "done" || state == "failed" || state == "cancelled";
+}
+
+// Of a job that only a target error or a time ends, `spp` is a limit that nobody asked for.
+std::string samples(const json& job) {
+  const std::string done = number(job, "spp_done", "{:.6g}"), limit = number(job, "spp", "{:.0f}");
+  const auto asked = job.find("spp_asked");
+  if (asked == job.end() || !asked->is_null()) return done + " of " + limit;
+  if (is_over(job)) return done;
+  return fmt::format("{}, until {} (at most {})", done,
+                     number_field(job, "target_error") ? "the target" : "its time is up",
+                     report::count(number_field(job, "spp").value_or(NAN)));
+}
+
+void add_known(std::vector<Row>& rows, const char* name, const json& object, const char* key,
+               const char* format = "{:.4g}") {
+  if (number_field(object, key)) rows.push_back({name, number(object, key, format)});
+}
+
+void add_pixels(std::vector<Row>& rows, const char* name, const json& job, const char* key,
+                const char* meaning) {
+  if (const double n = number_field(job, key).value_or(0); n > 0)
+    rows.push_back({name, fmt::format("{} pixels: {}", report::count(n), meaning)});
+}
+
+void add_error_rows(std::vector<Row>& rows, const json& job) {
+  rows.push_back({"relMSE", estimate_text(job, "relmse", "relmse_ci95")});
+  add_known(rows, "target relMSE", job, "target_error", "{:g}");
+  rows.push_back({"RMSE", estimate_text(job, "rmse", "rmse_ci95")});
+  if (const auto reference = job.find("reference"); reference != job.end() && reference->is_object()) {
+    add_known(rows, "true relMSE", *reference, "relmse");
+    add_known(rows, "true RMSE", *reference, "rmse");
+    add_known(rows, "FLIP", *reference, "flip");
+  }
+  add_pixels(rows, "few hits", job, "few_hits", "too few for their error to be known");
+  add_pixels(rows, "not reached yet", job, "pixels_without_samples", "the error is of the others");
+  if (const std::string words = verdict_of(job).words; !words.empty()) rows.push_back({"verdict", words});
+  if (const auto slope = number_field(job, "slope")) {
+    const auto ci = pair_field(job, "slope_ci95");
+    rows.push_back({"slope", ci ? fmt::format("{:.3g} ({:.3g} to {:.3g})", *slope, ci->first, ci->second)
+                                : fmt::format("{:.3g}", *slope)});
+  }
+  add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
+}
+
 }  // namespace
 
 std::string jobs_table(const json& answer) {
@@ -99,8 +142,9 @@ std::string jobs_table(const json& answer) {
   for (const json& job : objects(answer, "jobs"))
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
-                    time_of(job, "eta_seconds"),
+                    time_left_text(job, "eta_seconds"),
                     text(job, "name") + (unclean(job) ? " (numbers not clean)" : "") +
+                        (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
                         (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
   return rows.size() == 1 ? "no jobs" : table(rows);
 }
@@ -134,18 +178,13 @@ std::string job_text(const json& job) {
   rows.push_back({"done", percent(job, "progress")});
   if (const json* frames = frames_of(job))
     rows.push_back({"frames", fmt::format("{}: {}", text(*frames, "range"), frames_done(*frames))});
-  rows.push_back(
-      {"samples per pixel", number(job, "spp_done", "{:.6g}") + " of " + number(job, "spp", "{:.0f}")});
-  rows.push_back({"RMSE", number(job, "rmse", "{:.4g}")});
-  std::string relmse = number(job, "relmse", "{:.4g}");
-  if (const auto ci = pair_field(job, "relmse_ci95"))
-    relmse += fmt::format(" ({:.4g} to {:.4g})", ci->first, ci->second);
-  rows.push_back({"relMSE", relmse});
+  rows.push_back({"samples per pixel", samples(job)});
+  add_error_rows(rows, job);
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
-  rows.push_back({"left", time_left(job, "eta_seconds", "eta_ci95")});
+  rows.push_back({"left", time_left_text(job, "eta_seconds", "eta_ci95")});
   if (number_field(job, "eta_with_8_more"))
-    rows.push_back({"with 8 more workers", time_left(job, "eta_with_8_more", "eta_with_8_more_ci95")});
+    rows.push_back({"with 8 more workers", time_left_text(job, "eta_with_8_more", "eta_with_8_more_ci95")});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)

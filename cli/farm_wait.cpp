@@ -6,8 +6,8 @@
 #include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/patience.h"
-#include "cli/progress.h"
 #include "cli/say.h"
+#include "cli/verdict.h"
 
 namespace ls::cli {
 namespace {
@@ -16,7 +16,14 @@ using nlohmann::json;
 
 constexpr int kPollMilliseconds = 250;
 
-ProgressFigures figures_of(const json& job) {
+bool ended(const json& job) {
+  const std::string state = text_field(job, "state");
+  return state == "done" || state == "failed" || state == "cancelled";
+}
+
+}  // namespace
+
+ProgressFigures progress_of(const json& job) {
   ProgressFigures f;
   f.state = text_field(job, "state");
   f.progress = number_field(job, "progress").value_or(0);
@@ -27,6 +34,7 @@ ProgressFigures figures_of(const json& job) {
   f.relmse_ci95 = pair_field(job, "relmse_ci95");
   f.target_error = number_field(job, "target_error");
   f.eta_with_more = number_field(job, "eta_with_8_more");
+  f.doubtful = verdict_of(job).doubtful;
   f.trouble = text_field(job, "error");
   const double elapsed = number_field(job, "elapsed_seconds").value_or(0);
   if (const auto size = pair_field(job, "size"); elapsed > 0 && size)
@@ -38,13 +46,6 @@ ProgressFigures figures_of(const json& job) {
   }
   return f;
 }
-
-bool ended(const json& job) {
-  const std::string state = text_field(job, "state");
-  return state == "done" || state == "failed" || state == "cancelled";
-}
-
-}  // namespace
 
 FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options) {
   ProgressBar bar(options.quiet || options.json);
@@ -58,7 +59,7 @@ FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const Watch
       continue;
     }
     patience.answered();
-    bar.show(figures_of(*job));
+    bar.show(progress_of(*job));
     if (options.json)
       if (const std::string line = job->dump(-1, ' ', false, json::error_handler_t::replace); line != told)
         print(told = line);
@@ -66,10 +67,14 @@ FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const Watch
   }
 }
 
-int say_end(const json& job) {
+int say_end(const json& job, bool quiet) {
   say_health(job);
   const std::string state = text_field(job, "state"), id = text_field(job, "id");
-  if (state == "done") return kOk;
+  if (state == "done") {
+    if (const std::string worth = error_text(job); !worth.empty() && (!quiet || verdict_of(job).doubtful))
+      say(worth);
+    return kOk;
+  }
   const std::string error = text_field(job, "error");
   complain(fmt::format("job {} was {}{}", id, state == "failed" ? "given up" : state,
                        error.empty() ? "" : ": " + error));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "cli/farm_api.h"
+#include "cli/progress.h"
 
 namespace ls::cli {
 
@@ -16,7 +17,10 @@ struct WatchOptions {
 // waited for.
 FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
 
-// 0 for a job that is done; otherwise says why not and returns kFailed.
-int say_end(const nlohmann::json& job);
+ProgressFigures progress_of(const nlohmann::json& job);
+
+// Says what the image of a job that is done is worth, of one that is to be trusted not if `quiet`, and
+// returns kOk; otherwise says why it is not done and returns kFailed.
+int say_end(const nlohmann::json& job, bool quiet);
 
 }  // namespace ls::cli

@@ -45,6 +45,11 @@ Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
   return {};
 }
 
+bool doubtful(const std::optional<Judgement>& judgement) {
+  using Kind = Judgement::Kind;
+  return judgement && (judgement->kind == Kind::heavy_tail || judgement->kind == Kind::bias_floor);
+}
+
 ProgressFigures figures_of(const JobView& job) {
   const double samples = job.spp_done * job.size.width * job.size.height;
   return {std::string(to_string(job.state)),
@@ -58,7 +63,9 @@ ProgressFigures figures_of(const JobView& job) {
           job.eta_ci95,
           job.error_now ? std::optional(std::pair(job.error_now->relmse_lo, job.error_now->relmse_hi))
                         : std::nullopt,
-          job.target_error};
+          job.target_error,
+          {},
+          doubtful(job.judgement)};
 }
 
 void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {

@@ -8,9 +8,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <vector>
 
 #include "cli/say.h"
+#include "cli/verdict.h"
 #include "common/base/plain_text.h"
 
 namespace ls::cli {
@@ -51,6 +53,27 @@ int terminal_columns() {
   return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
 
+using Add = std::function<void(int rank, std::string text)>;
+
+void add_error(const ProgressFigures& f, const Add& add) {
+  if (!f.relmse) return;
+  add(0, fmt::format("  relMSE {:.3g}", *f.relmse));
+  if (f.doubtful) {
+    add(0, fmt::format(" ({})", kDoubt));
+  } else if (f.relmse_ci95) {
+    add(4, fmt::format(" ({:.3g} to {:.3g})", f.relmse_ci95->first, f.relmse_ci95->second));
+  }
+  if (f.target_error) add(1, fmt::format(", target {:g}", *f.target_error));
+}
+
+void add_time_left(const ProgressFigures& f, const Add& add) {
+  if (!f.eta_seconds) return;
+  add(0, fmt::format("  {}{} left", f.doubtful ? "at least " : "", show_seconds(*f.eta_seconds)));
+  if (f.eta_ci95 && !f.doubtful)
+    add(2, fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second)));
+  if (f.eta_with_more) add(5, fmt::format(", {} with 8 more", show_seconds(*f.eta_with_more)));
+}
+
 }  // namespace
 
 std::string progress_line(const ProgressFigures& f, int columns) {
@@ -59,20 +82,13 @@ std::string progress_line(const ProgressFigures& f, int columns) {
   std::vector<Part> parts;
   const auto add = [&](int rank, std::string text) { parts.push_back({rank, std::move(text)}); };
   add(0, fmt::format("{:3.0f} %", std::floor(100 * part)));
-  add(2, fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' ')));
+  add(3, fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' ')));
   if (f.state != "running") add(0, " " + plain_text(f.state));
   if (!f.frames.empty()) add(0, " " + plain_text(f.frames));
   add(0, fmt::format(" {:.1f} spp", f.spp_done));
-  if (f.samples_per_second > 0) add(5, "  " + show_rate(f.samples_per_second));
-  if (f.relmse) add(0, fmt::format("  relMSE {:.3g}", *f.relmse));
-  if (f.relmse && f.relmse_ci95)
-    add(3, fmt::format(" ({:.3g} to {:.3g})", f.relmse_ci95->first, f.relmse_ci95->second));
-  if (f.relmse && f.target_error) add(0, fmt::format(", target {:g}", *f.target_error));
-  if (f.eta_seconds) add(0, fmt::format("  {} left", show_seconds(*f.eta_seconds)));
-  if (f.eta_seconds && f.eta_ci95)
-    add(1, fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second)));
-  if (f.eta_seconds && f.eta_with_more)
-    add(4, fmt::format(", {} with 8 more", show_seconds(*f.eta_with_more)));
+  if (f.samples_per_second > 0) add(6, "  " + show_rate(f.samples_per_second));
+  add_error(f, add);
+  add_time_left(f, add);
   if (!f.trouble.empty()) add(0, "  " + plain_text(f.trouble));
   return fitted(parts, columns);
 }

@@ -10,6 +10,7 @@
 #include "cli/health_lines.h"
 #include "cli/json_fields.h"
 #include "cli/say.h"
+#include "cli/verdict.h"
 
 namespace ls::cli {
 namespace {
@@ -19,14 +20,14 @@ using nlohmann::json;
 double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
 
 // What less error would cost.
-std::string outlook(const json& report) {
+std::string outlook(const json& report, bool doubtful) {
   const auto forecast = report.find("forecast");
   if (forecast == report.end() || !forecast->is_object()) return "";
   const double more = number(*forecast, "core_seconds");
   if (!(more > 0)) return "";
-  std::string line =
-      fmt::format("; {:.3g} would cost {} more on one core", number(*forecast, "target"), show_seconds(more));
-  if (const auto ci = pair_field(*forecast, "core_seconds_ci95"))
+  std::string line = fmt::format("; {:.3g} would cost {}{} more on one core", number(*forecast, "target"),
+                                 doubtful ? "at least " : "", show_seconds(more));
+  if (const auto ci = pair_field(*forecast, "core_seconds_ci95"); ci && !doubtful)
     line += fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second));
   return line;
 }
@@ -59,13 +60,14 @@ std::string report_summary(const std::string& report) {
       fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
                   show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
   if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
-  if (const auto ci = pair_field(j, "relmse_ci95"))
+  const Verdict verdict = verdict_of_report(j);
+  if (const auto ci = pair_field(j, "relmse_ci95"); ci && !verdict.doubtful)
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
   if (const auto truth = number_field(j, "true_relmse")) line += fmt::format(", true relMSE {:.3g}", *truth);
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
-  if (text_field(j, "verdict_kind") != "early" || j.value("trusted", true) == false)
-    line += ": " + text_field(j, "verdict");
-  return line + outlook(j);
+  const bool news = verdict.doubtful || text_field(j, "verdict_kind") != "early";
+  if (news && !verdict.words.empty()) line += ": " + verdict.words;
+  return line + outlook(j, verdict.doubtful);
 }
 
 void say_report_health(const std::string& report) {

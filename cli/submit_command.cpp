@@ -62,7 +62,7 @@ int wait_and_fetch(const std::string& id, const Flags& flags) {
   if (!api) return say_error(api.error());
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return say_rejected(end.error());
-  if (const int code = say_end(*end); code != kOk) return code;
+  if (const int code = say_end(*end, flags.quiet); code != kOk) return code;
   return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
 }
 
