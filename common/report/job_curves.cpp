@@ -34,7 +34,7 @@ std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock&
   const double pace = clock.id == std::string_view(kCores.id) ? 1 : now / number(last, "core_seconds");
   if (!std::isfinite(pace)) return std::nullopt;
   Ahead ahead{now + pace * more, 0, 0, 0};
-  if (const auto ci = interval(forecast, "core_seconds_ci95")) {
+  if (const auto ci = interval(forecast, "core_seconds_ci95"); ci && !doubtful(report)) {
     ahead.x_lo = now + pace * ci->first;
     ahead.x_hi = now + pace * ci->second;
   }
@@ -87,25 +87,25 @@ std::string table(const std::vector<Json>& points) {
     head += fmt::format("<th scope=\"col\">{}</th>", name);
   if (truth) head += "<th scope=\"col\">True relMSE</th>";
   if (flip) head += "<th scope=\"col\">FLIP</th>";
+  const std::string title =
+      points.size() > kMostRows ? fmt::format("The last {} of {} points as a table", kMostRows, points.size())
+                                : "The points as a table";
   return fmt::format(
-      "<details><summary>The points as a table</summary><div class=\"wide\"><table><caption "
+      "<details><summary>{}</summary><div class=\"wide\"><table><caption "
       "class=\"unseen\">Error at each "
       "checkpoint</caption><thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div></details>",
-      head, rows);
+      title, head, rows);
 }
 
 std::string slope(const Json& report) {
   const double value = number(report, "slope");
-  if (!std::isfinite(value)) return "";
+  if (!std::isfinite(value)) return verdict_words(report);
   const auto with_sign = [](double x) { return fmt::format("{}{:.2f}", x < 0 ? "−" : "", std::abs(x)); };
   std::string out = fmt::format("Slope <b>{}</b>", with_sign(value));
   if (const auto ci = interval(report, "slope_ci95"))
     out +=
         fmt::format(" ({} to {}; independent samples give −1)", with_sign(ci->first), with_sign(ci->second));
-  const std::string verdict = text(report, "verdict"),
-                    trend = verdict.empty() ? text(report, "trend") : verdict;
-  if (!trend.empty()) out += ": " + escape_html(trend);
-  return out + ". ";
+  return out + ". " + verdict_words(report);
 }
 
 }  // namespace
@@ -115,12 +115,14 @@ std::string outlook(const Json& report) {
   const double target = number(forecast, "target"), more = number(forecast, "core_seconds");
   if (!(target > 0) || !(more > 0)) return "";
   const bool asked = flag(forecast, "asked", false);
-  std::string out = fmt::format("relMSE {} {} {} more of core time", asked ? given(target) : figure(target),
-                                asked ? "needs" : "would need", duration(more));
-  if (const std::string ci = range(interval(forecast, "core_seconds_ci95"), duration); !ci.empty())
+  const char* least = doubtful(report) ? "at least " : "";
+  std::string out = fmt::format("relMSE {} {} {}{} more of core time", asked ? given(target) : figure(target),
+                                asked ? "needs" : "would need", least, duration(more));
+  if (const std::string ci = range(interval(forecast, "core_seconds_ci95"), duration);
+      !ci.empty() && !doubtful(report))
     out += fmt::format(" ({})", ci);
   if (const double spp = number(forecast, "spp"); spp > 0)
-    out += fmt::format(", to {} samples per pixel", count(spp));
+    out += fmt::format(", to {}{} samples per pixel", least, count(spp));
   return out + ".";
 }
 

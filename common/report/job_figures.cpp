@@ -17,8 +17,8 @@ struct Part {
   const char* meaning;
 };
 constexpr std::array kParts{
-    Part{"load", "load", "fetching and reading what the scene names"},
-    Part{"build", "build", "making it ready to trace"},
+    Part{"load", "load", "getting the files that the scene names"},
+    Part{"build", "build", "reading them and building the world"},
     Part{"render", "render", "tracing"},
     Part{"transfer", "transfer", "packing results to be sent"},
     Part{"merge", "merge", "folding and measuring, in the coordinator"},
@@ -33,6 +33,7 @@ std::string fact(const char* name, const std::string& value, const std::string& 
 }
 
 std::string within(const Json& report, const char* key) {
+  if (doubtful(report)) return "don&#39;t trust yet";
   const auto ci = interval(report, key);
   return ci ? fmt::format("95 %: {} to {}", figure(ci->first), figure(ci->second)) : std::string();
 }
@@ -60,10 +61,16 @@ std::string true_figures(const Json& report) {
          fact("FLIP", figure(number(reference, "flip")), "0: looks the same");
 }
 
+std::string threads_of(const Json& report) {
+  const double threads = number(report, "threads");
+  return threads > 0 ? fmt::format(", {} thread{}", threads_words(threads), threads == 1 ? "" : "s")
+                     : std::string();
+}
+
 std::string lesser_figures(const Json& report) {
   std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
   out += true_figures(report);
-  out += fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)");
+  out += fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)" + threads_of(report));
   out += fact("Efficiency per core", figure(number(report, "efficiency_per_core")),
               "1 / (relMSE × core seconds)");
   out += fact("Samples", count(number(report, "samples")), "");
@@ -114,8 +121,8 @@ std::string time_split(const Json& report) {
   }
   return section("Where the time went",
                  bar(time, total) +
-                     "<table class=\"split\"><caption class=\"unseen\">Core time by what it was spent on"
-                     "</caption><tbody>\n" +
+                     "<table class=\"split\"><caption>Seconds of threads: of <i>render</i> their CPU "
+                     "time, of the others by the clock.</caption><tbody>\n" +
                      rows + "</tbody></table>");
 }
 

@@ -34,22 +34,8 @@ std::string how_it_ended(const Json& report) {
                           : stopped == "time"  ? "its time was up"
                           : stopped == "user"  ? "someone stopped it"
                                                : "";
-  if (state == "done" || state.empty()) return why.empty() ? state : "done: " + why;
-  return state + (state == "running" ? ": figures so far" : "");
-}
-
-bool doubtful(const Json& report) {
-  const std::string kind = text(report, "verdict_kind");
-  return kind.empty() ? !flag(report, "trusted", true) : kind == "heavy_tail" || kind == "bias_floor";
-}
-
-std::string verdict(const Json& report) {
-  const std::string note = text(report, "note"), words = text(report, "verdict");
-  std::string out;
-  if (doubtful(report) && !words.empty())
-    out += "<p class=\"verdict\" role=\"note\">" + escape_html(words) + "</p>";
-  if (!note.empty()) out += "<p class=\"note\">" + escape_html(note) + "</p>";
-  return out;
+  if (state == "running") return "running: figures so far";
+  return why.empty() ? state : (state.empty() ? "done" : state) + ": " + why;
 }
 
 std::string header(const Json& report) {
@@ -111,7 +97,7 @@ Result<std::string> job_page(const JobPage& page) {
   const Json report = Json::parse(page.report, nullptr, false);
   if (!report.is_object())
     return fail(Errc::invalid_argument, "the report is no JSON object, so no page can be made of it");
-  const std::string body = "<main>\n" + header(report) + pictures(page, report) + figures(report) +
+  const std::string body = "<main>\n" + header(report) + failure(report) + pictures(page, report) + figures(report) +
                            verdict(report) + curves(report) + time_split(report) + health(report) +
                            features(report) + provenance(report) + "</main>";
   return document(name_of(report) + " · Lightshaft report", css(), body);

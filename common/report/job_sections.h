@@ -8,6 +8,12 @@
 
 namespace ls::report {
 
+// ---- what to think of it (job_verdict.cpp) ----
+bool doubtful(const Json& report);              // its error figures are not to be relied on yet
+std::string verdict(const Json& report);        // why they are not, and what else is to be known of them
+std::string verdict_words(const Json& report);  // of one that is not doubtful, a sentence; empty: none
+std::string failure(const Json& report);
+
 // ---- error against time (job_curves.cpp) ----
 std::string curves(const Json& report);
 std::string outlook(const Json& report);  // what less error would cost, a sentence; empty: not known

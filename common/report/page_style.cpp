@@ -36,6 +36,8 @@ section .pair{margin-top:0}
 .figures small{display:block;font-size:.8rem}
 .lesser{margin-top:1.5rem;padding-top:1.25rem;border-top:1px solid var(--edge)}
 .verdict{margin-top:1.5rem;padding:.8rem 1.1rem;border:1px solid var(--warn);border-radius:8px;background:var(--veil);color:var(--warn)}
+.failure{margin:1.5rem 0;padding:.8rem 1.1rem;border:1px solid var(--bad);border-radius:8px}.failure b{color:var(--bad);font-weight:500}
+caption{caption-side:bottom;text-align:left;color:var(--soft);padding-top:.5rem}
 .note{margin-top:.9rem;font-size:.92rem}.note b{color:var(--ink);font-weight:500}
 .good{color:var(--good)}.bad h2{color:var(--bad)}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}

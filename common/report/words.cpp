@@ -57,6 +57,10 @@ std::string count(double n) {
   return grouped;
 }
 
+std::string threads_words(double n) {
+  return std::isfinite(n) && std::abs(n) < 1e6 ? fmt::format("{:g}", std::round(10 * n) / 10) : kAbsent;
+}
+
 std::string byte_size(double n) {
   static constexpr std::array kUnits{"B", "KiB", "MiB", "GiB", "TiB"};
   if (!std::isfinite(n)) return kAbsent;

@@ -17,6 +17,7 @@ json some_report() {
     "samples": 39321600, "render_seconds": 95.1, "core_seconds": 88.3, "load_seconds": 0.7, "peak_rss_bytes": 36347904,
     "rmse": 0.046, "relmse": 0.022, "relmse_ci95": [0.0125, 0.0389], "target_error": 0.005, "slope": -0.91,
     "slope_ci95": [-0.99, -0.83], "trend": "converging as expected", "trusted": true, "verdict": "converging as expected",
+    "verdict_kind": "converging", "error": null, "threads": 3.5, "pixels_without_samples": 0, "efficiency": 0.5,
     "forecast": {"target": 0.005, "asked": true, "spp": 2048, "core_seconds": 300, "core_seconds_ci95": [222, 420]},
     "time": {"load": 1, "build": 2, "render": 80, "transfer": 4, "merge": 1, "idle": 12},
     "health": {"clean": true, "causes": []}, "clamped_values": 0, "seed": 7, "integrator": "volpath", "scene": "abcd",
@@ -104,20 +105,130 @@ TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
   EXPECT_EQ(times(page_of(some_report()), "polyline class=\"line c1"), 0u);
 }
 
+void doubt(json& report) {
+  report["trusted"] = false;
+  report["verdict"] = "don't trust yet: few pixels carry the error";
+  report["verdict_kind"] = "heavy_tail";
+}
+
+void expect_not(const std::string& page, std::string_view words) {
+  EXPECT_EQ(page.find(words), std::string::npos) << '"' << words << "\" is in\n" << page;
+}
+
 TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
   json report = some_report();
-  report["trusted"] = false;
-  report["verdict"] = "don't trust yet";
+  doubt(report);
   report["few_hits_pixels"] = 12;
   report["health"] =
       json::parse(R"({"clean": false, "causes": [{"text": "3 samples were not a number", "frame": null,
     "first": [{"pixel": [412, 96], "sample": 1100}], "replay": "lightshaft render x.xml --pixel 412,96 --sample 1100"}]})");
   const std::string page = page_of(report);
 
-  expect(page, "class=\"verdict\" role=\"note\">don&#39;t trust yet");
+  expect(page, "class=\"verdict\" role=\"note\">don&#39;t trust yet: few pixels carry the error");
+  EXPECT_EQ(times(page, "few pixels carry the error"), 1u);
   expect(page, "3 samples were not a number; first at pixel 412,96, sample 1,100.");
   expect(page, "lightshaft render x.xml --pixel 412,96 --sample 1100");
   expect(page, "12 pixels got too few hits");
+}
+
+// However early it is, and whatever the report calls it.
+TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {
+  for (const char* kind : {"early", "heavy_tail", "bias_floor", ""}) {
+    json report = some_report();
+    doubt(report);
+    report["verdict_kind"] = kind;
+    report.erase("slope");
+    expect(page_of(report), "class=\"verdict\"");
+  }
+  json older = some_report();
+  older.erase("trusted");
+  older["verdict_kind"] = "bias_floor";
+  expect(page_of(older), "class=\"verdict\"");
+  expect_not(page_of(some_report()), "class=\"verdict\"");
+}
+
+TEST(JobPage, InDoubtPromisesNothing) {
+  json report = some_report();
+  doubt(report);
+  report["rmse_ci95"] = {0.0401, 0.0502};
+  const std::string page = page_of(report);
+
+  expect(page, "<b>0.0220</b><small>don&#39;t trust yet</small>");
+  expect(page, "<b>0.0460</b><small>don&#39;t trust yet</small>");
+  expect(page, "relMSE 0.005 needs at least 5 min more of core time, to at least 2,048 samples per pixel.");
+  for (const char* claim : {"0.0125 to 0.0389", "0.0401", "3.7 min", "converging as expected"})
+    expect_not(page, claim);
+}
+
+TEST(JobPage, SaysTheVerdictAlsoBeforeThereIsASlope) {
+  json report = some_report();
+  report["slope"] = report["slope_ci95"] = report["trend"] = nullptr;
+  report["verdict_kind"] = "early";
+  report["verdict"] = "too early to tell how it converges";
+  expect(page_of(report), "<p class=\"note\">Too early to tell how it converges. relMSE 0.005 needs");
+
+  report["convergence"] = json::array();
+  expect(page_of(report), "Too early to tell how it converges.");
+}
+
+TEST(JobPage, OfAFailedJobSaysWhy) {
+  json report = some_report();
+  report["state"] = "failed";
+  report["stopped"] = nullptr;
+  report["error"] = "SIGSEGV on 3 workers\nat pixel 412,96";
+  const std::string page = page_of(report);
+
+  expect(page, "<b>The job failed</b><pre>SIGSEGV on 3 workers\nat pixel 412,96</pre>");
+  expect_not(page_of(some_report()), "The job failed");
+}
+
+TEST(JobPage, SaysWhatStoppedAJobThatWasNotDone) {
+  json report = some_report();
+  report["state"] = "cancelled";
+  report["stopped"] = "user";
+  expect(page_of(report), "cancelled: someone stopped it");
+}
+
+TEST(JobPage, SaysThatSomeOfTheImageHasNoSampleYet) {
+  json report = some_report();
+  report["pixels_without_samples"] = 12800;
+  expect(page_of(report),
+         "No sample has reached 12,800 of 76,800 pixels yet: the error figures are of the others.");
+  report.erase("size");
+  expect(page_of(report), "No sample has reached 12,800 pixels yet");
+  expect_not(page_of(some_report()), "No sample has reached");
+}
+
+TEST(JobPage, ATableThatIsCutSaysSo) {
+  json report = some_report();
+  const json point = report["convergence"][0];
+  report["convergence"] = json::array();
+  for (int i = 1; i <= 300; ++i) {
+    report["convergence"].push_back(point);
+    report["convergence"].back()["seconds"] = i;
+  }
+  const std::string page = page_of(report);
+
+  expect(page, "<summary>The last 256 of 300 points as a table</summary>");
+  expect_not(page, "<td>44 s</td>");
+  expect(page, "<td>45 s</td>");
+  expect(page_of(some_report()), "<summary>The points as a table</summary>");
+}
+
+TEST(JobPage, SaysWhoseSecondsItCounts) {
+  const std::string page = page_of(some_report());
+
+  for (const char* words : {"getting the files that the scene names", "reading them and building the world",
+                            "Seconds of threads: of <i>render</i> their CPU time, of the others by the clock.",
+                            "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
+    expect(page, words);
+}
+
+TEST(JobPage, ThreadsAreThoseOfOneMachineOrTheMeanOfAFarm) {
+  json report = some_report();
+  expect(page_of(report), "<dt>Threads</dt><dd><span>3.5</span>");
+  report["threads"] = 16;
+  expect(page_of(report), "<dt>Threads</dt><dd><span>16</span>");
 }
 
 // Every text of the report, wherever it stands, is a stranger's.
@@ -131,6 +242,7 @@ TEST(JobPage, NoTextOfTheReportBecomesMarkup) {
   json report = some_report();
   report["warnings"] = {"w"};
   report["note"] = "n";
+  report["error"] = "e";
   report["trusted"] = false;
   report["build"] = report["pixels_sha256"] = report["numeric_class"] = "x";
   report["features_used"] = report["features_left_out"] = {"f"};

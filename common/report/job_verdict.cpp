@@ -1,0 +1,58 @@
+#include <fmt/format.h>
+
+#include "common/report/html.h"
+#include "common/report/job_sections.h"
+#include "common/report/words.h"
+
+namespace ls::report {
+namespace {
+
+std::string paragraph(const char* css_class, const std::string& markup) {
+  return markup.empty() ? "" : fmt::format("<p class=\"{}\">{}</p>", css_class, markup);
+}
+
+std::string unreached(const Json& report) {
+  const double missing = number(report, "pixels_without_samples");
+  if (!(missing > 0)) return "";
+  const auto size = interval(report, "size");
+  return fmt::format("No sample has reached {}{} pixels yet: the error figures are of the others.",
+                     count(missing), size ? " of " + count(size->first * size->second) : std::string());
+}
+
+}  // namespace
+
+bool doubtful(const Json& report) {
+  const std::string kind = text(report, "verdict_kind");
+  return !flag(report, "trusted", true) || kind == "heavy_tail" || kind == "bias_floor";
+}
+
+std::string verdict_words(const Json& report) {
+  if (doubtful(report)) return "";
+  std::string words = text(report, "verdict");
+  if (words.empty()) words = text(report, "trend");
+  if (words.empty()) return "";
+  if (words[0] >= 'a' && words[0] <= 'z') words[0] = static_cast<char>(words[0] - 'a' + 'A');
+  return escape_html(words) + ". ";
+}
+
+std::string verdict(const Json& report) {
+  std::string out;
+  if (doubtful(report)) {
+    const std::string words = text(report, "verdict");
+    out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
+                       words.empty() ? "This error estimate can&#39;t be trusted yet." : escape_html(words));
+  } else if (objects(report, "convergence").empty()) {  // else it stands under the curves
+    out += paragraph("note", verdict_words(report));
+  }
+  return out + paragraph("note", unreached(report)) + paragraph("note", escape_html(text(report, "note")));
+}
+
+std::string failure(const Json& report) {
+  const std::string why = text(report, "error");
+  if (why.empty()) return "";
+  return fmt::format("<div class=\"failure\" role=\"note\"><b>{}</b><pre>{}</pre></div>\n",
+                     text(report, "state") == "failed" ? "The job failed" : "Something is wrong",
+                     escape_html(why));
+}
+
+}  // namespace ls::report
