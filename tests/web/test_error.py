@@ -103,6 +103,69 @@ def test_what_has_no_logarithm_is_left_out(open_page, farm, points):
     assert page.evaluate(f"import('/js/plot_scale.js').then(({{ drawable }}) => drawable({points}, 'seconds').length)") == 0
 
 
+# ---- what is not to be trusted ----
+
+HEAVY = {"kind": "heavy_tail", "words": "don't trust yet: few pixels carry the error", "trusted": False}
+EARLY = {"kind": "early", "words": "no sample has found light", "trusted": False}
+
+
+@pytest.mark.parametrize("verdict", [HEAVY, EARLY, {"kind": "bias_floor", "words": "bias floor"}])
+def test_a_job_in_doubt_shows_no_interval(farm, dashboard, verdict):
+    farm.jobs["j-1"] = job(**WITH_TARGET, verdict=verdict, rmse_ci95=[0.04, 0.06])
+    farm.report = report(1, 2, 4, 8)
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.plot-point')")
+
+    facts, plot = page.text(".figures"), page.text(".plot figure") + page.text(".plot-verdict")
+
+    assert facts.count("don't trust yet") == 2 and "95 %" not in facts and "0.0400" not in facts
+    assert "Time left, at least" in facts and "at least 60 s left" in page.text(".job-head .sub")
+    assert "95 %" not in plot and "not before" in plot and page.count(".plot-fan") == 0
+    assert page.text(".plot-verdict .doubt") == verdict["words"]
+
+
+def test_a_job_that_is_trusted_again_gets_its_interval_back(farm, dashboard):
+    farm.jobs["j-1"] = job(verdict=EARLY)
+    page = dashboard()
+    page.wait("document.querySelector('[data-job] .doubt')")
+    assert "at least 42 s" in " ".join(page.text("[data-job]").split())
+
+    farm.change("j-1", verdict={"kind": "converging", "words": "converging as expected", "trusted": True})
+
+    page.wait("!document.querySelector('[data-job] .doubt')")
+    assert "at least" not in page.text("[data-job]")
+
+
+def test_an_early_report_that_is_not_trusted_is_marked(farm, dashboard):
+    """Also by a coordinator whose jobs have no verdict."""
+    farm.jobs["j-1"] = job()
+    farm.report = report(1, 2, verdict_kind="early", trusted=False, verdict="no sample has found light")
+    page = dashboard("#/jobs/j-1")
+
+    assert page.wait("document.querySelector('.plot-verdict .doubt')?.innerText") == "no sample has found light"
+
+
+def test_a_part_of_the_image_says_that_it_is_one(farm, dashboard):
+    farm.jobs["j-1"] = job(pixels_without_samples=2048)
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.figures')?.innerText.includes('of the part rendered so far')")
+    assert "95 %" not in page.text(".figures")
+
+
+@pytest.mark.parametrize("fields, shown", [
+    ({"spp_asked": None, "target_error": 0.001}, "until the target at most 65,536"), ({"spp_asked": None}, "until its time is up at most 65,536"),
+    ({"spp_asked": None, "target_error": 0.001, "state": "done", "stopped": "error"}, "for the target at most 65,536"),
+    ({"spp_asked": 65536, "target_error": 0.001}, "of 65,536"), ({}, "of 65,536")])
+def test_samples_that_nobody_asked_for_are_no_goal(farm, dashboard, fields, shown):
+    farm.jobs["j-1"] = job(spp=65536, spp_done=88, **fields)
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.figures')")
+
+    assert f"Samples per pixel 88 {shown} RMSE" in " ".join(page.text(".figures").split())
+
+
 # ---- maps ----
 
 def middle_pixel(page):

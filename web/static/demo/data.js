@@ -10,13 +10,23 @@ const job = (id, name, state, more = {}) => ({
 
 const half = {
   progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252, eta_ci95: [186, 330], eta_with_8_more: 66,
-  units_done: 1240, elapsed_seconds: 187, core_seconds: 742,
+  units_done: 1240, elapsed_seconds: 187, core_seconds: 742, spp_asked: 512, rmse_ci95: [0.0302, 0.0322], slope: -0.98, slope_ci95: [-1.06, -0.9], efficiency_per_core: 0.322,
   time: { load: 2.1, build: 9.4, render: 742, transfer: 6.2, merge: 3.9, idle: 21.5 },
 };
 
+const kTrusted = { kind: "converging", words: "converging as expected", trusted: true };
+const kHeavy = { kind: "heavy_tail", words: "don't trust yet: few pixels carry the error (like 16 of 230400; the worst one 25 %); bright outliers may still be missing", trusted: false };
+// Only its target ends it, and a few bright pixels keep its error from being known.
+const untrusted = {
+  progress: 0.071, spp: 65536, spp_asked: null, spp_done: 36, rmse: 0.0921, rmse_ci95: [0.0876, 0.0968], relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], target_error: 0.005,
+  eta_seconds: 4310, eta_ci95: [3200, 6100], eta_with_8_more: 1140, eta_with_8_more_ci95: [850, 1600], units_done: 2448, units_total: 34680, elapsed_seconds: 880, core_seconds: 3490,
+  verdict: kHeavy, slope: -0.71, slope_ci95: [-0.95, -0.47], efficiency_per_core: 0.00742, few_hits: 31, size: [1920, 1080],
+  time: { load: 0.4, build: 3.1, render: 3490, transfer: 21, merge: 14.2, idle: 38 },
+};
+
 export const jobs = [
-  job("j-7f3a91c2", "steam-bath.xml", "running", { ...half, submitted_unix: kNow - 240 }),
-  job("j-a04be6d1", "shafts.xml", "running", { progress: 0.071, spp_done: 36, relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], eta_seconds: 4310, submitted_unix: kNow - 900, size: [1920, 1080] }),
+  job("j-7f3a91c2", "steam-bath.xml", "running", { ...half, verdict: kTrusted, submitted_unix: kNow - 240 }),
+  job("j-a04be6d1", "shafts.xml", "running", { ...untrusted, submitted_unix: kNow - 900 }),
   job("j-22c81f09", "cloud.xml", "paused", { progress: 0.31, spp_done: 158.7, relmse: 0.000072, relmse_ci95: [0.000069, 0.000076], submitted_unix: kNow - 1500 }),
   job("j-5be0d7aa", "tint.xml", "queued", { spp: 4096, submitted_unix: kNow - 20 }),
   job("j-91d2c3f4", "fogbox.xml", "done", { progress: 1, spp_done: 512, spp: 512, stopped: "error", rmse: 0.0152, relmse: 0.00098, relmse_ci95: [0.00094, 0.00102], target_error: 0.001, units_done: 2880, elapsed_seconds: 423, core_seconds: 1684, time: { load: 2.1, build: 9.4, render: 1684, transfer: 12.2, merge: 8.1, idle: 33 }, submitted_unix: kNow - 5400 }),
@@ -24,11 +34,11 @@ export const jobs = [
     progress: 0.02, spp_done: 10, submitted_unix: kNow - 7200, elapsed_seconds: 6, core_seconds: 9,
     error: "unit (tile 37, round 3) ended the renderer with SIGSEGV on 3 workers (lab-01, lab-02, lab-04),\nat pixel 412,96, sample 11. The job was stopped.\nReplay it: lightshaft render forge-v12.xml --pixel 412,96 --sample 11",
   }),
-  job("j-0a4417bb", "spotfog.xml", "cancelled", { progress: 0.55, spp_done: 281, relmse: 0.0021, relmse_ci95: [0.0019, 0.0023], submitted_unix: kNow - 90000, elapsed_seconds: 99 }),
+  job("j-0a4417bb", "spotfog.xml", "cancelled", { stopped: "user", progress: 0.55, spp_done: 281, relmse: 0.0021, relmse_ci95: [0.0019, 0.0023], submitted_unix: kNow - 90000, elapsed_seconds: 99 }),
 ];
 
 export const unhealthy = job("j-7f3a91c2", "steam-bath.xml", "running", {
-  ...half, submitted_unix: kNow - 240, health: { clean: false, nonfinite: 3, negative: 0, majorant_violations: 1204, causes: [
+  ...half, verdict: { ...kHeavy, words: "Don't trust this estimate yet: a few pixels carry most of the error." }, submitted_unix: kNow - 240, health: { clean: false, nonfinite: 3, negative: 0, majorant_violations: 1204, causes: [
     { cause: "not_a_number", effect: "rejected", count: 3, text: "3 samples were not a number (NaN); they count as zero", frame: null, first: [{ pixel: [412, 96], sample: 11 }], replay: "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 412,96 --sample 11" },
     { cause: "majorant_violation", effect: "kept", count: 1204, text: "1,204 times a medium was denser than its bound, so the image may be biased", frame: null, first: [{ pixel: [300, 2], sample: 7 }], replay: "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 300,2 --sample 7" },
     { cause: "negative_density", effect: "input", count: 37, text: "37 negative values of volumes of the scene were made 0", frame: null, first: [], replay: null },
@@ -80,6 +90,13 @@ export const report = {
     const spread = 0.07 + 0.35 / Math.sqrt(seconds + 1);
     return { seconds, core_seconds: seconds * 3.97, spp: Math.max(2, 1.147 * seconds), rmse: Math.sqrt(relmse) * 0.48, relmse, relmse_ci95: [relmse / (1 + spread), relmse * (1 + spread)] };
   }),
+};
+/** The report of the job in data.jobs that is not to be trusted. */
+export const untrustedReport = {
+  target_error: 0.005, slope: -0.71, slope_ci95: [-0.95, -0.47], trend: "slower than expected", trusted: false, verdict: kHeavy.words, verdict_kind: kHeavy.kind,
+  forecast: { target: 0.005, asked: true, spp: 480, core_seconds: 17000, core_seconds_ci95: [12700, 24200] },
+  convergence: [[2, 49, 0.21], [4, 98, 0.16], [8, 195, 0.17], [16, 391, 0.068], [32, 783, 0.0402], [36, 880, 0.0386]].map(([samples, seconds, relmse]) => ({
+    seconds, core_seconds: seconds * 3.97, spp: samples, rmse: Math.sqrt(relmse) * 0.47, relmse, relmse_ci95: [relmse / 1.4, relmse * 1.4] })),
 };
 export const doubtful = { ...report, trusted: false, verdict_kind: "heavy_tail", verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
 

@@ -1,6 +1,6 @@
 // One job: its image as it fills in, how wrong that image still is, and who is at work on it.
 import { h } from "../dom.js";
-import { healthComplaints, ownerOf, seesOthers } from "../state.js";
+import { healthComplaints, isOver, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
@@ -9,6 +9,7 @@ import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
+import { timeLeft } from "../verdict.js";
 
 const kStopped = { spp: "all its samples are in", error: "the target error is reached", time: "its time was up", user: "someone stopped it" };
 
@@ -45,9 +46,9 @@ function heading(state, job, actions) {
 
 function sentence(job) {
   if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${kStopped[job.stopped] ?? "finished"}.`;
-  if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${duration(job.eta_seconds)} left`} · handed in ${moment(job.submitted_unix)}`;
+  if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · handed in ${moment(job.submitted_unix)}`;
   if (job.state === "queued") return "Waiting for a worker that may take it.";
-  return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}.`;
+  return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && kStopped[job.stopped] ? `: ${kStopped[job.stopped]}` : ""}.`;
 }
 
 function alerts(job) {

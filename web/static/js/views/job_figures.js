@@ -1,33 +1,42 @@
 // The figures of one job, and its tiles in flight.
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
-import { count, duration, figure, given, interval, plural, spp } from "../format.js";
+import { count, duration, figure, given, plural, spp } from "../format.js";
+import { confidence, doubtful, kDoubt } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
 
 /** What follows each figure has its lines kept free, so that nothing moves when it becomes known. */
 export function figures(job) {
-  const ci = interval(job.relmse_ci95);
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
-    fact("relMSE", figure(job.relmse), [ci ? `95 %: ${ci}` : "not known yet", job.target_error > 0 ? `target ${given(job.target_error)}` : null], "key"),
-    isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact("Time left", duration(job.eta_seconds), timeNotes(job), "key"),
-    fact("Samples per pixel", spp(job.spp_done), [`of ${count(job.spp)}`]),
-    fact("RMSE", figure(job.rmse)),
+    fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 ? `target ${given(job.target_error)}` : null], "key"),
+    isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(doubtful(job.verdict) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
+    fact("Samples per pixel", spp(job.spp_done), samplesAsked(job)),
+    fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),
     fact("Core time", duration(job.core_seconds)),
+    fact("Efficiency", figure(job.efficiency_per_core), ["1 / (relMSE × core s)"]),
     job.reference ? trueFigures(job.reference) : null,
     fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
     fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
+}
+
+/** Of a job that only a target error or a time ends, `spp` is a limit that nobody asked for. */
+function samplesAsked(job) {
+  if (job.spp_asked !== null) return [`of ${count(job.spp)}`];
+  const end = job.target_error > 0 ? ["until the target", "for the target"] : ["until its time is up", "in its time"];
+  return [end[isOver(job) ? 1 : 0], `at most ${count(job.spp)}`];
 }
 
 const between = (interval) => (Array.isArray(interval) ? ` (${duration(interval[0])} to ${duration(interval[1])})` : "");
 
 /** What the forecast leaves open, and what more workers would do. */
 function timeNotes(job) {
+  const sure = !doubtful(job.verdict);
   return [
-    job.eta_ci95 ? `95 %: ${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : `${duration(job.elapsed_seconds)} so far`,
-    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}${between(job.eta_with_8_more_ci95)}` : null];
+    sure && job.eta_ci95 ? `95 %: ${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : `${duration(job.elapsed_seconds)} so far`,
+    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}${sure ? between(job.eta_with_8_more_ci95) : ""}` : null];
 }
 
 const trueFigures = ({ relmse, rmse, flip }) => [
@@ -35,7 +44,7 @@ const trueFigures = ({ relmse, rmse, flip }) => [
   flip === null || flip === undefined ? null : fact("FLIP", figure(flip), [], "true")];
 
 const fact = (name, value, notes = [], className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name),
-  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i }, note))));
+  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i, class: note === kDoubt ? "doubt" : null }, note))));
 
 export function inFlight(state, job) {
   if (isOver(job)) return null;

@@ -1,7 +1,8 @@
 // All jobs.
 import { h } from "../dom.js";
-import { jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
+import { isOver, jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
+import { doubtful, kDoubt } from "../verdict.js";
 import { jobActions, progressBar, safeClass, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
@@ -29,13 +30,16 @@ function row(state, job, actions) {
     seesOthers(state) ? h("td", { key: "owner", class: "owner", "data-label": "Owner" }, ownerOf(job)) : null,
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
-    h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), h("span", { class: "of" }, ` / ${count(job.spp)}`)),
-    figureCell("relMSE", figure(job.relmse)),
-    figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null)),
+    h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), job.spp_asked === null ? goal(job) : h("span", { key: "of", class: "of" }, ` / ${count(job.spp)}`)),
+    figureCell("relMSE", figure(job.relmse), doubtful(job.verdict) ? h("small", { key: "doubt", class: "doubt" }, kDoubt) : null),
+    figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null), null, job.state === "running" && doubtful(job.verdict) ? h("small", { key: "least" }, "at least ") : null),
     h("td", { class: "acts" }, jobActions(state, job, actions)));
 }
 
-const figureCell = (label, text) => h("td", { class: text === kAbsent ? "number absent" : "number", "data-label": label }, text);
+/** What ends a job whose samples nobody asked for. */
+const goal = (job) => (isOver(job) ? null : h("small", { key: "goal" }, job.target_error > 0 ? "until the target" : "until its time is up"));
+
+const figureCell = (label, text, after = null, before = null) => h("td", { class: text === kAbsent ? "number absent" : "number", "data-label": label }, before, text, after);
 
 function firstSteps() {
   const origin = globalThis.location?.origin ?? "http://localhost:8080";

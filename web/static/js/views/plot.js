@@ -2,6 +2,7 @@
 import { h } from "../dom.js";
 import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
+import { doubtful, kDoubt, verdictOf } from "../verdict.js";
 import { choice } from "./pieces.js";
 import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
@@ -12,11 +13,14 @@ const kSince = { seconds: "after the first ray", core_seconds: "of core time" };
 export function errorPlot(job, { clock, picked, report }, actions, narrow) {
   const points = drawable(report?.convergence, clock);
   const plot = { points, key: clock, target: job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
+  const verdict = verdictOf(job, report);
+  plot.doubt = doubtful(verdict);
+  if (plot.doubt && plot.ahead) plot.ahead = { ...plot.ahead, lo: null, hi: null };
   plot.chosen = points[picked] ? picked : points.length - 1;
   return h("section", { key: "plot", class: "panel plot", "aria-labelledby": "plot-title" },
     h("div", { class: "panel-head" }, h("h2", { id: "plot-title" }, "Error against time"), choice("clock", "Time axis", kClocks, clock, actions.setClock)),
     points.length === 0 ? empty(narrow) : figureOf(plot, actions),
-    h("p", { class: "plot-verdict" }, verdict(report)),
+    h("p", { class: "plot-verdict" }, verdictWords(report, verdict)),
     table(points));
 }
 
@@ -39,7 +43,7 @@ function figureOf(plot, actions) {
       onpointermove: (event) => actions.pick(nearest(event, points, key, frame)), onpointerleave: () => actions.pick(null),
       onkeydown: (event) => actions.pick(stepped(event, chosen, points.length)), onblur: () => actions.pick(null),
     }, drawing(plot, frame)),
-    h("figcaption", { class: "plot-reading" }, reading(points[chosen], key), forecastText(plot)));
+    h("figcaption", { class: "plot-reading" }, reading(points[chosen], plot), forecastText(plot)));
 }
 
 function nearest(event, points, key, { x, box }) {
@@ -59,35 +63,34 @@ function stepped(event, chosen, count) {
 
 const spoken = (point, key) => `relMSE ${figure(point.relmse)} after ${duration(point[key])}`;
 
-function reading(point, key) {
+function reading(point, { key, doubt }) {
   const ci = interval(point.relmse_ci95);
+  const within = doubt ? ` (${kDoubt})` : ci ? ` (95 %: ${ci})` : null;
   return [
     h("span", { key: "t" }, h("b", null, duration(point[key])), ` ${kSince[key]}`),
-    h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), ci ? ` (95 %: ${ci})` : null),
+    h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), within),
     point.true_relmse > 0 ? h("span", { key: "r", class: "true" }, "against the reference ", h("b", null, figure(point.true_relmse)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 
-function forecastText({ ahead, key, target }) {
+function forecastText({ ahead, target, doubt }) {
   if (!ahead) return null;
+  const at = doubt ? "not before" : "at";
   const ci = ahead.lo !== null ? ` (${duration(ahead.lo)} to ${duration(ahead.hi)})` : null;
-  return h("span", { key: "f", class: "forecast" }, `target ${given(target)} at `, h("b", null, duration(ahead.x)), ci, ahead.more ? `, with 8 more workers at ${duration(ahead.more)}` : null);
+  return h("span", { key: "f", class: "forecast" }, `target ${given(target)} ${at} `, h("b", null, duration(ahead.x)), ci, ahead.more ? `, with 8 more workers ${at} ${duration(ahead.more)}` : null);
 }
 
 /** The slope with its interval, and what it means, in words. */
-function verdict(report) {
+function verdictWords(report, verdict) {
   if (!report) return null;
   const signed = (x) => x.toFixed(2).replace("-", "−");
   const ci = Array.isArray(report.slope_ci95) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
   return [
     typeof report.slope === "number" ? h("span", { key: "slope", title: "Of log error over log time; independent samples give −1" }, "slope ", h("b", null, signed(report.slope)), ci) : null,
-    doubtful(report)
-      ? h("span", { key: "words", class: "doubt" }, report.verdict || "This error estimate can't be trusted yet.")
-      : h("span", { key: "words" }, report.verdict || report.trend)];
+    doubtful(verdict)
+      ? h("span", { key: "words", class: "doubt" }, verdict.words || "This error estimate can't be trusted yet.")
+      : h("span", { key: "words" }, verdict.words)];
 }
-
-const kDoubtful = ["heavy_tail", "bias_floor"];
-const doubtful = ({ verdict_kind: kind, trusted }) => (kind ? kDoubtful.includes(kind) : trusted === false);
 
 const kColumns = ["Time", "Core time", "Samples", "relMSE", "95 % interval"];
 

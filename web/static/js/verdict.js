@@ -1,0 +1,26 @@
+// Whether a job's figures of its own error are to be relied on, and what is said in their place where they are not.
+import { duration, interval } from "./format.js";
+
+export const kDoubt = "don't trust yet";
+const kDoubtful = new Set(["heavy_tail", "bias_floor"]);
+
+/** {kind, words, trusted}; that of an older coordinator has no `trusted`. */
+export const doubtful = (verdict) => Boolean(verdict) && (verdict.trusted === false || kDoubtful.has(verdict.kind));
+
+/** The job's own, which comes with every event, or else its report's: null if neither has one. */
+export const verdictOf = (job, report) =>
+  job.verdict ?? (report ? { kind: report.verdict_kind, words: report.verdict || report.trend, trusted: report.trusted } : null);
+
+/** "95 %: 0.00390 – 0.00448", or why there is no interval. */
+export function confidence(job, ci) {
+  if (doubtful(job.verdict)) return kDoubt;
+  if (job.pixels_without_samples > 0) return "of the part rendered so far";
+  const known = interval(ci);
+  return known ? `95 %: ${known}` : null;
+}
+
+/** Bright outliers that are still missing only ever add to it. */
+export function timeLeft(job) {
+  const known = typeof job.eta_seconds === "number";
+  return known && doubtful(job.verdict) ? `at least ${duration(job.eta_seconds)}` : duration(job.eta_seconds);
+}
