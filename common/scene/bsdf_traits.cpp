@@ -36,6 +36,7 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
     t.depth = std::max(t.depth, i.depth + 1);
     t.transmits = t.transmits || i.transmits;
     t.passes = t.passes || i.passes;
+    t.black_behind = t.black_behind && i.black_behind;
   }
   t.two_sided = std::holds_alternative<TwoSidedBsdf>(bsdf);
   t.passes = t.passes || std::holds_alternative<NullBsdf>(bsdf) || std::holds_alternative<MaskBsdf>(bsdf) ||
@@ -44,6 +45,7 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
   t.transmits = t.transmits || t.passes || (principled && principled->spec_trans) ||
                 std::holds_alternative<DielectricBsdf>(bsdf) ||
                 std::holds_alternative<RoughDielectricBsdf>(bsdf);
+  t.black_behind = t.black_behind && !t.transmits && !t.two_sided;
   return t;
 }
 

@@ -10,10 +10,11 @@
 namespace ls::scene {
 
 struct BsdfTraits {
-  int depth = 1;           // of nesting: 1 contains none
-  bool transmits = false;  // some light crosses the surface
-  bool passes = false;     // some of it straight on, unscattered: shadow rays must see it
-  bool two_sided = false;  // is a `twosided`
+  int depth = 1;             // of nesting: 1 contains none
+  bool transmits = false;    // some light crosses the surface
+  bool passes = false;       // some of it straight on, unscattered: shadow rays must see it
+  bool two_sided = false;    // is a `twosided`
+  bool black_behind = true;  // what meets its back ends there: nothing is reflected, nothing gets through
   bool operator==(const BsdfTraits&) const = default;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "common/image/render_limits.h"
 
@@ -20,7 +21,7 @@ inline constexpr std::size_t kMaxParameterNameBytes = 128;
 inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;  // one attribute after substitution
 inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;  // all attributes together
 inline constexpr std::size_t kMaxSearchPaths = 64;                          // <path>
-inline constexpr std::size_t kMaxObjectChildren = 4096;                // of one object of a Nori file
+inline constexpr std::size_t kMaxObjectChildren = 4096;                     // of one object of a Nori file
 inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, by reference too
 inline constexpr int kMaxBsdfNesting = 8;      // bsdfs within bsdfs: a blend of blends is 2^7 of them
 inline constexpr std::size_t kMaxDiagnostics = 20;
@@ -28,5 +29,7 @@ inline constexpr std::size_t kMaxNameWork = 4'000'000;  // cells of edit distanc
 inline constexpr std::size_t kMaxExcerptBytes = 160;    // of a source line in a message
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
+// Pairs of shapes that are compared to find out whether one lets light into the other: about half a second.
+inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

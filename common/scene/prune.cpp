@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "common/base/overloaded.h"
 #include "common/scene/bsdf_traits.h"
 #include "common/scene/integrators.h"
 #include "common/scene/limits.h"
+#include "common/scene/unreachable.h"
 #include "common/scene/validate.h"
 
 namespace ls::scene {
@@ -18,20 +20,21 @@ bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
 
 class Pruner {
  public:
-  Pruner(const Scene& scene, const PrunedFor& whom) : s_(scene), whom_(whom) {}
+  Pruner(const Scene& scene, const PrunedFor& whom)
+      : assets_(scene.assets), s_(compacted(scene)), whom_(whom) {}
 
   Pruned run() {
-    const std::vector<Asset> assets = s_.assets;
-    media();
     materials();
     lights();
+    media();
+    phases();
     invisible();
     if (s_.sensor.aperture_scale && !(s_.sensor.aperture_radius > 0)) {
       s_.sensor.aperture_scale.reset();
       note("shape of the lens", "the camera is a pinhole");
     }
     Pruned out{compacted(s_), {}};
-    files(assets, out.scene.assets);
+    files(out.scene.assets);
     out.left_out = std::move(left_out_);
     return out;
   }
@@ -56,21 +59,27 @@ class Pruner {
   }
 
   void media();
-  bool does_something(const HomogeneousMedium& m) const {
-    return (m.scale != 0 && !all_zero(m.sigma_t)) || !all_zero(m.emission);
-  }
+  bool dense(const HomogeneousMedium& m) const { return m.scale != 0 && !all_zero(m.sigma_t); }
+  bool dense(const HeterogeneousMedium& m) const { return m.scale != 0 && !zero(m.sigma_t); }
+  bool does_something(const HomogeneousMedium& m) const { return dense(m) || !all_zero(m.emission); }
   bool does_something(const HeterogeneousMedium& m) const {
-    const bool dense = m.scale != 0 && !zero(m.sigma_t);
-    return dense || (m.emission && m.emission_scale != 0 && !zero(*m.emission));
+    return dense(m) || (m.emission && m.emission_scale != 0 && !zero(*m.emission));
   }
+  bool scatters(const HomogeneousMedium& m) const { return dense(m) && !all_zero(m.albedo); }
+  bool scatters(const HeterogeneousMedium& m) const { return dense(m) && !zero(m.albedo); }
+  std::vector<bool> named_media() const;
   void drop_dark_sources();
+  std::uint32_t drop_idle_media();
+  std::uint32_t drop_unreachable_media();
+  void phases();
   void materials();
   bool simplify(Bsdf& b);
   void lights();
   bool has_power(const Emitter& e) const;
   void invisible();
-  void files(const std::vector<Asset>& before, const std::vector<Asset>& after);
+  void files(const std::vector<Asset>& after);
 
+  const std::vector<Asset> assets_;  // before
   Scene s_;
   const PrunedFor whom_;
   std::vector<LeftOut> left_out_;
@@ -89,37 +98,94 @@ void Pruner::drop_dark_sources() {
   note("light given off by a medium", "its strength is 0", dark);
 }
 
-void Pruner::media() {
-  drop_dark_sources();
-  std::vector<bool> live, used(s_.media.size(), false);
-  // One that does nothing may still keep others of lower priority out of its place.
+std::vector<bool> Pruner::named_media() const {
+  std::vector<bool> named(s_.media.size(), false);
+  const auto name = [&](const std::optional<MediumIndex>& m) {
+    if (m) named[m->value] = true;
+  };
+  name(s_.sensor.medium);
+  for (const Shape& s : s_.shapes) name(s.interior), name(s.exterior);
+  return named;
+}
+
+// Those that do nothing; but one may still keep others of lower priority out of its place.
+std::uint32_t Pruner::drop_idle_media() {
+  const std::vector<bool> named = named_media();
+  const auto idle = [&](const Medium& m) {
+    return !whom_.media || !std::visit([&](const auto& x) { return does_something(x); }, m);
+  };
   const auto priority = [](const Medium& m) {
     return std::visit([](const auto& x) { return x.priority; }, m);
   };
   int lowest = std::numeric_limits<int>::max();
-  for (const Medium& m : s_.media) lowest = std::min(lowest, priority(m));
-  for (const Medium& m : s_.media)
-    live.push_back(whom_.media &&
-                   (priority(m) > lowest || std::visit([&](const auto& x) { return does_something(x); }, m)));
-  const auto drop_dead = [&](std::optional<MediumIndex>& m) {
-    if (!m) return;
-    used[m->value] = true;
-    if (!live[m->value]) m.reset();
+  for (std::size_t i = 0; i < named.size(); ++i)
+    if (named[i] && !idle(s_.media[i])) lowest = std::min(lowest, priority(s_.media[i]));
+  std::vector<bool> dead(named.size(), false);
+  std::uint32_t count = 0;
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    dead[i] = named[i] && idle(s_.media[i]) && priority(s_.media[i]) <= lowest;
+    count += dead[i];
+  }
+  const auto drop = [&](std::optional<MediumIndex>& m) {
+    if (m && dead[m->value]) m.reset();
   };
-  drop_dead(s_.sensor.medium);
-  bool any = s_.sensor.medium.has_value();
-  for (Shape& s : s_.shapes) {
-    drop_dead(s.interior);
-    drop_dead(s.exterior);
-    any = any || s.interior || s.exterior;
+  drop(s_.sensor.medium);
+  for (Shape& s : s_.shapes) drop(s.interior), drop(s.exterior);
+  return count;
+}
+
+// Those that are nothing but what fills bodies that no light gets into.
+std::uint32_t Pruner::drop_unreachable_media() {
+  const std::vector<bool> out_of_reach = unreachable_interiors(s_);
+  std::vector<std::optional<MediumIndex>> set_aside(s_.shapes.size());
+  for (std::size_t i = 0; i < s_.shapes.size(); ++i)
+    if (out_of_reach[i]) set_aside[i] = std::exchange(s_.shapes[i].interior, std::nullopt);
+  const std::vector<bool> named = named_media();
+  std::vector<bool> dropped(named.size(), false);
+  for (std::size_t i = 0; i < set_aside.size(); ++i) {
+    if (!set_aside[i]) continue;
+    if (named[set_aside[i]->value])
+      s_.shapes[i].interior = set_aside[i];
+    else
+      dropped[set_aside[i]->value] = true;
+  }
+  return static_cast<std::uint32_t>(std::count(dropped.begin(), dropped.end(), true));
+}
+
+// Until nothing changes: a medium that is gone may have been why another had to stay.
+void Pruner::media() {
+  drop_dark_sources();
+  std::uint32_t dead = 0, hidden = 0;
+  for (bool more = true; more;) {
+    const std::uint32_t idle = drop_idle_media(), unreachable = drop_unreachable_media();
+    dead += idle;
+    hidden += unreachable;
+    more = idle + unreachable > 0;
   }
   // Without any medium no surface leads from one into another.
-  if (!any)
+  const std::vector<bool> named = named_media();
+  if (std::none_of(named.begin(), named.end(), [](bool n) { return n; }))
     for (Shape& s : s_.shapes) s.is_medium_transition = false;
-  std::uint32_t dead = 0;
-  for (std::size_t i = 0; i < live.size(); ++i) dead += used[i] && !live[i];
   note("medium", whom_.media ? "it neither takes light nor gives any" : "the integrator `path` sees none",
        dead);
+  note("medium", "no light gets into what it fills", hidden);
+}
+
+void Pruner::phases() {
+  std::uint32_t unasked = 0;
+  const std::vector<bool> named = named_media();
+  const PhaseIndex isotropic{static_cast<std::uint32_t>(s_.phases.size())};
+  for (std::size_t i = 0; i < named.size(); ++i)
+    std::visit(
+        [&](auto& m) {
+          if (!named[i] || scatters(m) || std::holds_alternative<IsotropicPhase>(s_.phases[m.phase.value]))
+            return;
+          m.phase = isotropic;
+          ++unasked;
+        },
+        s_.media[i]);
+  if (unasked > 0) s_.phases.emplace_back(IsotropicPhase{});
+  note("phase function", "its medium scatters no light", unasked);
 }
 
 // One step; whether there was one. A branch keeps its own constants, so that what is left scatters as it did.
@@ -218,8 +284,8 @@ void Pruner::invisible() {
                       [&](const Instance& i) { return !seen[i.group.value]; }));
 }
 
-void Pruner::files(const std::vector<Asset>& before, const std::vector<Asset>& after) {
-  for (const Asset& a : before)
+void Pruner::files(const std::vector<Asset>& after) {
+  for (const Asset& a : assets_)
     if (std::none_of(after.begin(), after.end(), [&](const Asset& b) { return a.digest == b.digest; }))
       note(a.name, "nothing that is needed names it", 1, a.bytes);
 }

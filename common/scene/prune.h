@@ -1,7 +1,9 @@
 // What of a scene can't matter to any pixel, taken out before the scene is stored, sent or loaded: dead
-// branches of materials, lights without power, media that do nothing, surfaces that nobody can see; and with
-// them the files that only they named. What is left gives the same image. Its bits are the same too, unless
-// something went that rays used to stop at (invisible surfaces) or that next-event estimation used to choose.
+// branches of materials, lights without power, media that do nothing or that no light gets into
+// (unreachable.h), phase functions of media that scatter nothing, surfaces that nobody can see; and with them
+// the files that only they named. What is left gives the same image. Its bits are the same too, unless
+// something went that rays used to stop at (invisible surfaces), that next-event estimation used to choose, or
+// for whose sake points were sampled about lights in media that stay, too (a medium that no light gets into).
 #pragma once
 
 #include <string>

@@ -107,15 +107,15 @@ def test_every_instantiation_gives_the_same_bits_of_the_validation_scenes(tmp_pa
 
 # ---- what nothing needed names ----
 
-def random_grid(path):
+def large_grid(path, more=b""):
     n = round((UNUSED_BYTES / 4) ** (1 / 3)) + 1
-    path.write_bytes(vol_bytes([0.5] * n ** 3, n, n, n) + os.urandom(4096))  # another digest at each run
+    path.write_bytes(vol_bytes([0.5] * n ** 3, n, n, n) + more)
     assert path.stat().st_size > UNUSED_BYTES
 
 
 def with_unused(scene, folder):
     """The scene with two large files that no pixel depends on: a grid in no surface, an image in a branch of weight 0."""
-    random_grid(folder / "unused.vol")
+    large_grid(folder / "unused.vol", os.urandom(4096))  # another digest at each run
     (folder / "nothing.png").write_bytes(os.urandom(UNUSED_BYTES + 1))
     medium = ('<medium type="heterogeneous" id="unused"><volume name="sigma_t" type="gridvolume"><string name="filename" value="unused.vol"/></volume>'
               '</medium>')
@@ -159,6 +159,45 @@ def test_bytes_that_nothing_needs_are_neither_sent_nor_loaded(tmp_path):
         assert all(part["bytes"] == 0 for part in analysis["parts"] if part["part"] != "volume grids")
         assert bytes_under(farm.data) < UNUSED_BYTES and bytes_under(tmp_path / "farm" / "cache") < UNUSED_BYTES
     assert pixels[fat] == pixels[lean]
+
+
+def with_hidden_media(scene, folder):
+    """The scene with a large grid in an opaque box and coloured fog in an opaque ball, and the same without either."""
+    large_grid(folder / "fog.vol")
+    opaque = '<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>'
+    ball = '<shape type="sphere"><float name="radius" value="0.4"/><point name="center" x="1.6" y="0" z="0"/>{}{}</shape></scene>'
+    hidden, bare = folder / "hidden.xml", folder / "bare.xml"
+    text = scene.read_text().replace('<bsdf type="null"/>', opaque, 1)
+    hidden.write_text(text.replace("</scene>", ball.format(opaque, HOMOGENEOUS.format("1, 2, 4"))))
+    bare.write_text(GRID.sub("", text).replace('<default name="density" value="2"/>', "").replace("</scene>", ball.format(opaque, "")))
+    return hidden, bare
+
+
+def test_media_that_no_light_gets_into_are_neither_sent_nor_loaded(tmp_path):
+    hidden, bare = with_hidden_media(write_fog(tmp_path), tmp_path)
+    told = inspect(hidden)
+    out_of_reach = {"what": "medium", "why": "no light gets into what it fills", "count": 2, "bytes": 0}
+    assert out_of_reach in told["pruned"]
+    assert told["assets"] == [] and [f["name"] for f in told["files_left_out"]] == ["fog.vol"]
+    assert told["variant"] == inspect(bare)["variant"] == "surfaces"
+    assert told["scene_sha256"] == inspect(bare)["scene_sha256"]
+    glass = tmp_path / "glass.xml"
+    glass.write_text(hidden.read_text().replace('<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>', '<bsdf type="dielectric"/>', 1))
+    told = inspect(glass)
+    assert [a["name"] for a in told["assets"]] == ["fog.vol"] and told["variant"] == "grey grids"
+    assert {**out_of_reach, "count": 1} in told["pruned"]
+
+    (tmp_path / "farm").mkdir()
+    with LocalFarm(tmp_path / "farm") as farm:
+        farm.add_worker(fake=False)
+        env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+        jobs = [lightshaft("submit", scene, "--spp", 2, env=env).stdout.split()[0] for scene in (hidden, bare)]
+        pixels = [farm.pixels(job) for job in jobs]
+        report = farm.report(jobs[0])
+        assert out_of_reach in report["analysis"]["left_out"]
+        assert {"volume grids", "chromatic extinction", "participating media"} <= set(report["features_left_out"])
+        assert bytes_under(farm.data) < UNUSED_BYTES and bytes_under(tmp_path / "farm" / "cache") < UNUSED_BYTES
+    assert pixels[0] == pixels[1]
 
 
 def test_a_scene_may_be_sent_whole_and_nothing_beyond_its_needs_goes_to_workers(tmp_path):

@@ -160,12 +160,12 @@ TEST(Surfaces, TraitsFollowFromWhatIsContained) {
              MaskBsdf{{0}, {2}}, TwoSidedBsdf{{0}, {0}}, NullBsdf{}};
   const auto traits = scene::bsdf_traits(s);
   ASSERT_TRUE(traits);
-  EXPECT_EQ((*traits)[0], (scene::BsdfTraits{1, false, false, false}));
-  EXPECT_EQ((*traits)[1], (scene::BsdfTraits{1, true, false, false}));
-  EXPECT_EQ((*traits)[2], (scene::BsdfTraits{2, true, false, false}));
-  EXPECT_EQ((*traits)[3], (scene::BsdfTraits{3, true, true, false}));
-  EXPECT_EQ((*traits)[4], (scene::BsdfTraits{2, false, false, true}));
-  EXPECT_EQ((*traits)[5], (scene::BsdfTraits{1, true, true, false}));
+  EXPECT_EQ((*traits)[0], (scene::BsdfTraits{1, false, false, false, true}));
+  EXPECT_EQ((*traits)[1], (scene::BsdfTraits{1, true, false, false, false}));
+  EXPECT_EQ((*traits)[2], (scene::BsdfTraits{2, true, false, false, false}));
+  EXPECT_EQ((*traits)[3], (scene::BsdfTraits{3, true, true, false, false}));
+  EXPECT_EQ((*traits)[4], (scene::BsdfTraits{2, false, false, true, false}));
+  EXPECT_EQ((*traits)[5], (scene::BsdfTraits{1, true, true, false, false}));
 }
 
 // Mitsuba 3's defaults, and its relation of specular and eta.
