@@ -29,7 +29,7 @@ inline constexpr std::size_t kMaxNameWork = 4'000'000;  // cells of edit distanc
 inline constexpr std::size_t kMaxExcerptBytes = 160;    // of a source line in a message
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
-// Pairs of shapes that are compared to find out whether one lets light into the other: about half a second.
+// Pairs of shapes that are compared to find out whether one lets light into the other.
 inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

@@ -2,8 +2,9 @@
 // branches of materials, lights without power, media that do nothing or that no light gets into
 // (unreachable.h), phase functions of media that scatter nothing, surfaces that nobody can see; and with them
 // the files that only they named. What is left gives the same image. Its bits are the same too, unless
-// something went that rays used to stop at (invisible surfaces), that next-event estimation used to choose, or
-// for whose sake points were sampled about lights in media that stay, too (a medium that no light gets into).
+// something went that rays used to stop at (invisible surfaces), that next-event estimation used to choose,
+// or for whose sake points were sampled about lights in media that stay, too (a medium that no light gets
+// into).
 #pragma once
 
 #include <string>

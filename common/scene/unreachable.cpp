@@ -35,13 +35,12 @@ bool glows(const Medium& medium) {
                     medium);
 }
 
-// Whether the camera is outside of the box, and so is all of its near plane if the sensor names a medium:
-// there the renderer asks which closed boundaries are around it (docs/decisions/0010).
+// Whether the camera is outside of the box, and so is all of its near plane, where rays begin.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
   const Vec3 camera = place_of(s.to_world);
   const Box box = with_margin(tight, {camera, camera});
   if (touch(box, {camera, camera})) return false;
-  if (!s.medium || s.projection == Projection::spherical) return true;
+  if (s.projection == Projection::spherical) return true;
   const Vec3 normal = cross(column(s.to_world, 0), column(s.to_world, 1));
   const double unit = dot(normal, column(s.to_world, 2));
   bool before = true, behind = true;
@@ -89,8 +88,10 @@ class Search {
 
   // What light may get in by, or come from. Surfaces that do nothing at all are taken out later (prune.cpp).
   bool is_entrance(const Shape& s) const {
+    const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && glows(s_.media[m->value]); };
+    if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;
     const bool nothing = std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition;
-    return s.emitter || (traits_[s.bsdf.value].transmits && !nothing);
+    return traits_[s.bsdf.value].transmits && !nothing;
   }
 
   // Not if the shape is mirrored, or if the normals of a mesh's file may turn its sides round

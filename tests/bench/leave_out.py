@@ -67,6 +67,27 @@ WORKS = {"vacuum": {"shadow_rays"}, "textured": {"shadow_rays", "texels"},
          "grid": {"shadow_rays", "phase", "density", "macro_cells", "boundary_rays"}}
 WORKS["delta"] = WORKS["homogeneous"]
 
+# Of common/scene/prune.cpp.
+TAKEN_OUT = """## What is taken out
+
+Taken out of a scene before it is stored or sent is what no pixel depends on, with every file that only it named; `lightshaft inspect` and the report list it with the reason:
+
+| what | why |
+|---|---|
+| branch of a blend | its weight is 0 |
+| mask | its opacity is 0 or 1 everywhere |
+| light | it is black |
+| light given off by a medium | its strength is 0 |
+| medium | it neither takes light nor gives any; for `path`, any |
+| medium | no light gets into what it fills: an opaque body, or what is behind a black back |
+| phase function | its medium scatters no light |
+| surface | light passes it unchanged, and there is no medium on either side |
+| instance | nothing of its group can be seen |
+| shape of the lens | the camera is a pinhole |
+
+What stays although it may not be seen, and why: [decisions/0012](decisions/0012-what-a-scene-needs.md).
+"""
+
 
 def scene_text(name):
     text = SCENES[name][0]
@@ -318,7 +339,7 @@ def worked(works):
 
 def page(rows, bytes_alone):
     command = "tests/bench/leave_out.py" + (" --bytes-alone" if bytes_alone else "")
-    out = ["# What a scene does not need is left out", "", f"Made by `{command}` (release build, GCC 12, `-march=x86-64-v3`).", ""]
+    out = ["# What a scene does not need is left out", "", f"Made by `{command}` (release build, GCC 12, `-march=x86-64-v3`).", "", TAKEN_OUT]
     if bytes_alone:
         out += ["Without `--bytes-alone` it also builds the renderer without the parts that each scene does not use and compares instructions per path, "
                 "and tabulates the counters of work.", ""]

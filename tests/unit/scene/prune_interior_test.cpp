@@ -118,18 +118,16 @@ TEST(PruneInteriors, StayAroundTheCamera) {
   }
 }
 
-// The media around a camera are looked for at its near plane, if the sensor names one.
+// There rays begin.
 TEST(PruneInteriors, StayWhereTheCamerasNearPlaneMayBe) {
-  Scene s = must_read(
-      with_sensor(cube(kWhole + kFog) + R"(<medium type="homogeneous" id="air"/>)" +
-                  shape("sphere", at(0, 0, 0, 100) + bsdf("null") + R"(<ref name="interior" id="air"/>)")));
-  ASSERT_EQ(s.media.size(), 2u);
-  s.sensor.medium = s.shapes.at(1).interior;
-  EXPECT_EQ(pruned(s).scene.media.size(), 1u);
+  Scene s = must_read(with_sensor(cube(kWhole + kFog)));
+  EXPECT_EQ(pruned(s).scene.media.size(), 0u);
   s.sensor.near_clip = 5;
-  EXPECT_EQ(pruned(s).scene.media.size(), 2u);
-  s.sensor.projection = Projection::spherical;  // has no near plane
   EXPECT_EQ(pruned(s).scene.media.size(), 1u);
+  s.sensor.projection = Projection::orthographic;
+  EXPECT_EQ(pruned(s).scene.media.size(), 1u);
+  s.sensor.projection = Projection::spherical;  // has none
+  EXPECT_EQ(pruned(s).scene.media.size(), 0u);
 }
 
 TEST(PruneInteriors, StayAroundLights) {
@@ -149,6 +147,7 @@ TEST(PruneInteriors, StayAroundLights) {
   EXPECT_EQ(media(body + shape("sphere", at(0, 0, 0, 50) + kGrey + kArea)), 0u);  // the sky
   EXPECT_EQ(media(cube(kWhole + kFog + kArea)), 1u);
   EXPECT_EQ(media(cube(kWhole + kFire)), 1u);
+  EXPECT_EQ(media(body + shape("sphere", at(0, 1, 5) + kWhole + kFire)), 2u);
 }
 
 // Two surfaces in one place are one: a path may go through the one that lets it.
