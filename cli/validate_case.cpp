@@ -9,9 +9,20 @@
 
 namespace ls::cli {
 
+namespace {
+
+// By the error alone a figure without variance that is off by its last place would be hundreds of errors off.
+void measure_z(ValidateCase& c, double allowance) {
+  const double unit = std::hypot(c.standard_error, allowance);
+  c.allowance = allowance;
+  c.z = unit > 0 ? (c.got - c.expected) / unit : 0;
+}
+
+}  // namespace
+
 void judge(ValidateCase& c, double freedom, double rounding) {
   const double off = c.got - c.expected, beyond = std::max(0., std::abs(off) - rounding);
-  c.z = c.standard_error > 0 ? off / c.standard_error : 0;
+  measure_z(c, rounding);
   c.p = c.standard_error > 0 ? student_tails(beyond / c.standard_error, freedom) : beyond > 0 ? 0. : 1.;
   if (c.nonfinite > 0)
     c.why = fmt::format("{} samples were not finite", c.nonfinite);
@@ -27,7 +38,7 @@ void judge_equivalence(ValidateCase& c, double freedom, double unknown, double r
   const double f = known ? std::max(freedom, least) : freedom;
   const double half = student_quantile(c.level, f) * c.standard_error + unknown;
   const double reach = off + student_quantile(c.band_level, f) * c.standard_error + unknown;
-  c.z = c.standard_error > 0 ? (c.got - c.expected) / c.standard_error : 0;
+  measure_z(c, unknown);
   c.p = c.standard_error > 0 ? student_tails(std::max(0., off - unknown) / c.standard_error, f)
         : off > unknown      ? 0.
                              : 1.;

@@ -75,7 +75,12 @@ void deep(Table& t) {
   }
   t.mean("N17-through-a-white-slab-64/homogeneous/volpath", "N17 7.2",
          "What a white slab of optical depth 64 lets through.", [] { return column({}, {.tau = 64}, true); },
-         grey(white_transmittance(64)), {.band = .1, .slack = 1e-4, .slow = true, .paths = 1u << 16});
+         grey(white_transmittance(64)),
+         {.band = .1,
+          .why_band = "one path of forty gets through, after a thousand scatterings",
+          .slack = 1e-4,
+          .slow = true,
+          .paths = 1u << 16});
 }
 
 void roulette(Table& t) {

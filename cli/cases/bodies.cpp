@@ -63,7 +63,7 @@ void mean_way_through_a_cube(Table& t) {
            "Light's mean way through the unit cube is 4 V / S = 2/3, however it is scattered.",
            [=] { return cubes(r.way, r.sigma_s, r.g); }, grey(2. / 3),
            // Four points in each angle: 1e-3 of what scattering changes, a tenth.
-           {.band = .005, .slack = 2e-4, .slow = r.sigma_s > 2 || r.way.grid});
+           {.slack = 2e-4, .slow = r.sigma_s > 2 || r.way.grid});
 }
 
 // A ball of albedo 1 - 1e-7 that gives off its absorption coefficient times 1e6: its light is the mean way,
@@ -90,7 +90,11 @@ void all_but_white(Table& t) {
              return kit;
            },
            // Reabsorbed: a share of 1.6e-6 per length, over ways of some 20.
-           grey(kPi / 3 * kDepth * kAbsorbed * kSource), {.band = .01, .slack = 5e-5, .slow = way.distant});
+           grey(kPi / 3 * kDepth * kAbsorbed * kSource),
+           {.band = .01,
+            .why_band = "16 mean free paths: ways that vary by more than their mean",
+            .slack = 5e-5,
+            .slow = way.distant});
 }
 
 }  // namespace

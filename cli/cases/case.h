@@ -42,10 +42,15 @@ class Maker {
   std::function<SceneKit()> make_;
 };
 
+// What a band is where nothing is said.
+inline constexpr double kBand = .003;
+
 // The interval of the mean must lie within `band` (a share of the answer) around the answer, and must not
 // miss it by more than float32 rounding and `slack`.
 struct MeanOptions {
-  double band = .003;
+  double band = kBand;
+  // Of a wider one: why, in a sentence for the page of the table.
+  std::string why_band = {};
   // Where the answer itself is only known to this share of it: derived beside the case.
   double slack = 0;
   // What is compared is what is missing to 1.

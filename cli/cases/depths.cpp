@@ -101,7 +101,11 @@ void opaque(Table& t) {
       t.mean(fmt::format("N03-semi-infinite-a.9-{:g}{}", tau, way.name()), "N3 7.1",
              "An all but endless medium of this depth reflects what Chandrasekhar's H gives.",
              [=] { return half_space(way, .9, tau, 1); }, grey(.414947),
-             {.band = coarse ? .006 : .003, .slack = coarse ? kPlaces : kDigits});
+             {.band = coarse ? .006 : kBand,
+              .why_band = coarse ? "17 float32 places to a mean free path at the face's height: a sum that is .31 % "
+                                   "above its integral"
+                                 : "",
+              .slack = coarse ? kPlaces : kDigits});
     }
   }
 }
@@ -135,7 +139,8 @@ void shadows(Table& t) {
                          kit.heterogeneous(ramp, rgb(0), 8 / 1.5));
            return kit;
          },
-         grey(std::exp(-8.) / (2 * kPi)), {.band = .02});
+         grey(std::exp(-8.) / (2 * kPi)),
+         {.band = .02, .why_band = "an e^-8 of the light, by the few shadow rays that are walked on in the dark"});
 }
 
 }  // namespace

@@ -288,6 +288,17 @@ void no_densities(Table& t) {
             "A negative density renders as 0, bit for bit.",
             [value](const Bench& b) { return same_bits(b, with_voxel(value), with_voxel(0), 16); });
   }
+  t.exact("N14-albedo-above-1/grid/volpath", "N14", "Albedos of 1.5 and 40 scatter as 1 does, bit for bit.",
+          [](const Bench& b) {
+            const auto with_albedo = [](float one, float other) {
+              SceneKit kit = with_voxel(1);
+              std::get<HeterogeneousMedium>(kit.scene.media[0]).albedo =
+                  kit.grid({2, 1, 1}, {one, other}, box({-1, -1, -1}, {1, 1, 1}));
+              std::get<ConstantEmitter>(kit.scene.emitters[0]).radiance = {1, 2, 4};
+              return kit;
+            };
+            return same_bits(b, with_albedo(1.5f, 40), with_albedo(1, 1), 16);
+          });
   t.exact("N14-negatives-are-counted/grid", "N14", "The report counts the one negative density.",
           [](const Bench& b) -> Figure {
             const auto p = shoot(with_voxel(-.5f), 2, b.seed, b.threads);

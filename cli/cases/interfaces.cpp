@@ -41,7 +41,10 @@ void stacks(Table& t) {
   for (const int m : {1, 10, 100})
     t.mean(fmt::format("N42-plates-{}", m), "N42 7.6g",
            "A stack of m plates lets (1 - r) / (1 + (2 m - 1) r) pass.", [=] { return plates(m); },
-           grey((1 - r) / (1 + (2 * m - 1) * r)), {.band = m < 100 ? .003 : .02, .slow = m > 1});
+           grey((1 - r) / (1 + (2 * m - 1) * r)),
+           {.band = m < 100 ? kBand : .02,
+            .why_band = m < 100 ? "" : "paths of hundreds of interfaces, of which a tenth gets through",
+            .slow = m > 1});
   t.same(
       "N42-null-interfaces", "N42",
       "A thousand boundaries of nothing change nothing but that each moves a ray aside by 16 last places, a "
@@ -61,18 +64,21 @@ SceneKit mesh(const std::string& more) {
   kit.look({0, -4, 3}, {0, 0, 0}, 40);
   return kit;
 }
-SceneKit placed(bool as_instance, const Transform& at) {
+SceneKit placed(bool as_instance, const Transform& at, double size = 1) {
   SceneKit kit;
   const BsdfIndex b = kit.bsdf(DiffuseBsdf{kit.texture({.75, .5, .25})});
-  kit.shape(RectangleShape{}, translate({0, 0, -1.5}) * scale(6), kit.diffuse(.5));
-  Shape& s = kit.shape(CubeShape{}, as_instance ? Transform{} : at, b);
+  kit.shape(RectangleShape{}, translate({0, 0, -1.5 * size}) * scale(6 * size), kit.diffuse(.5));
+  const Transform place = scale(size) * at;
+  Shape& s = kit.shape(CubeShape{}, as_instance ? Transform{} : place, b);
   if (as_instance) {
     s.group = SceneKit::push<GroupTag>(kit.scene.groups, ShapeGroup{});
-    kit.scene.instances.push_back(Instance{*s.group, at});
+    kit.scene.instances.push_back(Instance{*s.group, place});
   }
   kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
   kit.environment(.25);
-  kit.look({0, -6, 3}, {0, 0, 0}, 30);
+  kit.look({0, -6 * size, 3 * size}, {0, 0, 0}, 30);
+  kit.scene.sensor.near_clip = 1e-6 * size;
+  kit.scene.sensor.far_clip = 1e8 * size;
   return kit;
 }
 
@@ -97,6 +103,19 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
+  // A scene of such a size, and a box in it that is squeezed by 1e6.
+  for (const double s : {1e-6, 1e6})
+    t.same(
+        fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",
+        "The scene and its instance at a millionth, and a million.",
+        [=] { return placed(true, rotate_x(30), s); }, [] { return placed(true, rotate_x(30)); });
+  t.same(
+      "N44-instance-squeezed-by-1e6", "N44", "An instance a million times as wide as high is the box there.",
+      [] { return placed(true, scale(1, 1, 1e-6)); }, [] { return placed(false, scale(1, 1, 1e-6)); });
+  t.exact("N44-squeezed-too-much", "N44", "One that is thinner than what the scene's size leaves is refused.",
+          [](const Bench& b) {
+            return refused(b, placed(true, scale(1e6, 1, 1e-6)), {"to_world"});
+          });
   t.exact("N44-singular", "N44", "An instance that is pressed flat is refused.", [](const Bench& b) {
     return refused(b, placed(true, scale(1, 1, 0)), {"to_world", "no inverse"});
   });
@@ -121,6 +140,16 @@ SceneKit painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   return kit;
 }
 
+// A floor of one normal, told as a map's colour, in the sun and a sky.
+SceneKit mapped(const Rgb& normal) {
+  SceneKit kit;
+  kit.shape(RectangleShape{}, scale(9), kit.bsdf(NormalMapBsdf{kit.texture(normal), kit.diffuse(.5)}));
+  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, rgb(1)});
+  kit.environment();
+  kit.look({0, -1, 5}, {0, 0, 0}, 20, {0, 1, 0});
+  return kit;
+}
+
 void textures(Table& t) {
   for (const double k : {1., 1e9, 1e30})
     t.mean(fmt::format("N45-uv-{:g}", k), "N45",
@@ -136,6 +165,8 @@ void textures(Table& t) {
             [=](const Bench& b) {
               return refused(b, painted(bad), {"paint.exr", "texel"});
             });
+  t.exact("N45-texel-above-1", "N45", "A texel of 3 reflects as one of 1 does, bit for bit.",
+          [](const Bench& b) { return same_bits(b, painted(3), painted(1), 16); });
   t.exact("N45-negative-texel", "N45", "Negative texels are black and counted.",
           [](const Bench& b) -> Figure {
             const auto p = shoot(painted(-.5f), 4, b.seed, b.threads);
@@ -145,22 +176,29 @@ void textures(Table& t) {
             return f;
           });
   t.exact("N46-normal-of-nothing", "N46",
-          "A normal map whose normals are (0, 0, 0) leaves a healthy surface.", [](const Bench& b) -> Figure {
-            SceneKit kit;
-            const TextureIndex none = kit.texture(rgb(.5));
-            kit.shape(RectangleShape{}, scale(9), kit.bsdf(NormalMapBsdf{none, kit.diffuse(.5)}));
-            kit.environment();
-            kit.look({0, -1, 5}, {0, 0, 0}, 20, {0, 1, 0});
-            const auto p = shoot(kit, 16, b.seed, b.threads);
-            if (!p) return {.why = p.error().message};
-            return {.expected = .25,
-                    .got = p->mean(0, 1),
-                    .tolerance = .26,
-                    .unhealthy = p->health.nonfinite + p->health.negative};
-          });
+          "A normal map whose normals are (0, 0, 0) is none: the surface's own, bit for bit.",
+          [](const Bench& b) { return same_bits(b, mapped(rgb(.5)), mapped({.5, .5, 1}), 16); });
+  t.exact("N46-normal-from-below", "N46", "A normal map whose normals point into the surface: nothing lights it.",
+          [](const Bench& b) { return every_value(b, mapped({.5, .5, 0}), 16, grey(0), 0); });
 }
 
 // ---- cameras
+Figure cropped(const Bench& b, double radius) {
+  SceneKit whole = placed(false, {});
+  whole.scene.film.filter = TentFilter{radius};
+  SceneKit part = whole;
+  part.scene.film.crop_offset = {5, 3};
+  part.scene.film.crop_size = {4, 6};
+  const auto w = shoot(whole, 8, b.seed, b.threads), p = shoot(part, 8, b.seed, b.threads);
+  if (!w || !p) return {.why = "one of the scenes is refused"};
+  Figure f;
+  for (std::size_t y = 0; y < 6; ++y)
+    for (std::size_t x = 0; x < 4; ++x)
+      for (std::size_t c = 0; c < 3; ++c)
+        f.got += w->mean((y + 3) * 16 + x + 5, c) != p->mean(y * 4 + x, c);
+  return f;
+}
+
 void cameras(Table& t) {
   t.exact("N47-lens-of-nothing", "N47",
           "A lens of radius 0 is a pinhole, bit for bit, wherever it is focused.", [](const Bench& b) {
@@ -170,6 +208,33 @@ void cameras(Table& t) {
             lens.scene.sensor.focus_distance = 1e-3;
             return same_bits(b, lens, pinhole, 8);
           });
+  for (const double focus : {0., std::numeric_limits<double>::quiet_NaN()})
+    t.exact(fmt::format("N47-focus-at-{:g}", focus), "N47", "A lens that is focused nowhere is refused.",
+            [=](const Bench& b) {
+              SceneKit lens = placed(false, {});
+              lens.scene.sensor.aperture_radius = .1;
+              lens.scene.sensor.focus_distance = focus;
+              return refused(b, lens, {"focus_distance"});
+            });
+  t.exact("N47-lens-wider-than-its-focus", "N47", "A lens ten times as wide as its focus is far: the sky stays white.",
+          [](const Bench& b) {
+            SceneKit kit;
+            kit.shape(SphereShape{}, translate({0, 0, -1e4}), kit.diffuse(.5));
+            kit.environment();
+            kit.look({0, 0, 0}, {0, 0, 1}, 40, {0, 1, 0});
+            kit.scene.sensor.aperture_radius = 1;
+            kit.scene.sensor.focus_distance = .1;
+            return every_value(b, kit, 64, grey(1), 0);
+          });
+  for (const FrameSize size : {FrameSize{10'000, 1}, FrameSize{1, 10'000}})
+    t.exact(fmt::format("N48-frame-of-{}x{}", size.width, size.height), "N48",
+            "A white sky is white in a frame ten thousand times as long as wide.", [=](const Bench& b) {
+              SceneKit kit(size);
+              kit.shape(SphereShape{}, translate({0, 0, -1e4}), kit.diffuse(.5));
+              kit.environment();
+              kit.look({0, 0, 0}, {0, 0, 1}, 40, {0, 1, 0});
+              return every_value(b, kit, 2, grey(1), 0);
+            });
   for (const double fov : {179.9, .01, 1e-9})
     t.exact(fmt::format("N48-fov-{:g}", fov), "N48", "A white sky is white in any field of view.",
             [=](const Bench& b) {
@@ -179,21 +244,10 @@ void cameras(Table& t) {
               kit.look({0, 0, 0}, {0, 0, 1}, fov, {0, 1, 0});
               return every_value(b, kit, 4, grey(1), 0);
             });
-  t.exact("N48-crop", "N48", "A crop is that part of the frame, bit for bit.", [](const Bench& b) -> Figure {
-    SceneKit whole = placed(false, {});
-    whole.scene.film.filter = TentFilter{2};
-    SceneKit part = whole;
-    part.scene.film.crop_offset = {5, 3};
-    part.scene.film.crop_size = {4, 6};
-    const auto w = shoot(whole, 8, b.seed, b.threads), p = shoot(part, 8, b.seed, b.threads);
-    if (!w || !p) return {.why = "one of the scenes is refused"};
-    Figure f;
-    for (std::size_t y = 0; y < 6; ++y)
-      for (std::size_t x = 0; x < 4; ++x)
-        for (std::size_t c = 0; c < 3; ++c)
-          f.got += w->mean((y + 3) * 16 + x + 5, c) != p->mean(y * 4 + x, c);
-    return f;
-  });
+  // The second filter is wider than the frame, and than any tile of it.
+  for (const double radius : {2., 40.})
+    t.exact(fmt::format("N48-crop-filter-{:g}", radius), "N48", "A crop is that part of the frame, bit for bit.",
+            [=](const Bench& b) { return cropped(b, radius); });
 }
 
 }  // namespace

@@ -88,7 +88,11 @@ void through_a_lamp(Table& t) {
              return kit;
            },
            grey(kSigma / (4 * kPi) * std::exp(-3 * kSigma) * angles),
-           {.band = .02, .slack = 1e-3, .slow = true, .frames = 64});
+           {.band = .02,
+            .why_band = "over a pixel about the lamp the squares of what rays bring have no finite mean",
+            .slack = 1e-3,
+            .slow = true,
+            .frames = 64});
   }
 }
 
@@ -116,7 +120,7 @@ void from_afar(Table& t) {
            // Its rim is .1 rad off: the way down is longer by at most .005, times .01.
            // Flights through a grid this thin seldom end in it.
            grey(lit_cube_answer(.01, 1)),
-           {.band = way.grid && !way.distant ? .01 : .003, .slack = 5e-5, .slow = way.grid && !way.distant});
+           {.slack = 5e-5, .slow = way.grid && !way.distant, .paths = way.grid && !way.distant ? 1u << 22 : 0u});
   }
 }
 

@@ -30,13 +30,12 @@ SceneKit glint(double alpha, Microfacet d, double off) {
   return kit;
 }
 
-// Of GGX, what masking (Smith's, by correlated heights) leaves at angles of these tangents; Beckmann's is 1
-// here to every digit.
+// Of GGX, what masking (Smith's, separable) leaves at angles of these tangents; Beckmann's is 1 here to every digit.
 double unmasked(double alpha, double view, double light) {
   const auto lambda = [alpha](double angle) {
     return (std::sqrt(1 + std::pow(alpha * std::tan(angle), 2)) - 1) / 2;
   };
-  return 1 / (1 + lambda(view) + lambda(light));
+  return 1 / ((1 + lambda(view)) * (1 + lambda(light)));
 }
 
 // D G / (4 cos) of the light's irradiance.

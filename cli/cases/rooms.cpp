@@ -83,7 +83,9 @@ void paths(Table& t) {
         t.mean(fmt::format("7.6d-mean-path-{:g}-g{:g}/{}", sigma_s, g, grid ? "grid" : "homogeneous"), "7.6d",
                "Light's mean way through the unit ball is 4/3, however it is scattered.",
                [=] { return ball(grid, sigma_s, g); }, grey(kPi / 3),
-               {.band = .005, .slow = sigma_s > 2 || g != 0});
+               {.band = sigma_s > 2 ? .005 : kBand,
+                .why_band = sigma_s > 2 ? "many scatterings, and ways that vary by more than their mean" : "",
+                .slow = sigma_s > 2 || g != 0});
       }
 }
 

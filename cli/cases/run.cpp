@@ -161,6 +161,7 @@ class Runner {
     c.got = s.got[k];
     c.standard_error = s.error[k];
     c.band = band();
+    c.why_band = case_->options.why_band;
     c.level = level_;
     c.band_level = kBandLevel;
     c.nonfinite = cli::samples_gone_wrong(s.health);

@@ -138,7 +138,7 @@ def fluence(cases, file):
 
 def all_z(cases, file):
     """Distances of statistical figures from their answers, in standard errors, against the normal law."""
-    z = sorted(abs(c["z"]) for c in cases if c["kind"] == "statistical" and c["z"] and c["stderr"] > 2e-5 * abs(c["expected"]))
+    z = sorted(abs(c["got"] - c["expected"]) / c["stderr"] for c in cases if c["kind"] == "statistical" and c["stderr"] > 2e-5 * abs(c["expected"]))
     plot = Plot(f"How often a figure is further off than z standard errors ({len(z)} figures)", "z", "share of the figures", (0, 5), (1e-3, 1), log_x=False)
     plot.line([(i / 20, least(math.erfc(i / 20 / math.sqrt(2)), 1e-3)) for i in range(101)], "#888", "4 4")
     plot.label("normal law", "#888")
@@ -151,6 +151,33 @@ def number(value):
     return "-" if value is None else f"{value:.6g}"
 
 
+def band(case):
+    return "exact" if case["kind"] == "exact" else f"{100 * case['band']:.3g} %"
+
+
+def subject(case):
+    """The row of the list, and what is asked: without the values that it is asked at."""
+    return re.split(r"-(?=[a-z])", case["name"], maxsplit=1)[0]
+
+
+def wide_bands(cases):
+    """The cases that say why their band is wider, by subject: how many, how wide, and what the usual band would take."""
+    groups = {}
+    for case in cases:
+        if case.get("why_band"):
+            groups.setdefault((subject(case), case["why_band"], case["band"]), []).append(case)
+    lines = ["### Rows with a wider band than .3 %, and why", "",
+             f"{sum(map(len, groups.values()))} of {sum(c['kind'] == 'statistical' for c in cases)} statistical figures. What a narrower "
+             "band takes grows with the square: the last column is what .3 % would, by the paths that were taken.", "",
+             "| cases | figures | band | why | paths | at .3 % |", "|---|---|---|---|---|---|"]
+    for (_, why, width), members in groups.items():
+        names = [re.sub(r"/(red|green|blue)$", "", c["name"]) for c in members]
+        paths = sum({name: c["paths"] for name, c in zip(names, members)}.values())
+        shown = names[0] if len(set(names)) == 1 else f"{names[0]} to {names[-1]}"
+        lines.append(f"| {shown} | {len(members)} | {100 * width:.3g} % | {why} | {paths:.1e} | {paths * (width / .003) ** 2:.1e} |")
+    return [*lines, ""]
+
+
 def page(table):
     cases = table["cases"]
     bands = sorted(case["band"] for case in cases if case["kind"] == "statistical")
@@ -161,14 +188,19 @@ def page(table):
              f"**{table['passed']} of {table['passed'] + table['failed']} figures pass**, {sum(c['nonfinite'] for c in cases)} samples went wrong, "
              f"{sum(c['paths'] for c in cases):.3g} paths. "
              f"Half of the intervals had to lie within {100 * bands[len(bands) // 2]:.2g} % of the answer, the widest within {100 * bands[-1]:.2g} %.", "",
+             "z is the distance from the answer in units of both what chance and what float32 (and an answer that is known to some digits) may do: "
+             "sqrt(standard error^2 + allowance^2). Wrong: samples that were rejected or negative. Seconds: by the clock, of the attempt that counts, on all cores.", "",
              "![Error by depth](images/stability-depth.svg)", "![Error by scale](images/stability-scale.svg)",
              "![Fluence](images/stability-fluence.svg)", "![z](images/stability-z.svg)", ""]
     groups = {}
     for case in cases:
-        groups.setdefault((re.split(r"-(?=[a-z])", case["name"], maxsplit=1)[0], case["about"]), []).append(case)
+        groups.setdefault((subject(case), case["about"]), []).append(case)
+    lines += wide_bands(cases)
     for (row, about), members in groups.items():
-        lines += [f"### {row}: {about}", "", "| case | expected | got | standard error | z | verdict |", "|---|---|---|---|---|---|"]
-        lines += [f"| {c['name']} | {number(c['expected'])} | {number(c['got'])} | {c['stderr']:.1e} | {c['z']:.2f} | {c['verdict']} |" for c in members]
+        lines += [f"### {row}: {about}", "", "| case | expected | got | standard error | z | band | wrong | seconds | verdict |",
+                  "|---|---|---|---|---|---|---|---|---|"]
+        lines += [f"| {c['name']} | {number(c['expected'])} | {number(c['got'])} | {c['stderr']:.1e} | {c['z']:.2f} | {band(c)} | "
+                  f"{c['nonfinite']} | {c['seconds']:.1f} | {c['verdict']} |" for c in members]
         lines.append("")
     lines += ["### Rows that tests answer without a picture", "", "| row | test | file |", "|---|---|---|"]
     lines += [f"| {e['row']} | {e['test']} | `{e['file']}` |" for e in table["elsewhere"]]

@@ -38,6 +38,14 @@ TEST(Equivalence, PassesOnlyIfTheIntervalLiesInTheBandAndCoversTheAnswer) {
   EXPECT_FALSE(judged(std::nan(""), 0, .003).passed());
 }
 
+TEST(Equivalence, MeasuresZByChanceAndByWhatIsAllowedWithoutIt) {
+  EXPECT_NEAR(judged(2.003, .001, .003).z, 3, 1e-9);
+  EXPECT_NEAR(judged(2.0001, 1e-9, .003, 1000, .0002).z, .5, 1e-9) << "a last place, and not 1e5 errors";
+  EXPECT_NEAR(judged(2.0001, 0, .003, 1000, .0002).z, .5, 1e-9);
+  EXPECT_NEAR(judged(2.005, .003, .01, 1000, .004).z, 1, 1e-9);
+  EXPECT_EQ(judged(2.005, .003, .01, 1000, .004).allowance, .004);
+}
+
 TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
   const auto judged_at = [](double off, double level, double band_level) {
     cli::ValidateCase c;
@@ -121,6 +129,12 @@ TEST(Cases, HaveIdsAndRowsOfTheirOwn) {
     EXPECT_TRUE(ids.insert(c.id).second) << c.id << " is there twice";
     EXPECT_FALSE(c.rows.empty() || c.about.empty()) << c.id;
   }
+}
+
+TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
+  const Table table = all_cases();
+  for (const Case& c : table.cases())
+    EXPECT_EQ(c.options.band > kBand, !c.options.why_band.empty()) << c.id << ": " << c.options.band;
 }
 
 // Eight digits of the fluence of a point, by quadrature of its Fourier transform: a way of its own.
