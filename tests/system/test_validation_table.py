@@ -21,6 +21,10 @@ def test_every_case_passes_with_figures_of_its_own(table):
     for case in table["cases"]:
         assert case["verdict"] == "pass" and case["nonfinite"] == 0
         assert case["kind"] in ("exact", "statistical") and case["about"] and case["rows"], case["name"]
+        # Bands of .3 % are 1 % here.
+        assert ("why_band" in case) == (case.get("band", 0) > .0101), case["name"]
+        # The interval covers the answer: at most 6.1 errors of few degrees of freedom, and the allowance.
+        assert abs(case["z"]) < 7.1, case["name"]
 
 
 def test_every_row_of_the_list_is_a_case_or_a_test_that_is_named(table):
@@ -59,6 +63,33 @@ def test_shutters_that_mean_nothing_are_warned_of(tmp_path):
         said = inspected(tmp_path, 0, sensor=f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>').stderr
         assert "'shutter_close'" in said and "motion is not rendered" in said
     assert "motion" not in inspected(tmp_path, 0).stderr
+
+
+NO_NUMBERS = {"inf": "wants a", "-inf": "wants a", "nan": "wants a", "-1": "out of its range"}
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS)
+@pytest.mark.parametrize("light", ["point", "constant", "area"])
+def test_lights_that_are_no_number_are_refused(tmp_path, light, value):
+    name = "intensity" if light == "point" else "radiance"
+    emitter = f'<emitter type="{light}"><rgb name="{name}" value="1, {value}, 1"/></emitter>'
+    scene = tmp_path / "scene.xml"
+    scene.write_text('<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"/></sensor>\n'
+                     + (f'<shape type="sphere">{emitter}</shape>' if light == "area" else emitter) + "</scene>")
+    said = lightshaft("render", scene, "-o", tmp_path / "out.exr", "--spp", "2", code=2).stderr
+    assert NO_NUMBERS[value] in said and "scene.xml" in said
+
+
+@pytest.mark.parametrize("lens", ['aperture_radius="inf"', 'aperture_radius="-1"', 'aperture_radius="nan"',
+                                  'focus_distance="0"', 'focus_distance="inf"', 'focus_distance="-1"', 'focus_distance="nan"'])
+def test_lenses_that_cannot_be_are_refused(tmp_path, lens):
+    name, value = lens.replace('"', "").split("=")
+    numbers = {"aperture_radius": ".1", "focus_distance": "2", name: value}
+    floats = "".join(f'<float name="{n}" value="{v}"/>' for n, v in numbers.items())
+    scene = tmp_path / "scene.xml"
+    scene.write_text(f'<scene version="3.0.0"><sensor type="thinlens">{floats}<film type="hdrfilm"/></sensor></scene>')
+    said = lightshaft("inspect", scene, code=2).stderr
+    assert "scene.xml:1:" in said and f"'{name}'" in said and ("out of its range" in said or "wants a" in said)
 
 
 def test_cases_are_chosen_by_prefix_or_glob(tmp_path):

@@ -1,6 +1,8 @@
 // Samples that are rejected or kept though something is wrong with them: counted by cause, located, and
 // replayed.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <xmmintrin.h>
 
 #include <cmath>
 #include <limits>
@@ -103,6 +105,29 @@ TEST(Health, TellsOfChangedInputsByCause) {
   Health expected;
   expected.add(HealthCause::negative_density, 1);
   EXPECT_EQ(changed_inputs(*test::world_of(kit)), expected);
+}
+
+// Denormal densities: units trace with such numbers as zeros, whatever their thread is set to, and leave it as it was. So
+// they cost what zeros cost. (Taken as numbers these would be an extinction of 8e-10, by their scale, and shine 16 along 2.)
+TEST(Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread) {
+  SceneKit kit({4, 4});
+  const VolumeIndex grid = kit.grid({2, 1, 1}, {8e-39f, 8e-39f}, test::translate({-1, -1, -1}) * test::scale(2));
+  const MediumIndex medium = kit.heterogeneous(grid, {0, 0, 0}, 1e29);
+  std::get<HeterogeneousMedium>(kit.scene.media[medium.value]).source_radiance = kit.constant({1e10, 1e10, 1e10});
+  kit.container(CubeShape{}, {}, kit.null(), medium);
+  kit.look({0, -5, 0}, {0, 0, 0}, 30);
+  const auto world = test::world_of(kit);
+  const unsigned usual = _mm_getcsr();
+  std::vector<float> sums[2];
+  for (const unsigned zeros : {0u, 0x8040u}) {
+    const unsigned set = (usual & ~0x8040u) | zeros;
+    _mm_setcsr(set);
+    sums[zeros ? 1 : 0] = render_tile(*world, {0, 0, 4, 4}, {0, 16}, nullptr, nullptr).sums;
+    EXPECT_EQ(_mm_getcsr() & 0x8040u, zeros);
+  }
+  _mm_setcsr(usual);
+  EXPECT_EQ(sums[0], sums[1]);
+  EXPECT_THAT(sums[0], ::testing::Each(0.f));
 }
 
 }  // namespace
