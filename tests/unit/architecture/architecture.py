@@ -279,12 +279,12 @@ def exceptions_are_files(tree):
             yield f"the exception for {path} is for a file that is not there"
 
 
-# Numbers that decide pixels: named constants of the renderer, and literals with an exponent that have no name. (A literal
-# without one, such as .5, is nearly always arithmetic.) Grids' file formats are not pixels.
+# Numbers that decide pixels: named constants of the renderer, and literals that have no name and either an exponent or a
+# value of .01 or less. (Larger ones, such as .5, are nearly always arithmetic.) Grids' file formats are not pixels.
 CONSTANTS_PAGE = "docs/constants.md"
 DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb[/_])")
 NAMED_NUMBER = re.compile(r"\bconstexpr\s+(?:static\s+)?(?:float|double|int|std::\w+)\s+(k[A-Z]\w*)\s*(?:\[|=)")
-BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+)f?\b")
+BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+|0?\.0(?:10*|0\d*[1-9]\d*))f?\b")
 
 
 def numbers_that_decide(text):

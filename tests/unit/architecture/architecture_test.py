@@ -119,8 +119,9 @@ class Rules(unittest.TestCase):
         self.assert_finds(architecture.constants_are_listed, {
             "docs/constants.md": page, "worker/render/vdb/c.cpp": "constexpr int kMany = 5;", "worker/agent/d.cpp": "x = 1e-9;",
             "worker/render/a.h": "inline constexpr float kDepth = 4;  // 1e-3\nif (x < 1e-7f) y = .5f;",
-            "worker/render/b.h": "constexpr double kNew = 1e-30;\nstatic constexpr std::size_t kDepth = 1;\nx += 0x1p-20f; y = 1e-7;"},
-            "b.h: kNew decides", "b.h: 0x1p-20 decides", "row for kOld in worker/render/gone.h")
+            "worker/render/b.h": "constexpr double kNew = 1e-30;\nstatic constexpr std::size_t kDepth = 1;\nx += 0x1p-20f; y = 1e-7;\n"
+                                 "z = std::max(.001f, x) + .02 + .25f + 0.0 + .05;  // .002\nfmt(\"0.003\");"},
+            "b.h: kNew decides", "b.h: 0x1p-20 decides", "b.h: .001 decides", "row for kOld in worker/render/gone.h")
 
     def test_exceptions_for_files_that_went(self):
         excepted = {**architecture.LONG_FILES, **architecture.CLOCK_EXCEPTIONS, **architecture.EXIT_EXCEPTIONS, **architecture.SLEEP_EXCEPTIONS}
