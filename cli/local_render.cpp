@@ -45,10 +45,7 @@ Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
   return {};
 }
 
-bool doubtful(const std::optional<Judgement>& judgement) {
-  using Kind = Judgement::Kind;
-  return judgement && (judgement->kind == Kind::heavy_tail || judgement->kind == Kind::bias_floor);
-}
+bool doubtful(const std::optional<Judgement>& judgement) { return judgement && !judgement->trusted; }
 
 ProgressFigures figures_of(const JobView& job) {
   const double samples = job.spp_done * job.size.width * job.size.height;
