@@ -165,6 +165,7 @@ int run(const Flags& flags) {
   const auto limit = render::limit_threads(options->conditions.threads);
   interrupt.on_signal([&] { stop = true; });
   results.seeds = options->seeds;
+  results.first_seed = options->first_seed;
   const auto names = scene_names(options->scenes);
   bool failed = false;
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "common/base/clock.h"
+#include "common/scene/prune.h"
+#include "common/scene/serialize.h"
 #include "worker/render/thread_limit.h"
 
 namespace ls::cli {
@@ -120,6 +122,11 @@ render::TileResult render_frame(const render::World& world, FrameSize size, Samp
   return frame;
 }
 
+Result<Scene> as_sent(const Scene& scene) {
+  const auto whom = scene::pruned_for(scene.integrator.name, scene.integrator.max_depth);
+  return deserialize_scene(serialize(scene::pruned(scene, whom).scene));
+}
+
 RenderSettings settings_of(const Scene& scene, std::uint64_t seed) {
   RenderSettings settings;
   settings.size = scene.film.image_size();
@@ -134,9 +141,12 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
                          std::uint64_t seed, int threads) {
   const SystemClock clock;
   const TimePoint start = clock.now();
-  Scene scene = given;
-  scene.film.size = enough(given.film.size);
-  scene.film.filter = BoxFilter{};
+  Scene asked = given;
+  asked.film.size = enough(given.film.size);
+  asked.film.filter = BoxFilter{};
+  const auto sent = as_sent(asked);
+  if (!sent) return tl::unexpected(sent.error());
+  const Scene& scene = *sent;
   const FrameSize size = scene.film.size;
   const RenderSettings settings = settings_of(scene, seed);
   const auto limit = render::limit_threads(threads);

@@ -1,5 +1,5 @@
-// The mean of a scene's frame (of a spherical camera: over directions), rendered through the renderer's
-// public face, with a standard error that low-discrepancy sequences don't fool: the two halves of every pixel
+// The mean of a scene's frame (of a spherical camera: over directions), rendered as a job's is (taken in, sent to a
+// worker, rendered in units), with a standard error that low-discrepancy sequences don't fool: the two halves of every pixel
 // and all pixels are independent, so that (A - B)^2 / 4 estimates each pixel's squared error without bias.
 #pragma once
 
@@ -19,6 +19,9 @@ void add(render::Health& sum, const render::Health& h);
 
 // Every pixel of `size` of a world, one row a task; the sums' planes are those of the whole frame.
 render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples, int threads);
+
+// The scene as a worker would get it: without what the image does not need, written and read again.
+Result<Scene> as_sent(const Scene& scene);
 
 // What a scene asks for, and this seed.
 RenderSettings settings_of(const Scene& scene, std::uint64_t seed);

@@ -1,5 +1,5 @@
 // The cases of `lightshaft validate`: questions with answers that are known without the renderer, asked of it
-// through its public face (Scene -> build_world -> render_tile).
+// as a job's is (pruned, serialized, read by a worker, rendered in units).
 //
 // To add one: write a function `void add_SUBJECT(Table& t)` in a file of this folder (small, one subject),
 // declare it below, name it in all.cpp, and in it call

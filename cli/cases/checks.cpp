@@ -15,8 +15,10 @@ double Picture::mean(std::size_t pixel, std::size_t channel) const {
 }
 
 Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed, int threads) {
-  const RenderSettings settings = cli::settings_of(kit.scene, seed);
-  const auto world = render::build_world(kit.scene, settings, kit.files, threads);
+  const auto scene = cli::as_sent(kit.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  const RenderSettings settings = cli::settings_of(*scene, seed);
+  const auto world = render::build_world(*scene, settings, kit.files, threads);
   if (!world) return tl::unexpected(world.error());
   render::TileResult frame = cli::render_frame(**world, settings.size, {0, spp}, threads);
   return Picture{settings.size, spp, std::move(frame.sums), frame.health,

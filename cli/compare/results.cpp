@@ -54,8 +54,11 @@ std::vector<std::string> paragraphs_before(const Results& results) {
   out.push_back(
       fmt::format("Each entrant has {} s{} ({}) for each of {}, after loading the scene; those of one seed "
                   "take turns on the same "
-                  "cores. The machine: {}. {}.",
+                  "cores. {}. The machine: {}. {}.",
                   report::given(c.time), limit, clock_words(c), plural(results.seeds, "seed"),
+                  results.seeds == 1 ? fmt::format("The seed is {}", results.first_seed)
+                                     : fmt::format("The seeds are {} to {}", results.first_seed,
+                                                   results.first_seed + (results.seeds - 1)),
                   results.machine.words, results.machine.build));
   const Machine& m = results.machine;
   if (m.others < 0)

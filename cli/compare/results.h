@@ -26,6 +26,7 @@ struct Results {
   Machine machine;
   std::size_t seeds = 0;
   std::vector<Race> races;
+  std::uint64_t first_seed = 0;  // those after it follow
 };
 
 // scene, entrant, seed, spp, wall_seconds, cpu_seconds, seconds (on the race's clock), relmse, rmse,

@@ -41,7 +41,7 @@ std::string points_csv(const Results& results) {
                                      field(p.estimate->relmse_hi))
                        : ",,";
         out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), name(race, lane.entrant),
-                           lane.seed, field(p.spp), field(p.cost.wall), field(p.cost.cpu), field(p.seconds),
+                           results.first_seed + lane.seed, field(p.spp), field(p.cost.wall), field(p.cost.cpu), field(p.seconds),
                            field(p.relmse), field(root(p.mse)), estimate, p.last ? 1 : 0);
       }
   return out;
@@ -65,7 +65,7 @@ std::string forecasts_csv(const Results& results) {
   for (const Race& race : results.races)
     for (const Prediction& p : predictions_of(race))
       out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), name(race, p.entrant),
-                         p.seed, field(p.spp), field(p.spent), field(p.target), field(p.predicted),
+                         results.first_seed + p.seed, field(p.spp), field(p.spent), field(p.target), field(p.predicted),
                          field(p.lo), field(p.hi), field(p.actual.value_or(NAN)), p.within() ? 1 : 0);
   return out;
 }

@@ -1,8 +1,7 @@
 #include "worker/child/job_text.h"
 
 #include <nlohmann/json.hpp>
-
-#include "common/base/json_count.h"
+#include <stdexcept>
 
 namespace ls::worker::child {
 
@@ -36,8 +35,11 @@ Result<LocalJob> from_text(std::string_view text) {
     job.brief.settings_digest = digest_of(job.brief.settings);
     job.brief.needs = json.at("needs").get<std::string>();
     job.scene = json.at("scene_file").get<std::string>();
-    for (const auto& blob : json.at("blobs"))
-      job.brief.assets.push_back({digest(blob.at(0)), count_of(blob.at(1)), blob.at(2)});
+    for (const auto& blob : json.at("blobs")) {
+      // The library would convert 1e20, which no integer can hold.
+      if (!blob.at(1).is_number_unsigned()) throw std::invalid_argument("the size of a file is no count");
+      job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
+    }
     for (const auto& [hex, path] : json.at("files").items())
       job.assets[digest(hex)] = path.get<std::string>();
     return job;

@@ -105,6 +105,10 @@ TEST(Files, KeepTheirColumnsWhateverNamesAre) {
 
   EXPECT_THAT(points_csv(r),
               HasSubstr("\n\"fog, \"\"thick\"\"\",Lightshaft <b>|volpath,0,2,0.02,0.04,0.02,5,"));
+  Results later = r;
+  later.first_seed = 101;
+  EXPECT_THAT(points_csv(later), HasSubstr("|volpath,101,2,0.02,")) << "the seed that makes it again";
+  EXPECT_THAT(markdown(later), HasSubstr("The seeds are 101 to 103"));
   EXPECT_THAT(summary_csv(r), HasSubstr(",Other,3,64,0.64,0.3125,"));
   EXPECT_THAT(forecasts_csv(r),
               HasSubstr("scene,entrant,seed,spp,spent,target,predicted,lo,hi,actual,within\n"));
