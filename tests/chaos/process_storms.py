@@ -87,7 +87,10 @@ def workers_drained_by_SIGTERM(s):
         farm.submit_storm()
         for _ in range(3):
             farm.until_share(s.dice.uniform(.05, .8))
-            leaver = s.dice.choice([w for w in farm.workers if w.alive() and "joined" in w.output()])
+            # One that has rendered something. (A worker that leaves with its first lease still under way to it never
+            # sees that, and its units are told as those of a lost one.)
+            known = {w["name"] for w in farm.get("/api/v1/workers")["workers"] if w["units_done"] > 0}
+            leaver = s.dice.choice([w for w in farm.workers if w.alive() and w.name in known])
             farm.add_worker("--fake-delay", DELAY, threads=2)
             assert leaver.terminate() == 0, f"{leaver.name}: {leaver.output()}"
         yield farm

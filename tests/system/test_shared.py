@@ -116,6 +116,7 @@ def test_a_store_of_blobs_that_is_away_during_a_takeover_delays_it_and_nothing_e
                 shutil.copy(a.data / name, tmp_path / "b" / "data" / name)
             with LocalFarm(tmp_path / "b", flags=flags) as b:
                 job = a.submit(SCENE, **SPEC)
+                wait_until(lambda: redis.ask("HGET", f"lightshaft:job:{job}", "owner"), "Redis is told")
                 s3.refuse = [503] * 1_000_000
                 asked = len(s3.requests)
                 a.coordinator.kill()
