@@ -83,8 +83,9 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"media, noisy", scene(room(lamp(60)) + fog(.6, .9, .995))},
       {"media, dark", scene(fog(2, .95, .9) + lamp(2))},
       {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
-      {"media, to a target", scene(fog(2, .95, .9) + lamp(2)), 4096, false, 1.5e-5},
+      {"media, to a target", scene(fog(1, .9, .9) + lamp(60, .1)), 4096, false, 1e-4},
       {"fireflies", scene(caustic()), 64, true},
+      {"fireflies, to a target", scene(caustic()), 1024, true, .2},
   };
   return all;
 }
