@@ -1,6 +1,7 @@
 // Images, meshes and volumes as scenes name them.
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +20,8 @@
 #include "tests/unit/nvdb/nvdb_kit.h"
 #include "worker/render/vdb/nvdb.h"
 #include "worker/render/vdb/refused.h"
+#include "worker/render/vdb_belief.h"
+#include "worker/render/vdb_reply.h"
 
 namespace ls::fuzz {
 namespace {
@@ -39,6 +42,14 @@ void check(const GridData& g) {
   must(g.values.size() == std::size_t{g.nx} * g.ny * g.nz * g.channels, "a grid has all of its values");
   for (const float v : g.values)
     must(std::isfinite(v) && v >= 0, "a grid's values are finite and not negative");
+}
+
+void check(const LsVdbGrid& grid) {
+  must(grid.channels == 1 || grid.channels == 3, "a grid has 1 or 3 channels");
+  const auto nodes = static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2];
+  for (std::uint64_t i = 0; i < nodes * static_cast<std::uint64_t>(grid.channels); ++i)
+    must(std::isfinite(grid.values[i]) && grid.values[i] >= 0,
+         "a grid's values are finite and not negative");
 }
 
 std::string jpeg() {
@@ -128,14 +139,36 @@ void nvdb(std::string_view file, bool whole) {
   try {
     whole ? render::decode_nvdb(bytes, "", kMostValues, grid)
           : render::expand_nvdb("fuzz", bytes, kMostValues, grid);
-    const auto nodes = static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2];
-    for (std::uint64_t i = 0; i < nodes * static_cast<std::uint64_t>(grid.channels); ++i)
-      must(std::isfinite(grid.values[i]) && grid.values[i] >= 0,
-           "a grid's values are finite and not negative");
+    check(grid);
   } catch (const render::Refused& refused) {
     must(!refused.text.empty(), "what is refused is told why");
   }
   delete[] grid.values;
+}
+
+// What lightshaft-vdb may have replied: what comes before the values, without its padding, and the values.
+void vdb_reply(Bytes input) {
+  std::vector<std::byte> reply(input.size() <= sizeof(render::VdbReply)
+                                   ? input.size()
+                                   : render::kVdbValuesAt + input.size() - sizeof(render::VdbReply));
+  const std::size_t head = std::min(input.size(), sizeof(render::VdbReply));
+  std::copy_n(bytes_of(input).begin(), head, reply.begin());
+  if (reply.size() >= render::kVdbValuesAt)
+    std::copy(bytes_of(input).begin() + head, bytes_of(input).end(), reply.begin() + render::kVdbValuesAt);
+  const auto grid = render::believed_grid(reply, kMostValues);
+  grid ? check(*grid) : must(!grid.error().message.empty(), "what is refused is told why");
+}
+
+std::string vdb_reply_seed() {
+  render::VdbReply reply{};
+  reply.magic = render::kVdbMagic;
+  for (std::int32_t& n : reply.grid.size) n = 2;
+  reply.grid.channels = 3;
+  for (int i = 0; i < 16; i += 5) reply.grid.index_to_scene[i] = 1;
+  std::string bytes;
+  put(bytes, reply);
+  for (int i = 0; i < 24; ++i) put(bytes, static_cast<float>(i));
+  return bytes;
 }
 
 // Of six types of values: the buffer of a grid, and a file with it.
@@ -227,6 +260,8 @@ void volume(Bytes input) {
       return grid(decode_raw_grid("fuzz", bytes_of(rest), GridOrder::x_fastest));
     case 'z':
       return grid(decode_raw_grid("fuzz", bytes_of(rest), GridOrder::z_fastest));
+    case 'r':
+      return vdb_reply(rest);
     case 'n':
       return nvdb(text_of(rest), true);
     case 'b':
@@ -244,7 +279,7 @@ Seeds volume_seeds() {
   test::NvdbKit packed;
   packed.codec = 1;
   Seeds seeds{"v" + vol(1, 1, 4), "v" + vol(1, 3, 4), "v" + vol(2, 1, 2), "v" + vol(3, 3, 1),
-              "x" + raw_grid(),   "z" + raw_grid(),   "n" + packed.file()};
+              "x" + raw_grid(),   "z" + raw_grid(),   "n" + packed.file(), "r" + vdb_reply_seed()};
   for (char i = 0; i < 6; ++i) seeds.push_back(std::string("b") + i), seeds.push_back(std::string("f") + i);
   std::string patches = std::string("b") + '\0';
   for (const std::uint32_t at : {16u, 632u, 636u, 696u, 736u, 760u, 816u, 4944u})

@@ -8,15 +8,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "worker/render/vdb_belief.h"
 #include "worker/render/vdb_reply.h"
 
 extern char** environ;
@@ -99,13 +98,6 @@ tl::unexpected<Error> how_it_ended(int status) {
   }
 }
 
-bool sound(const LsVdbGrid& grid, std::uint64_t count) {
-  const auto usable = [](float v) { return std::isfinite(v) && v >= 0; };
-  const auto finite = [](double v) { return std::isfinite(v); };
-  return std::all_of(grid.index_to_scene, grid.index_to_scene + 16, finite) &&
-         std::all_of(grid.values, grid.values + count, usable);
-}
-
 }  // namespace
 
 VdbFile::VdbFile(VdbFile&& from) noexcept
@@ -125,7 +117,7 @@ std::filesystem::path VdbFile::program_beside_us() {
 
 Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values, const std::filesystem::path& program) {
-  const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC));
+  const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (reply.fd < 0) return no_program("memfd_create", errno);
   const auto status = run(
       program,
@@ -134,29 +126,22 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   if (!status) return tl::unexpected(status.error());
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
-  constexpr std::string_view kNonsense = "not a readable OpenVDB or NanoVDB file: reading it gave nonsense";
+  // What the program left behind it may still hold the reply: nobody cuts or changes it from here on, or it
+  // is not looked at.
+  if (::fcntl(reply.fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE) != 0) return vdb_nonsense();
   struct stat written {};
   if (::fstat(reply.fd, &written) != 0) return no_program("fstat", errno);
   const auto bytes = static_cast<std::uint64_t>(written.st_size);
-  if (bytes < kVdbValuesAt) return fail(Errc::invalid_argument, std::string(kNonsense));
+  if (bytes == 0) return vdb_nonsense();
   VdbFile file;
   file.mapped_bytes_ = bytes;
   void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, reply.fd, 0);
   if (mapped == MAP_FAILED) return no_program("mmap", errno);
   file.mapped_ = mapped;
   file.taken_ = DataTaken(bytes);
-  VdbReply said;
-  std::memcpy(&said, mapped, sizeof said);
-  said.error[sizeof said.error - 1] = 0;
-  if (said.magic != kVdbMagic) return fail(Errc::invalid_argument, std::string(kNonsense));
-  if (said.code != 0)
-    return fail(said.code == 2 ? Errc::resource_exhausted : Errc::invalid_argument, std::string(said.error));
-  file.grid_ = said.grid;
-  file.grid_.values = reinterpret_cast<float*>(static_cast<char*>(mapped) + kVdbValuesAt);
-  const std::uint64_t count = values_of(said.grid);
-  if (count == 0 || count > max_values || count > (bytes - kVdbValuesAt) / sizeof(float) ||
-      !sound(file.grid_, count))
-    return fail(Errc::invalid_argument, std::string(kNonsense));
+  const auto grid = believed_grid({static_cast<const std::byte*>(mapped), bytes}, max_values);
+  if (!grid) return tl::unexpected(grid.error());
+  file.grid_ = *grid;
   return file;
 }
 

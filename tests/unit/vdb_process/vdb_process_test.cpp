@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -44,11 +45,16 @@ class VdbProcess : public testing::Test {
     return VdbFile::read(folder_ / "none.vdb", "", 1 << 20, program(words));
   }
   // ... that answers with a reply and values.
-  Result<VdbFile> answered(const VdbReply& reply, const std::vector<float>& values) {
+  Result<VdbFile> answered(const VdbReply& reply, const std::vector<float>& values,
+                           const std::string& then = "") {
     std::string bytes(kVdbValuesAt, '\0');
     std::memcpy(bytes.data(), &reply, sizeof reply);
     bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
-    return read_by("cat '" + file("reply", bytes).string() + "' >&3");
+    return read_by("cat '" + file("reply", bytes).string() + "' >&3\n" + then);
+  }
+  std::filesystem::path fifo(const std::string& name) {
+    EXPECT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
+    return folder_ / name;
   }
 
  private:
@@ -127,9 +133,25 @@ TEST_F(VdbProcess, AReplyIsBelievedOnlyWhereItHolds) {
   EXPECT_FALSE(answered(VdbReply{}, {1, 2}));
   EXPECT_FALSE(read_by("printf abc >&3"));
   EXPECT_FALSE(read_by("true"));
+  refused.error[0] = 0;
+  EXPECT_THAT(answered(refused, {}).error().message, HasSubstr("nonsense"));
+  refused.error[0] = 'x';
   const auto told = answered(refused, {});
   ASSERT_FALSE(told);
   EXPECT_EQ(told.error().message.size(), sizeof refused.error - 1);
+}
+
+TEST_F(VdbProcess, WhatTheProgramLeavesBehindCannotChangeItsReply) {
+  const auto go = fifo("go"), done = fifo("done");
+  const auto cut = answered(reply_of(2, 1, 1), {1, 2},
+                            "{ read word <'" + go.string() + "'; (: >/proc/self/fd/3); echo cut >'" +
+                                done.string() + "'; } 2>/dev/null &");
+  ASSERT_TRUE(cut) << cut.error().message;
+  std::ofstream(go) << "go\n";
+  std::string word;
+  std::ifstream(done) >> word;
+  EXPECT_EQ(word, "cut");  // it has tried
+  EXPECT_EQ(cut->grid().values[1], 2);
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow is larger than any limit
