@@ -84,6 +84,7 @@ struct Figure {
 struct Bench {
   std::uint64_t seed = 0;
   int threads = 1;
+  std::string id = {};  // the case's
 };
 struct Exact {
   std::function<Figure(const Bench&)> check;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "cli/validate_measure.h"
 
@@ -25,8 +27,22 @@ Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed
                  render::describe(**world).clamped_inputs};
 }
 
+std::optional<std::string> what_is_lost(const std::string& id, const SceneKit& kit) {
+  const bool grid = id.find("/grid") != std::string::npos;
+  if (!grid && id.find("/homogeneous") == std::string::npos) return std::nullopt;
+  const auto sent = cli::as_sent(kit.scene);
+  if (!sent) return sent.error().message;
+  const bool left = std::any_of(sent->media.begin(), sent->media.end(), [&](const Medium& m) {
+    return std::holds_alternative<HeterogeneousMedium>(m) == grid;
+  });
+  if (left) return std::nullopt;
+  return fmt::format("no {} medium is left of the scene that is sent: the case asks nothing of media",
+                     grid ? "grid" : "homogeneous");
+}
+
 Figure every_value(const Bench& bench, const SceneKit& kit, std::uint64_t spp, const Channels& expected,
                    double tolerance) {
+  if (const auto lost = what_is_lost(bench.id, kit)) return {.why = *lost};
   const auto p = shoot(kit, spp, bench.seed, bench.threads);
   if (!p) return {.why = p.error().message};
   Figure f{expected[0], expected[0], tolerance * (expected[0] != 0 ? std::abs(expected[0]) : 1), {}, 0};
@@ -45,6 +61,8 @@ Figure every_value(const Bench& bench, const SceneKit& kit, std::uint64_t spp, c
 }
 
 Figure same_bits(const Bench& bench, const SceneKit& a, const SceneKit& b, std::uint64_t spp) {
+  if (const auto lost = what_is_lost(bench.id, a)) return {.why = *lost};
+  if (const auto lost = what_is_lost(bench.id, b)) return {.why = *lost};
   const auto p = shoot(a, spp, bench.seed, bench.threads), q = shoot(b, spp, bench.seed, bench.threads);
   if (!p) return {.why = p.error().message};
   if (!q) return {.why = q.error().message};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "cli/cases/case.h"
@@ -20,6 +21,10 @@ struct Picture {
   double mean(std::size_t pixel, std::size_t channel) const;
 };
 Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed, int threads);
+
+// What a case with this id asks of media (".../homogeneous...", ".../grid...") and what is left of them in a
+// job: if nothing is, it asks nothing, and this says so.
+std::optional<std::string> what_is_lost(const std::string& id, const SceneKit& kit);
 
 // Of every pixel and channel the value that is farthest from the answer (as a share of it, where it is not
 // 0).

@@ -22,9 +22,20 @@ double phi(double x) { return x == 0 ? 1 : -std::expm1(-x) / x; }
 void nothing(Table& t) {
   for (const Way& way : all_ways()) {
     t.exact("N01-no-extinction" + way.name(), "N1",
-            "A medium without extinction before a white sky shows 1 exactly, in every sample.",
+            "A medium that takes a part in 1e30, and so stays in the scene, shows a white sky as 1 exactly, in "
+            "every sample.",
             [way](const Bench& b) {
-              SceneKit kit = unit_cube(way, rgb(0));
+              SceneKit kit = unit_cube(way, rgb(1e-30));
+              kit.environment();
+              return every_value(b, kit, 64, grey(1), 0);
+            });
+    if (!way.grid) continue;
+    t.exact("N01-zeros" + way.name(), "N1",
+            "A grid whose values are all 0, which only its file says, shows 1 exactly, in every sample.",
+            [way](const Bench& b) {
+              SceneKit kit = unit_cube(way, rgb(1));
+              std::get<HeterogeneousMedium>(kit.scene.media.at(0)).sigma_t =
+                  kit.grid({3, 4, 5}, std::vector<float>(60, 0), {});
               kit.environment();
               return every_value(b, kit, 64, grey(1), 0);
             });

@@ -25,6 +25,8 @@ const std::vector<Elsewhere>& answered_elsewhere() {
        "Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing"},
       {"N30", "tests/unit/render/envmap_sampling_test.cpp",
        "EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight"},
+      {"N30", "tests/unit/render/lights_tree_test.cpp",
+       "LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart"},
       {"N31", "tests/unit/render/lights_tree_test.cpp",
        "LightTree, CopesWithLightsInOnePlaceAndWithExtremes"},
       {"N33", "tests/unit/bsdf/hand_values_test.cpp", "Roughness, BelowTheSpecularLimitIsAMirror"},

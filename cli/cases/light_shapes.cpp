@@ -187,8 +187,8 @@ void orders_apart(Table& t) {
           });
   for (const double s : {1e-15, 1e15}) {
     t.same(
-        fmt::format("N32-densities-of-{:g}", 1 / s), "N32",
-        "Lengths whose inverse squares are beyond float32: the weights of strategies stay numbers.",
+        fmt::format("N32-lengths-of-{:g}", s), "N32",
+        "Densities a length of 1e15 or 1e-15 apart: strategies are weighed in a world of unit size.",
         [=] {
           Way way{false, true};
           SceneKit kit = lit_cube(way, rgb(1), rgb(1), 0, {0, 0, 0}, s);

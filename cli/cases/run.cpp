@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cli/cases/checks.h"
 #include "cli/cases/level.h"
 #include "cli/validate_measure.h"
 #include "cli/validate_stats.h"
@@ -71,6 +72,7 @@ class Runner {
 
   Result<Measured> look(const Maker& make, std::uint64_t paths, std::uint64_t seed) const {
     const SceneKit kit = make();
+    if (auto lost = what_is_lost(case_->id, kit)) return fail(Errc::internal, *lost);
     if (case_->options.frames > 0)
       return cli::measure_frames(kit.scene, kit.files, paths, seed, options_.threads, case_->options.frames);
     return cli::measure(kit.scene, kit.files, paths, seed, options_.threads);
@@ -177,7 +179,7 @@ class Runner {
   void exact(const Exact& e) {
     const SystemClock clock;
     const TimePoint start = clock.now();
-    const Figure f = e.check({seed_of(case_->id, options_.seed, 0), options_.threads});
+    const Figure f = e.check({seed_of(case_->id, options_.seed, 0), options_.threads, case_->id});
     ValidateCase c = blank("");
     c.kind = "exact";
     c.expected = f.expected;

@@ -84,9 +84,10 @@ void constant_grid(Table& t, Way way) {
 void furnace(Table& t, const Way& way) {
   for (const bool scatters : {false, true}) {
     t.mean(fmt::format("seed-furnace-{}{}", scatters ? "scattering" : "noscatter", way.name()), "seed 7.6c",
-           "Light of 1 from everywhere: 1, where there is nothing of the medium and where all is scattered.",
+           "Light of 1 from everywhere: 1, where red and green meet nothing of the medium and where all is "
+           "scattered.",
            [=] {
-             SceneKit kit = cube(way, rgb(0), scatters ? Rgb{.5, 1, 2} : rgb(0));
+             SceneKit kit = cube(way, rgb(0), scatters ? Rgb{.5, 1, 2} : Rgb{0, 0, .5});
              kit.environment();
              return kit;
            },

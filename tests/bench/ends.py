@@ -84,7 +84,7 @@ def table(args, folder):
         "off. What is missing of the image's mean (the same paths, roulette off):", "",
         "| scene | " + " | ".join(f"`max_depth` {d}" for d in DEPTHS) + " |", "|---|" + "---|" * len(DEPTHS), *depths, "",
         f"`rr_depth` is where roulette begins; {args.seeds} seeds. The image's mean against that without roulette, with one standard error; then relMSE and "
-        "CPU time, both over those without (where the room's paths end by `kForcedSurvival` alone, beyond 1024 scatterings):", "",
+        "CPU time, both over those without (where the room's paths end by `forced_survival` alone, beyond 1024 scatterings):", "",
         "| scene | " + " | ".join(f"`rr_depth` {rr}" + (" (default)" if rr == 5 else "") for rr in ROULETTES[:-1]) + " |", "|---|" + "---|" * (len(ROULETTES) - 1),
         *roulettes, ""])
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """What a scene does not need, measured: writes docs/leave-out.md.
 
-usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone]
+usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone] [--bits SCENE...]
+       leave_out.py --bits-alone SCENE...
 N = 0: with what was built before, which must be of these sources.
 
 For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
@@ -12,7 +13,8 @@ For a vacuum, a homogeneous, a grid and a textured scene, and one of whose light
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
 - what a worker on a farm keeps resident and which libraries it has mapped, with larger files;
 - bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
---bytes-alone measures the last two, which need no other build. Builds land in build/leave-out-*, eight of them, of which only the
+--bits asks further scenes whether every instantiation that covers them gives the same bits; --bits-alone prints just that.
+--bytes-alone measures the last two of the list, which need no other build. Builds land in build/leave-out-*, eight of them, of which only the
 renderer differs: with ccache each compiles a few dozen files; build/release must be configured. Needs valgrind. Instruction counts
 do not depend on what else runs. Ends with 1 if a scene pays more than LIMIT for what it leaves out, or a counter of unused work is
 not 0.
@@ -337,14 +339,29 @@ def worked(works):
             *(f"| {key.replace('_', ' ')} | " + " | ".join(str(work[key]) for work in works.values()) + " |" for key in next(iter(works.values()))), ""]
 
 
-def page(rows, bytes_alone):
+def same_bits(scenes):
+    """A section: whether each instantiation that covers a scene gives the same bits, in a small image of it."""
+    out = ["## The same bits", "", "Every instantiation that covers a scene, on the scene as a job's, in a small image (`lightshaft inspect SCENE --variants`):", "",
+           "| scene | instantiation | others that cover it | same bits |", "|---|---|---|---|"]
+    for scene in scenes:
+        said = subprocess.run([ROOT / "build" / "release" / "bin" / "lightshaft", "inspect", scene, "--json", "--variants"], check=True, capture_output=True, text=True)
+        told = json.loads(said.stdout)
+        own, *others = [v["variant"] for v in told["variant_bits"]]
+        name = scene.parent.name if scene.stem == "scene" else scene.stem
+        out.append(f"| {name} | {own} | {', '.join(others) or 'none'} | {'yes' if told['variants_agree'] else 'NO'} |")
+    return out + [""]
+
+
+def page(rows, bytes_alone, bits):
     command = "tests/bench/leave_out.py" + (" --bytes-alone" if bytes_alone else "")
-    out = ["# What a scene does not need is left out", "", f"Made by `{command}` (release build, GCC 12, `-march=x86-64-v3`).", "", TAKEN_OUT]
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+    out = ["# What a scene does not need is left out", "", f"Made by `{command}` of commit {commit} (release build, GCC 12, `-march=x86-64-v3`).", "", TAKEN_OUT]
     if bytes_alone:
         out += ["Without `--bytes-alone` it also builds the renderer without the parts that each scene does not use and compares instructions per path, "
                 "and tabulates the counters of work.", ""]
     else:
         out += computed(rows)
+    out += same_bits(bits) if bits else []
     out += ["## Bytes", "",
             "A job on a farm with one worker, with a grid of 128^3 nodes (8 MiB) and an image of 1024^2 texels (3 MiB): what the coordinator stores of it "
             "beside the scene's own text, what the worker fetched, what its render process keeps resident; and "
@@ -374,10 +391,16 @@ def main():
     options.add_argument("--only", default=",".join(SCENES))
     options.add_argument("--skip", default="")
     options.add_argument("--bytes-alone", action="store_true")
+    options.add_argument("--bits", nargs="+", type=pathlib.Path, default=[])
+    options.add_argument("--bits-alone", nargs="+", type=pathlib.Path)
     chosen = options.parse_args()
+    if chosen.bits_alone:
+        section = "\n".join(same_bits(chosen.bits_alone))
+        print(section)
+        sys.exit(1 if "| NO |" in section else 0)
     with tempfile.TemporaryDirectory(prefix="lightshaft-leave-out-") as folder:
         rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone, chosen.skip.split(","))
-    chosen.out.write_text(page(rows, chosen.bytes_alone))
+    chosen.out.write_text(page(rows, chosen.bytes_alone, chosen.bits))
     found = list(faults(rows))
     print("\n".join(found), file=sys.stderr)
     sys.exit(1 if found else 0)

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "cli/cases/checks.h"
 #include "cli/cases/endless.h"
 #include "cli/cases/run.h"
 #include "cli/cases/ways.h"
@@ -113,6 +114,29 @@ TEST(Cases, ASceneThatIsRefusedFails) {
       grey(1));
   const auto line = run_cases(t, {}).at(0);
   EXPECT_NE(line.why.find("extinction"), std::string::npos) << line.why;
+}
+
+// Pruning may take out just what a case is about: then it would pass whatever the renderer does.
+TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
+  const auto nothing = [](bool grid) {
+    SceneKit kit;
+    const Way way{grid, false};
+    way.choose(kit);
+    kit.container(CubeShape{}, {}, kit.null(), way.medium(kit, rgb(0), rgb(0), 0, {}));
+    kit.environment();
+    return kit;
+  };
+  for (const bool grid : {false, true}) {
+    const std::string id = grid ? "mine/grid/volpath" : "mine/homogeneous/volpath";
+    Table t;
+    t.mean(id, "N0", "", [=] { return nothing(grid); }, grey(1));
+    t.exact(id, "N0", "", [=](const Bench& b) { return every_value(b, nothing(grid), 4, grey(1), 0); });
+    for (const cli::ValidateCase& line : run_cases(t, {}))
+      EXPECT_NE(line.why.find("asks nothing of media"), std::string::npos) << id << ": " << line.why;
+  }
+  Table other;
+  other.exact("mine", "N0", "", [=](const Bench& b) { return every_value(b, nothing(false), 4, grey(1), 0); });
+  EXPECT_TRUE(run_cases(other, {}).at(0).passed());
 }
 
 TEST(Cases, AreAskedForByPrefixOrGlob) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/support/render_check.h"
 
@@ -43,6 +44,29 @@ TEST(TruncatedExponential, IsTheExponentialWithoutAnEndAndNothingWithoutDepth) {
   EXPECT_EQ(truncated_pdf(0, kInfinity, .5f), 0);
   EXPECT_FALSE(std::isfinite(truncated_sample(0, kInfinity, .5)));
   EXPECT_EQ(truncated_pdf(0, 4, 1), .25f);
+}
+
+// Shares of strategies whose densities are as far apart as float32 can say (kMaxRatio): numbers in [0, 1],
+// whatever the light's density beside them is.
+TEST(SegmentLightVertex, SharesAreNumbersAtTheEndsOfFloat32) {
+  using Vertex = SegmentLight<Features{}>::Vertex;
+  constexpr float kTiny = 1e-45f, kHuge = std::numeric_limits<float>::max();
+  for (const bool by_depth : {false, true})
+    for (const float depth_ratio : {0.f, kTiny, 1.f, kMaxRatio})
+      for (const float flight : {0.f, kTiny, 1e-38f, 1.f, kHuge})
+        for (const float pivot : {0.f, 1e-30f, 1e-7f, 1.f, 1e30f}) {
+          const Vertex v{by_depth, true, depth_ratio, flight, .5f, {0, 0, 0}, {1, 0, 0}, 1};
+          for (const float found : {v.found_as_light(), v.found_as_light({.5f, pivot, 0})}) {
+            ASSERT_GE(found, 0);
+            ASSERT_LE(found, kMaxRatio);
+            for (const float p_s : {1e-30f, 1.f, 1e15f})
+              for (const float p_l : {0.f, kTiny, 1.f, 1e30f, kHuge}) {
+                const float share = p_s / (p_s + p_l * found);  // as PathTracer::add_emission
+                ASSERT_TRUE(share >= 0 && share <= 1)
+                    << by_depth << ' ' << depth_ratio << ' ' << flight << ' ' << pivot << ' ' << p_s << ' ' << p_l;
+              }
+          }
+        }
 }
 
 SceneKit cloud_kit() {

@@ -153,6 +153,29 @@ TEST(LightTree, CopesWithLightsInOnePlaceAndWithExtremes) {
   }
 }
 
+// STABILITY N30: a million, of intensities 1e-20 to 1e20. All words are shared out to the last, each comes to
+// a light that has some, and that is one of the bright: those below 1e9 have 1e-10 of the sum together.
+TEST(LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart) {
+  constexpr std::size_t n = 1'000'000;
+  RandomStream r(30);
+  std::vector<LightBounds> lights = random_bounds(n, r);
+  for (std::size_t i = 0; i < n; ++i) {
+    lights[i].intensity = std::pow(10., 40 * r.uniform() - 20);
+    lights[i].cos_spread = -1;  // all shine everywhere
+  }
+  const LightTree tree = LightTree::build(lights);
+  const V3 x(.5f, .5f, 2);
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; i < n; ++i) sum += tree.words_of(i, kWords, x, V3(0));
+  EXPECT_EQ(sum, kWords);
+  for (std::uint64_t k = 0; k < 1000; ++k) {
+    const LightTree::Found f = tree.find(k * (kWords / 1000), kWords, x, V3(0));
+    ASSERT_EQ(f.words, tree.words_of(f.light, kWords, x, V3(0)));
+    ASSERT_GE(f.words, 1u);
+    EXPECT_GT(lights[f.light].intensity, 1e9);
+  }
+}
+
 // ---- as part of Lights ----
 TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
   const LightBench b(hall(200));
