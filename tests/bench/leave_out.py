@@ -2,7 +2,6 @@
 """What a scene does not need, measured: writes docs/leave-out.md.
 
 usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone] [--bits SCENE...]
-       leave_out.py --bits-alone SCENE...
 N = 0: with what was built before, which must be of these sources.
 
 For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
@@ -13,7 +12,7 @@ For a vacuum, a homogeneous, a grid and a textured scene, and one of whose light
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
 - what a worker on a farm keeps resident and which libraries it has mapped, with larger files;
 - bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
---bits asks further scenes whether every instantiation that covers them gives the same bits; --bits-alone prints just that.
+--bits asks further scenes whether every instantiation that covers them gives the same bits (same_bits.py).
 --bytes-alone measures the last two of the list, which need no other build. Builds land in build/leave-out-*, eight of them, of which only the
 renderer differs: with ccache each compiles a few dozen files; build/release must be configured. Needs valgrind. Instruction counts
 do not depend on what else runs. Ends with 1 if a scene pays more than LIMIT for what it leaves out, or a counter of unused work is
@@ -36,6 +35,7 @@ sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "system")]
 from cli_kit import FOG, fog_values, write_fog  # noqa: E402
 from local_farm import LocalFarm  # noqa: E402
 from processes import family  # noqa: E402
+from same_bits import same_bits  # noqa: E402
 
 SIZE, SPP = (48, 36), 2
 LIMIT = 0.005
@@ -339,19 +339,6 @@ def worked(works):
             *(f"| {key.replace('_', ' ')} | " + " | ".join(str(work[key]) for work in works.values()) + " |" for key in next(iter(works.values()))), ""]
 
 
-def same_bits(scenes):
-    """A section: whether each instantiation that covers a scene gives the same bits, in a small image of it."""
-    out = ["## The same bits", "", "Every instantiation that covers a scene, on the scene as a job's, in a small image (`lightshaft inspect SCENE --variants`):", "",
-           "| scene | instantiation | others that cover it | same bits |", "|---|---|---|---|"]
-    for scene in scenes:
-        said = subprocess.run([ROOT / "build" / "release" / "bin" / "lightshaft", "inspect", scene, "--json", "--variants"], check=True, capture_output=True, text=True)
-        told = json.loads(said.stdout)
-        own, *others = [v["variant"] for v in told["variant_bits"]]
-        name = scene.parent.name if scene.stem == "scene" else scene.stem
-        out.append(f"| {name} | {own} | {', '.join(others) or 'none'} | {'yes' if told['variants_agree'] else 'NO'} |")
-    return out + [""]
-
-
 def page(rows, bytes_alone, bits):
     command = "tests/bench/leave_out.py" + (" --bytes-alone" if bytes_alone else "")
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
@@ -392,12 +379,7 @@ def main():
     options.add_argument("--skip", default="")
     options.add_argument("--bytes-alone", action="store_true")
     options.add_argument("--bits", nargs="+", type=pathlib.Path, default=[])
-    options.add_argument("--bits-alone", nargs="+", type=pathlib.Path)
     chosen = options.parse_args()
-    if chosen.bits_alone:
-        section = "\n".join(same_bits(chosen.bits_alone))
-        print(section)
-        sys.exit(1 if "| NO |" in section else 0)
     with tempfile.TemporaryDirectory(prefix="lightshaft-leave-out-") as folder:
         rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone, chosen.skip.split(","))
     chosen.out.write_text(page(rows, chosen.bytes_alone, chosen.bits))
