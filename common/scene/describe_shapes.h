@@ -98,7 +98,7 @@ void describe_clips(V& v, T& s) {
            .range = kPositive},
           s.near_clip);
   v.field({.name = "far_clip",
-           .doc = "farthest depth that is seen (not `spherical`)",
+           .doc = "farthest depth that is seen, of surfaces and of media (not `spherical`)",
            .unit = "length",
            .range = kPositive},
           s.far_clip);

@@ -24,6 +24,19 @@ namespace {
 
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
 
+// Geometry ids, the same in every scene they are attached to: kind + side * kKinds, side 0 of what is opaque,
+// 1 of what light passes; in the scenes of groups kInGroup higher, so that a hit's id alone tells what stands
+// in the world by itself. In the world's scenes the instances follow from kFirstInstance on, in their order.
+enum : unsigned {
+  kTriangles = 0,
+  kSpheres = 1,
+  kDisks = 2,
+  kCylinders = 3,
+  kKinds = 4,
+  kInGroup = 2 * kKinds,
+  kFirstInstance = 2 * kKinds
+};
+
 // All but triangles are user geometries: their intersection is our own double-precision code.
 template <class Shape>
 struct ShapeSet {
@@ -40,23 +53,42 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
   *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
 }
 
+// What a callback knows of the ray: Embree's context, and the ray as it is in the world. In an instance Embree
+// hands over one that it has taken to the group's space in float32.
+struct Tracing {
+  RTCIntersectContext context;
+  const PlacedInstance* instances;
+  const V3 *o, *d;
+
+  Tracing(const PlacedInstance* all, const V3& origin, const V3& direction)
+      : instances(all), o(&origin), d(&direction) {
+    rtcInitIntersectContext(&context);
+  }
+};
+
 template <class Shape>
-double shape_distance(const void* user, unsigned prim, const RTCRay& ray) {
+double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context, const RTCRay& ray) {
   LS_COUNT(user_geometry);
   const Shape& s = static_cast<const ShapeSet<Shape>*>(user)->shapes[prim];
+  if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    // As Geometry::complete_instanced has it, so that what is met here is met there, too.
+    const auto& tracing = *reinterpret_cast<const Tracing*>(context);
+    const PlacedInstance& i = tracing.instances[context->instID[0] - kFirstInstance];
+    return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
+                     ray.tfar);
+  }
   return intersect(s, V3d(ray.org_x, ray.org_y, ray.org_z), V3d(ray.dir_x, ray.dir_y, ray.dir_z), ray.tnear,
                    ray.tfar);
 }
 
-// A trace that stops nowhere and keeps all it meets: its context is this one, and has a filter.
-struct Collecting {
-  RTCIntersectContext context;
+// A trace that stops nowhere and keeps all it meets: it has a filter.
+struct Collecting : Tracing {
+  using Tracing::Tracing;
   std::array<RTCHit, Together::kMost> met;  // only the ids are set
   std::size_t count = 0;
 
   static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
-    static_assert(offsetof(Collecting, context) == 0);
-    auto& c = *reinterpret_cast<Collecting*>(context);
+    auto& c = static_cast<Collecting&>(*reinterpret_cast<Tracing*>(context));
     if (c.count < c.met.size())
       c.met[c.count++] = {.primID = primitive, .geomID = geometry, .instID = {instance}};
   }
@@ -72,7 +104,7 @@ template <class Shape>
 void intersect_callback(const RTCIntersectFunctionNArguments* args) {
   if (!args->valid[0]) return;
   auto* rh = reinterpret_cast<RTCRayHit*>(args->rayhit);
-  const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, rh->ray);
+  const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, rh->ray);
   const auto tf = static_cast<float>(t);
   if (!(tf < rh->ray.tfar)) return;
   if (args->context->filter)
@@ -87,23 +119,10 @@ template <class Shape>
 void occluded_callback(const RTCOccludedFunctionNArguments* args) {
   if (!args->valid[0]) return;
   auto* ray = reinterpret_cast<RTCRay*>(args->ray);
-  if (shape_distance<Shape>(args->geometryUserPtr, args->primID, *ray) < ray->tfar) {
+  if (shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, *ray) < ray->tfar) {
     ray->tfar = -std::numeric_limits<float>::infinity();
   }
 }
-
-// Geometry ids, the same in every scene they are attached to: kind + side * kKinds, side 0 of what is opaque,
-// 1 of what light passes; in the scenes of groups kInGroup higher, so that a hit's id alone tells what stands
-// in the world by itself. In the world's scenes the instances follow from kFirstInstance on, in their order.
-enum : unsigned {
-  kTriangles = 0,
-  kSpheres = 1,
-  kDisks = 2,
-  kCylinders = 3,
-  kKinds = 4,
-  kInGroup = 2 * kKinds,
-  kFirstInstance = 2 * kKinds
-};
 
 // Written in the 16-byte words that Embree reads: a load of several smaller stores has to wait for them.
 using F32x4 = float __attribute__((vector_size(16)));
@@ -148,6 +167,7 @@ struct Accel::State {
   std::vector<std::uint32_t> group_of;  // by instance
   std::atomic<std::int64_t> bytes{0};
   bool coincident = false;
+  const PlacedInstance* instances = nullptr;  // the geometry's
 
   ~State() {
     own.reset();
@@ -296,9 +316,8 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
   RTCRayHit rh;
   set_ray(rh.ray, o, d, t_max);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, &rh);
+  Tracing tracing(st.instances, o, d);
+  rtcIntersect1(scene, &tracing.context, &rh);
   return primitive_of(st, rh.hit);
 }
 
@@ -314,6 +333,7 @@ Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
   a.state_ = std::make_unique<State>();
   State& st = *a.state_;
   st.coincident = coincident;
+  st.instances = g.instances.data();
   st.device =
       rtcNewDevice(fmt::format("threads={},user_threads=0,{}", std::max(1, threads), kDeviceConfig).c_str());
   if (!st.device)
@@ -359,8 +379,7 @@ Together Accel::between(const V3& a, const V3& b) const {
   RTCRayHit rh;
   set_ray(rh.ray, a, d, 1);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  Collecting all;
-  rtcInitIntersectContext(&all.context);
+  Collecting all(state_->instances, a, d);
   all.context.filter = collect_callback;
   rtcIntersect1(state_->own->all, &all.context, &rh);
   for (std::size_t i = 0; i < all.count; ++i) together.ids[i] = *primitive_of(*state_, all.met[i]);
@@ -377,9 +396,8 @@ bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
   if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
   RTCRay ray;
   set_ray(ray, o, d, t_max);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(state_->own->opaque, &context, &ray);
+  Tracing tracing(state_->instances, o, d);
+  rtcOccluded1(state_->own->opaque, &tracing.context, &ray);
   return ray.tfar < 0;
 }
 

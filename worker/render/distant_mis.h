@@ -26,9 +26,6 @@
 
 namespace ls::render {
 
-// Ratios of densities are cut here, so that no product with them is 0 times infinity.
-inline constexpr float kMaxRatio = 1e30f;
-
 template <Features F>
 class SegmentLight {
  public:

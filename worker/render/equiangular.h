@@ -12,6 +12,9 @@
 
 namespace ls::render {
 
+// Ratios of densities are cut here, so that no product with them is 0 times infinity.
+inline constexpr float kMaxRatio = 1e30f;
+
 class EquiAngular {
  public:
   // The segment o + t d, t in [0, length], d of unit length, length finite and positive.

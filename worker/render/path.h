@@ -66,14 +66,15 @@ class PathTracer {
 
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
 
-  std::optional<float> scatter_in_media(const SurfaceHit* end);
-  std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end);
-  std::optional<float> scatter_among(const SurfaceHit* end);
+  // Up to the surface at `end`, else as far as `reach`.
+  std::optional<float> scatter_in_media(const SurfaceHit* end, float reach);
+  std::optional<float> scatter_in_medium(const Medium& medium, const SurfaceHit* end, float reach);
+  std::optional<float> scatter_among(const SurfaceHit* end, float reach);
   void light_vertex(const Medium& medium, const V3& p, const V3& d);
   void add_glow_among(float t_max);
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_glow(const Medium& medium, float t_max);
-  std::optional<float> scatter_on_surface(const SurfaceHit& hit);
+  std::optional<float> scatter_on_surface(SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
   // Whether a segment is left after so many scatterings and as many boundaries and veils passed.
@@ -193,7 +194,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     }
     if constexpr (F.media) {
       if (medium_.any()) {
-        if (const auto u = scatter_in_media(met ? &hit : nullptr)) {
+        if (const auto u = scatter_in_media(met ? &hit : nullptr, t_max)) {
           if (!survives(*u)) break;
           continue;
         }
@@ -236,8 +237,9 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 // A number for roulette: the path goes on from a vertex in the medium. Nothing: it reached the end of the
 // segment, if there is one, or has ended on the way, with beta black.
 template <Features F, template <Features> class Light>
-std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& medium, const SurfaceHit* end) {
-  const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
+std::optional<float> PathTracer<F, Light>::scatter_in_medium(const Medium& medium, const SurfaceHit* end,
+                                                             float reach) {
+  const float t_max = end ? way_to(*end, start_, o_, d_) : reach;
   const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow(medium, t_max);
   const auto plan = Light<F>::ahead(*this, medium, segment);
@@ -291,11 +293,17 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
 
 // A number for roulette, or nothing: absorbed, or too deep.
 template <Features F, template <Features> class Light>
-std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) {
+std::optional<float> PathTracer<F, Light>::scatter_on_surface(SurfaceHit& hit) {
   if (!may_go_on(depth_ + 1, passed_)) return std::nullopt;
   ++depth_;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-  const V3 wo = hit.shading.to_local(-d_);
+  V3 wo = hit.shading.to_local(-d_);
+  // At the rim of a surface with normals of its own these may be turned away from who looks at its front: by
+  // them alone the path would stand behind it, and light from there would come through.
+  if ((wo.z > 0) != (dot(d_, hit.ng) < 0)) [[unlikely]] {
+    hit.shading = Frame::from_tangent(hit.ng, hit.shading.s);
+    wo = hit.shading.to_local(-d_);
+  }
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
   const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});

@@ -45,11 +45,11 @@ void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool throug
 }
 
 template <Features F, template <Features> class Light>
-std::optional<float> PathTracer<F, Light>::scatter_in_media(const SurfaceHit* end) {
+std::optional<float> PathTracer<F, Light>::scatter_in_media(const SurfaceHit* end, float reach) {
   if constexpr (F.overlaps) {
-    if (medium_.several()) return scatter_among(end);
+    if (medium_.several()) return scatter_among(end, reach);
   }
-  return scatter_in_medium(world_.media[medium_.one()], end);
+  return scatter_in_medium(world_.media[medium_.one()], end, reach);
 }
 
 // From one side of a surface to the other: from in front of all that may be meant to lie where it does, but

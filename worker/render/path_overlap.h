@@ -11,8 +11,8 @@
 namespace ls::render {
 
 template <Features F, template <Features> class Light>
-std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end) {
-  const float t_max = end ? way_to(*end, start_, o_, d_) : kInfinity;
+std::optional<float> PathTracer<F, Light>::scatter_among(const SurfaceHit* end, float reach) {
+  const float t_max = end ? way_to(*end, start_, o_, d_) : reach;
   const Segment segment{t_max, dot(o_ - start_, d_), end};
   if constexpr (F.emission) add_glow_among(t_max);
   RandomStream streams = stream_.stream(segment_, Purpose::overlap);

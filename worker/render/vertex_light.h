@@ -10,6 +10,7 @@
 // vertex for all strategies.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "worker/render/built.h"
@@ -35,6 +36,10 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Stre
   }
 }
 
+// e / f, both of one spot. The means of macro cells may take f to 0 where flights still get to: then it is the
+// largest ratio, for all strategies alike.
+inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
+
 template <Features F>
 class VertexLight {
  public:
@@ -52,7 +57,9 @@ class VertexLight {
       return kBuilt.equiangular && focused && (is_point || !(F.grids && points_only));
     }
     // e / f for a light with this pivot, where it focuses on such.
-    float focus(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t) / flight_pdf; }
+    float focus(const V3& pivot) const {
+      return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
+    }
     // Of a light that was hit: no point.
     float found_as_light(const V3& pivot) const { return focuses(false) ? 1 + focus(pivot) : 1.f; }
     static float found_as_light() { return 1; }
@@ -75,8 +82,10 @@ class VertexLight {
     v.d = path.d_;
     v.length = stretch.to() - stretch.from();
     v.t = t - stretch.from();
-    v.flight_pdf = flight_pdf<F>(medium, path.density_, stretch.at(t));
-    v.focused = v.flight_pdf > 0 && v.length > 0;
+    const Stretch::Spot spot = stretch.at(t);
+    v.flight_pdf = flight_pdf<F>(medium, path.density_, spot);
+    // Also where that is 0 by underflow: points are placed there (focus_on_light).
+    v.focused = spot.rate > 0 && v.length > 0;
     return v;
   }
 
@@ -123,12 +132,10 @@ class VertexLight {
     const auto light = lights.sample(choice, p);
     if (!light || !(s.pdf > 0)) return;
     const float phase = medium.phase.value(path.d_, light->direction);
-    // e / f; infinite where no flight gets to
-    const float ratio = s.pdf / flight_pdf<F>(medium, path.density_, spot);
+    const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, spot));
     const bool delta = !kBuilt.found_lights || light->delta;
-    const float share = delta ? 1 : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
     const float weight =
-        delta ? (std::isfinite(ratio) ? ratio / (1 + ratio) : 1.f) : (std::isfinite(ratio) ? share : 1.f);
+        delta ? ratio / (1 + ratio) : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
     const C3 arriving = path.unoccluded(s.p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;

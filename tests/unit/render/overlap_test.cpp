@@ -187,6 +187,34 @@ TEST(Overlaps, ReplaceTheExteriorThatABoundaryNames) {
   EXPECT_NEAR(seen(kit), 4 * 1 + 2 * 10, 1e-3);
 }
 
+// Nor does a ball take away what is around it by naming another outside: what is there does not depend on the
+// way, and not on whether a medium of nothing is left out.
+TEST(Overlaps, DoNotReplaceTheCamerasMediumByAnExteriorThatIsNot) {
+  for (const bool named : {false, true}) {
+    SceneKit kit({1, 1});
+    const MediumIndex fog = glowing(kit, 1), amber = glowing(kit, 10), nothing = glowing(kit, 0);
+    Shape& ball = kit.container(SphereShape{}, {}, kit.null(), amber);
+    if (named) ball.exterior = nothing;
+    kit.shape(CubeShape{}, translate({5, 0, 0}), kit.diffuse(0));
+    look_along_x(kit, {-8, 0, 0});
+    kit.scene.sensor.medium = fog;
+    EXPECT_NEAR(seen(kit), 12 * 1 + 2 * 10, 1e-3) << named;
+  }
+}
+
+// What lies beyond far_clip is not seen: neither surfaces nor media.
+TEST(Overlaps, AndOtherMediaEndWhereTheCameraSeesNoFarther) {
+  for (const bool two : {false, true}) {
+    SceneKit kit({1, 1});
+    const MediumIndex fog = glowing(kit, 1), amber = glowing(kit, 10);
+    if (two) kit.container(CubeShape{}, test::scale(50), kit.null(), amber);
+    look_along_x(kit, {0, 0, 0});
+    kit.scene.sensor.medium = fog;
+    kit.scene.sensor.far_clip = 5;
+    EXPECT_NEAR(seen(kit), 5 * (two ? 11 : 1), 1e-3) << two;
+  }
+}
+
 // A medium of nothing that is preferred is a hole.
 TEST(Overlaps, CanBeHollowedOut) {
   SceneKit kit({1, 1});
