@@ -183,6 +183,8 @@ void Service::on(const JobStateChanged& e, Todo&) {
     entry->clock_zero.reset();
     entry->leased.clear();
     if (entry->assembly) entry->assembly->forget_waiting();
+    end_curve_locked(entry);
+    compare_last_locked(entry);
     chores_.push([this, entry] { retire(entry); });
   }
   persist_locked(*entry);
@@ -212,14 +214,28 @@ void Service::on(const Checkpoint& e, Todo&) {
       std::upper_bound(entry->replay.begin(), entry->replay.end(),
                        std::pair(entry->fold_seconds, std::numeric_limits<double>::infinity()));
   if (!entry->replay.empty()) core = until == entry->replay.begin() ? 0 : std::prev(until)->second;
-  const ConvergencePoint point{entry->fold_seconds, core, error.spp, figures_of(error)};
+  add_point_locked(entry, {entry->fold_seconds, core, error.spp, figures_of(error)});
+  compare_locked(entry, e.rounds, error.spp);
+}
+
+// What a job ends with by time, or because it is cancelled, may be more than its last checkpoint: the curve ends
+// with the image that is handed out, so that all who ask are told the same.
+void Service::end_curve_locked(const EntryPtr& entry) {
+  if (!entry->assembly || entry->assembly->film().pixels_without_samples() > 0) return;
+  const ImageError error = image_error(entry->assembly->film().error());
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;
+  entry->stored.totals.doubt = error.verdict;
+  entry->stored.totals.few_hits = error.few_hits;
+  add_point_locked(entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
+}
+
+void Service::add_point_locked(const EntryPtr& entry, const ConvergencePoint& point) {
   entry->points.push_back(point);
-  chores_.push([this, id = e.job, point] {
+  chores_.push([this, id = entry->stored.id, point] {
     if (const auto added = store_->add_point(id, point); !added)
       log_error(fmt::format("job={}", id.value), added.error().message);
     step("checkpoint-stored");
   });
-  compare_locked(entry, e.rounds, error.spp);
 }
 
 // What was said of wrong or lost pixels: checkpoints are taken again as tiles are folded again.
@@ -248,6 +264,7 @@ void Service::on(const JobFinished& e, Todo&) {
   entry->stored.totals.ended_unix = unix_now();
   if (entry->assembly) entry->stored.totals.health = entry->assembly->health().total();
   entry->clock_zero.reset();
+  end_curve_locked(entry);
   compare_last_locked(entry);
   if (e.unaudited > 0)
     log_job(e.job, fmt::format("{} results were to be rendered again by another worker, but nobody else of their "

@@ -296,6 +296,8 @@ class Service final : public Coordinator {
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
   Result<std::uint64_t> write_image(const Film& film, const ReportFacts& facts);
   ReportFacts facts_locked(const JobEntry& entry) const;
+  void add_point_locked(const EntryPtr& entry, const ConvergencePoint& point);
+  void end_curve_locked(const EntryPtr& entry);
   void forget_curve_locked(JobEntry& entry);
   Provenance provenance_of(const ReportFacts& facts) const;
   MatteManifests mattes_of(const StoredJob& job) const;

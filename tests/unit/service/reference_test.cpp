@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <thread>
 
 #include "common/image/exr_file.h"
 #include "tests/unit/service/fake_farm.h"
@@ -63,6 +64,43 @@ TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
   }
   EXPECT_EQ(rendered(dir.path() / "b", 2), first);
   EXPECT_EQ(rendered({}, 3), first);  // in memory
+}
+
+// Cancelled in the middle of a round: list, curve and report tell of one image, the one that is handed out, and
+// its true error is its own.
+TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator, against(*coordinator));
+  {
+    FakeFarm farm(*coordinator, 1);
+    farm.reorder = [](auto& units) {
+      std::stable_sort(units.begin(), units.end(), [](const LeaseUnit& a, const LeaseUnit& b) { return a.round < b.round; });
+    };
+    farm.stop_after = 5;  // two tiles: up to 2 and to 4 samples, and one tile of the third round
+    farm.finish(job);
+    while (coordinator->job(job)->spp_done < 7) std::this_thread::yield();  // 7.2 as soon as all five are folded
+    ASSERT_EQ(coordinator->convergence(job)->size(), 2u);
+    ASSERT_TRUE(coordinator->cancel(job));
+  }
+  const auto told_alike = [&] {
+    const auto points = coordinator->convergence(job).value();
+    const auto told = report(*coordinator, job);
+    ASSERT_EQ(points.size(), 3u);
+    EXPECT_EQ(points.back().spp, told["spp"]);
+    EXPECT_EQ(points.back().error.relmse, told["relmse"]);
+    EXPECT_EQ(coordinator->job(job)->error_now->relmse, told["relmse"]);
+    if (const auto truth = points.back().truth) {  // what is not stored yet goes with a coordinator
+      EXPECT_EQ(truth->relmse, told["true_relmse"]);
+      EXPECT_NE(truth->relmse, points[1].truth->relmse);
+    }
+  };
+  while (!coordinator->convergence(job)->back().truth) std::this_thread::yield();
+  told_alike();
+  while (!std::filesystem::exists(dir.path() / "jobs" / job.value / "film.snap")) std::this_thread::yield();
+  coordinator.reset();
+  coordinator = open_at(dir.path());
+  told_alike();
 }
 
 TEST(ServiceReference, SurvivesARestart) {
