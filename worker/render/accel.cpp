@@ -41,6 +41,7 @@ enum : unsigned {
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
+  const PlacedInstance* instances = nullptr;  // the world's
 };
 
 template <class Shape>
@@ -57,11 +58,9 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
 // hands over one that it has taken to the group's space in float32.
 struct Tracing {
   RTCIntersectContext context;
-  const PlacedInstance* instances;
   const V3 *o, *d;
 
-  Tracing(const PlacedInstance* all, const V3& origin, const V3& direction)
-      : instances(all), o(&origin), d(&direction) {
+  Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) {
     rtcInitIntersectContext(&context);
   }
 };
@@ -69,11 +68,12 @@ struct Tracing {
 template <class Shape>
 double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context, const RTCRay& ray) {
   LS_COUNT(user_geometry);
-  const Shape& s = static_cast<const ShapeSet<Shape>*>(user)->shapes[prim];
+  const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
+  const Shape& s = set.shapes[prim];
   if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
     // As Geometry::complete_instanced has it, so that what is met here is met there, too.
     const auto& tracing = *reinterpret_cast<const Tracing*>(context);
-    const PlacedInstance& i = tracing.instances[context->instID[0] - kFirstInstance];
+    const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
     return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
                      ray.tfar);
   }
@@ -167,7 +167,6 @@ struct Accel::State {
   std::vector<std::uint32_t> group_of;  // by instance
   std::atomic<std::int64_t> bytes{0};
   bool coincident = false;
-  const PlacedInstance* instances = nullptr;  // the geometry's
 
   ~State() {
     own.reset();
@@ -224,6 +223,7 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
     const Side s = side_of(range, side);
     to.base[first_id + kind] = s.first;
     part.shapes = std::span(all).subspan(s.first, s.count());
+    part.instances = g.instances.data();
     if (s.count() > 0) add(shape_geometry(device, part), kind);
   };
   const Side triangles = side_of(set.triangles, side);
@@ -316,7 +316,7 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
   RTCRayHit rh;
   set_ray(rh.ray, o, d, t_max);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  Tracing tracing(st.instances, o, d);
+  Tracing tracing(o, d);
   rtcIntersect1(scene, &tracing.context, &rh);
   return primitive_of(st, rh.hit);
 }
@@ -333,7 +333,6 @@ Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
   a.state_ = std::make_unique<State>();
   State& st = *a.state_;
   st.coincident = coincident;
-  st.instances = g.instances.data();
   st.device =
       rtcNewDevice(fmt::format("threads={},user_threads=0,{}", std::max(1, threads), kDeviceConfig).c_str());
   if (!st.device)
@@ -379,7 +378,7 @@ Together Accel::between(const V3& a, const V3& b) const {
   RTCRayHit rh;
   set_ray(rh.ray, a, d, 1);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  Collecting all(state_->instances, a, d);
+  Collecting all(a, d);
   all.context.filter = collect_callback;
   rtcIntersect1(state_->own->all, &all.context, &rh);
   for (std::size_t i = 0; i < all.count; ++i) together.ids[i] = *primitive_of(*state_, all.met[i]);
@@ -396,7 +395,7 @@ bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
   if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
   RTCRay ray;
   set_ray(ray, o, d, t_max);
-  Tracing tracing(state_->instances, o, d);
+  Tracing tracing(o, d);
   rtcOccluded1(state_->own->opaque, &tracing.context, &ray);
   return ray.tfar < 0;
 }

@@ -71,6 +71,9 @@ template <class V>
   if (s.normals) {
     const V3 m = g.normals[idx[0]] * w + g.normals[idx[1]] * u + g.normals[idx[2]] * v;
     if (dot(m, m) > 0) ns = normalize(m) * s.orientation;
+    // At the rim of a body they may be turned away from who looks at its front: by them alone the path would
+    // stand behind the surface, and light from there would come through.
+    if ((dot(ns, V3(d)) < 0) != (dot(hit.ng, V3(d)) < 0)) ns = hit.ng;
   }
   if (!s.wants_tangent) {
     hit.shading = Frame(ns);

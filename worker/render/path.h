@@ -74,7 +74,7 @@ class PathTracer {
   void add_glow_among(float t_max);
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_glow(const Medium& medium, float t_max);
-  std::optional<float> scatter_on_surface(SurfaceHit& hit);
+  std::optional<float> scatter_on_surface(const SurfaceHit& hit);
   bool passes_veil(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
   // Whether a segment is left after so many scatterings and as many boundaries and veils passed.
@@ -293,17 +293,11 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
 
 // A number for roulette, or nothing: absorbed, or too deep.
 template <Features F, template <Features> class Light>
-std::optional<float> PathTracer<F, Light>::scatter_on_surface(SurfaceHit& hit) {
+std::optional<float> PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) {
   if (!may_go_on(depth_ + 1, passed_)) return std::nullopt;
   ++depth_;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-  V3 wo = hit.shading.to_local(-d_);
-  // At the rim of a surface with normals of its own these may be turned away from who looks at its front: by
-  // them alone the path would stand behind it, and light from there would come through.
-  if ((wo.z > 0) != (dot(d_, hit.ng) < 0)) [[unlikely]] {
-    hit.shading = Frame::from_tangent(hit.ng, hit.shading.s);
-    wo = hit.shading.to_local(-d_);
-  }
+  const V3 wo = hit.shading.to_local(-d_);
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
   const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
