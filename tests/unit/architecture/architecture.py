@@ -57,7 +57,7 @@ class Door:
 EVERYWHERE = r"^(common|worker|coordinator|cli)/"
 
 DOORS = [
-    Door("Embree", r"^embree\d?/", r"^worker/render/accel\.(h|cpp)$", "one file pair of the renderer"),
+    Door("Embree", r"^embree\d?/", r"^worker/render/accel(_shapes)?\.(h|cpp)$", "accel.h and its parts"),
     Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
     Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
     Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr\w*\.(h|cpp)$", "common/image/exr*"),

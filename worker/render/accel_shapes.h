@@ -1,0 +1,118 @@
+// Part of accel.cpp: what Embree calls back for spheres, disks and cylinders, and for all that lies in a place.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "worker/render/accel.h"
+#include "worker/render/built.h"
+#include "worker/render/counters.h"
+#include "worker/render/shape_boxes.h"
+
+namespace ls::render {
+
+// Geometry ids, the same in every scene they are attached to: kind + side * kKinds, side 0 of what is opaque,
+// 1 of what light passes; in the scenes of groups kInGroup higher, so that a hit's id alone tells what stands
+// in the world by itself. In the world's scenes the instances follow from kFirstInstance on, in their order.
+enum : unsigned {
+  kTriangles = 0,
+  kSpheres = 1,
+  kDisks = 2,
+  kCylinders = 3,
+  kKinds = 4,
+  kInGroup = 2 * kKinds,
+  kFirstInstance = 2 * kKinds
+};
+
+// All but triangles are user geometries: their intersection is our own double-precision code.
+template <class Shape>
+struct ShapeSet {
+  std::span<const Shape> shapes;
+  const PlacedInstance* instances = nullptr;  // the world's
+};
+
+template <class Shape>
+void bounds_callback(const RTCBoundsFunctionArguments* args) {
+  const Shape& s = static_cast<const ShapeSet<Shape>*>(args->geometryUserPtr)->shapes[args->primID];
+  // Rounded outwards by more than the last place of the coordinates.
+  const Box b = box_of(s);
+  const V3d margin = (b.hi - b.lo) * .5e-6 + V3d(1e-6);
+  const V3 lo(b.lo - margin), hi(b.hi + margin);
+  *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
+}
+
+// What a callback knows of the ray: Embree's context, and the ray as it is in the world. In an instance Embree
+// hands over one that it has taken to the group's space in float32.
+struct Tracing {
+  RTCIntersectContext context;
+  const V3 *o, *d;
+
+  Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) {
+    rtcInitIntersectContext(&context);
+  }
+};
+
+template <class Shape>
+double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context, const RTCRay& ray) {
+  LS_COUNT(user_geometry);
+  const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
+  const Shape& s = set.shapes[prim];
+  if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    // As Geometry::complete_instanced has it, so that what is met here is met there, too.
+    const auto& tracing = *reinterpret_cast<const Tracing*>(context);
+    const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
+    return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
+                     ray.tfar);
+  }
+  return intersect(s, V3d(ray.org_x, ray.org_y, ray.org_z), V3d(ray.dir_x, ray.dir_y, ray.dir_z), ray.tnear,
+                   ray.tfar);
+}
+
+// A trace that stops nowhere and keeps all it meets: it has a filter.
+struct Collecting : Tracing {
+  using Tracing::Tracing;
+  std::array<RTCHit, Together::kMost> met;  // only the ids are set
+  std::size_t count = 0;
+
+  static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
+    auto& c = static_cast<Collecting&>(*reinterpret_cast<Tracing*>(context));
+    if (c.count < c.met.size())
+      c.met[c.count++] = {.primID = primitive, .geomID = geometry, .instID = {instance}};
+  }
+};
+inline void collect_callback(const RTCFilterFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+  Collecting::keep(args->context, hit->geomID, hit->primID, hit->instID[0]);
+  args->valid[0] = 0;  // and go on
+}
+
+template <class Shape>
+void intersect_callback(const RTCIntersectFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  auto* rh = reinterpret_cast<RTCRayHit*>(args->rayhit);
+  const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, rh->ray);
+  const auto tf = static_cast<float>(t);
+  if (!(tf < rh->ray.tfar)) return;
+  if (args->context->filter)
+    return Collecting::keep(args->context, args->geomID, args->primID, args->context->instID[0]);
+  rh->ray.tfar = tf;
+  rh->hit.primID = args->primID;
+  rh->hit.geomID = args->geomID;
+  rh->hit.instID[0] = args->context->instID[0];
+}
+
+template <class Shape>
+void occluded_callback(const RTCOccludedFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  auto* ray = reinterpret_cast<RTCRay*>(args->ray);
+  if (shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, *ray) < ray->tfar) {
+    ray->tfar = -std::numeric_limits<float>::infinity();
+  }
+}
+
+}  // namespace ls::render
