@@ -128,7 +128,7 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_pixels(rows, "not reached yet", job, "pixels_without_samples", "the error is of the others");
   if (const std::string words = verdict_of(job).words; !words.empty()) rows.push_back({"verdict", words});
   if (const auto slope = number_field(job, "slope")) {
-    const auto ci = pair_field(job, "slope_ci95");
+    const auto ci = verdict_of(job).doubtful ? std::nullopt : pair_field(job, "slope_ci95");
     rows.push_back({"slope", ci ? fmt::format("{:.3g} ({:.3g} to {:.3g})", *slope, ci->first, ci->second)
                                 : fmt::format("{:.3g}", *slope)});
   }

@@ -29,6 +29,13 @@ std::optional<CoreSeconds> core_seconds_left(const OutlookFacts& facts, std::spa
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
+// A unit is one thread's: no more threads help than units may be under way, and none is done before its time. Of what is
+// less than a unit it is the part of it that is left.
+double seconds_on(double threads, double core, const OutlookFacts& facts) {
+  const double busy = facts.units_at_once > 0 ? std::min(threads, facts.units_at_once) : threads;
+  return std::max(core / busy, std::min(core, facts.unit_seconds));
+}
+
 }  // namespace
 
 Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points) {
@@ -37,12 +44,15 @@ Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points
   const auto core = core_seconds_left(facts, points, out);
   if (facts.threads > 0 && core) {
     const auto on = [&](double threads) {
-      return core->ci95 ? std::optional(std::pair(core->ci95->first / threads, core->ci95->second / threads)) : std::nullopt;
+      return core->ci95 ? std::optional(std::pair(seconds_on(threads, core->ci95->first, facts),
+                                                  seconds_on(threads, core->ci95->second, facts)))
+                        : std::nullopt;
     };
-    out.seconds = core->to_end / facts.threads;
+    out.seconds = seconds_on(facts.threads, core->to_end, facts);
     out.ci95 = on(facts.threads);
-    if (facts.threads_with_more > facts.threads) {
-      out.with_more = core->to_end / facts.threads_with_more;
+    const double more = std::max(facts.threads, facts.threads_with_more);
+    if (const double sooner = seconds_on(more, core->to_end, facts); sooner < *out.seconds) {
+      out.with_more = sooner;
       out.with_more_ci95 = on(facts.threads_with_more);
     }
   }

@@ -18,6 +18,8 @@ struct OutlookFacts {
   double elapsed = 0;                    // seconds since the first ray
   double threads = 0;                    // that work on it, or would
   double threads_with_more = 0;          // with more workers; not above `threads`: they would not help
+  double unit_seconds = 0;               // core seconds of one of the units left, in the mean; 0: not known
+  double units_at_once = 0;              // that may be under way, each on one thread; 0: no limit
 };
 
 struct Outlook {
@@ -30,7 +32,7 @@ struct Outlook {
 
 // Whichever of samples, target and time comes first. The forecast of the target counts from the last point
 // (convergence.h); what has been spent since is taken off. Until there is one a steered job's own foresight stands in,
-// without an interval. Where a forecast's interval reaches beyond the end of the samples, it ends there.
+// without an interval. A unit is one thread's, so few units keep few threads busy. Where a forecast's interval reaches beyond the end of the samples, it ends there.
 Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

@@ -91,10 +91,10 @@ Outlook Service::outlook_locked(const JobEntry& entry, const JobFigures& figures
   const int room = job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
   if (workers > 0)
     facts.threads_with_more = facts.threads + static_cast<double>(std::min(room, kMoreWorkers)) * threads / workers;
-  if (job.spec.max_units) {  // each unit is one thread's
-    facts.threads = std::min<double>(facts.threads, *job.spec.max_units);
-    facts.threads_with_more = std::min<double>(facts.threads_with_more, *job.spec.max_units);
-  }
+  facts.units_at_once = static_cast<double>(entry.grid.count()) * kRoundsAhead;
+  if (job.spec.max_units) facts.units_at_once = std::min<double>(facts.units_at_once, *job.spec.max_units);
+  if (figures.units_total > figures.units_done)
+    facts.unit_seconds = figures.core_seconds_to_limit / static_cast<double>(figures.units_total - figures.units_done);
   return outlook_of(facts, error_points(entry.points));
 }
 

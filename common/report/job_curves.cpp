@@ -26,6 +26,11 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
+// Of the error at a checkpoint. What each was worth is not kept: in doubt about the last there is none at all.
+std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
+  return doubt ? std::nullopt : interval(point, "relmse_ci95");
+}
+
 // Where the error will be down to the target that was asked for; of wall seconds by the pace there was.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
@@ -47,10 +52,12 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
   plot.title = fmt::format("relMSE against {}", clock.name);
   plot.x_title = clock.axis;
   plot.y_title = "relMSE";
-  Curve estimate{"estimate, with its 95 % interval", {}}, truth{"against the reference", {}, true};
+  const bool doubt = doubtful(report);
+  Curve estimate{doubt ? "estimate, not to be trusted yet" : "estimate, with its 95 % interval", {}};
+  Curve truth{"against the reference", {}, true};
   for (const Json& p : points) {
     const double x = number(p, clock.key);
-    const auto ci = interval(p, "relmse_ci95").value_or(std::pair(0.0, 0.0));
+    const auto ci = shown_interval(p, doubt).value_or(std::pair(0.0, 0.0));
     estimate.points.push_back({x, number(p, "relmse"), ci.first, ci.second});
     if (const double error = number(p, "true_relmse"); error > 0) truth.points.push_back({x, error});
   }
@@ -67,7 +74,7 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
 
 std::string cell(const std::string& words) { return "<td>" + words + "</td>"; }
 
-std::string table(const std::vector<Json>& points) {
+std::string table(const std::vector<Json>& points, bool doubt) {
   const bool truth =
       std::any_of(points.begin(), points.end(), [](const Json& p) { return number(p, "true_relmse") > 0; });
   const bool flip =
@@ -77,16 +84,18 @@ std::string table(const std::vector<Json>& points) {
     const Json& p = points[i];
     rows += "<tr>" + cell(duration(number(p, "seconds"))) + cell(duration(number(p, "core_seconds"))) +
             cell(given(number(p, "spp"))) + cell(figure(number(p, "rmse"))) +
-            cell(figure(number(p, "relmse"))) + cell(range(interval(p, "relmse_ci95"), figure));
+            cell(figure(number(p, "relmse")));
+    if (!doubt) rows += cell(range(shown_interval(p, doubt), figure));
     if (truth) rows += cell(figure(number(p, "true_relmse")));
     if (flip) rows += cell(figure(number(p, "true_flip")));
     rows += "</tr>\n";
   }
   std::string head;
-  for (const char* name : {"Time", "Core time", "Samples", "RMSE", "relMSE", "95 % interval"})
-    head += fmt::format("<th scope=\"col\">{}</th>", name);
-  if (truth) head += "<th scope=\"col\">True relMSE</th>";
-  if (flip) head += "<th scope=\"col\">FLIP</th>";
+  const auto column = [&](const char* name) { head += fmt::format("<th scope=\"col\">{}</th>", name); };
+  for (const char* name : {"Time", "Core time", "Samples", "RMSE", "relMSE"}) column(name);
+  if (!doubt) column("95 % interval");
+  if (truth) column("True relMSE");
+  if (flip) column("FLIP");
   const std::string title =
       points.size() > kMostRows ? fmt::format("The last {} of {} points as a table", kMostRows, points.size())
                                 : "The points as a table";
@@ -99,13 +108,18 @@ std::string table(const std::vector<Json>& points) {
 
 std::string slope(const Json& report) {
   const double value = number(report, "slope");
-  if (!std::isfinite(value)) return verdict_words(report);
+  const bool doubt = doubtful(report);
+  const std::string verdict =
+      doubt ? "No intervals are shown: the estimate can&#39;t be trusted yet. " : verdict_words(report);
+  if (!std::isfinite(value)) return verdict;
   const auto with_sign = [](double x) { return fmt::format("{}{:.2f}", x < 0 ? "−" : "", std::abs(x)); };
   std::string out = fmt::format("Slope <b>{}</b>", with_sign(value));
-  if (const auto ci = interval(report, "slope_ci95"))
+  const auto ci = interval(report, "slope_ci95");
+  if (ci && doubt) out += " (independent samples give −1)";
+  if (ci && !doubt)
     out +=
         fmt::format(" ({} to {}; independent samples give −1)", with_sign(ci->first), with_sign(ci->second));
-  return out + ". " + verdict_words(report);
+  return out + ". " + verdict;
 }
 
 }  // namespace
@@ -133,7 +147,7 @@ std::string curves(const Json& report) {
   for (const Clock& clock : {kWall, kCores})
     body += fmt::format("<figure><figcaption>Against {}</figcaption>{}</figure>", clock.name,
                         svg_of(plot_of(report, points, clock)));
-  body += "</div><p class=\"note\">" + slope(report) + outlook(report) + "</p>" + table(points);
+  body += "</div><p class=\"note\">" + slope(report) + outlook(report) + "</p>" + table(points, doubtful(report));
   return section("Error against time", body);
 }
 

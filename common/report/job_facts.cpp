@@ -64,6 +64,17 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
+// What the paths and the ends of the job were to be; nothing of what nobody asked for.
+std::string asked(const Json& report) {
+  const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
+  const std::string roulette = whole(number(report, "rr_depth"));
+  return row("Maximum depth", depth == -1 ? "unlimited" : whole(depth)) +
+         row("Russian roulette", roulette.empty() ? "" : "from depth " + roulette) +
+         row("Samples asked", spp > 0 ? count(spp) + " per pixel" : "") +
+         row("Target relMSE", given(number(report, "target_error"))) +
+         row("Time asked", duration(number(report, "time_asked")));
+}
+
 }  // namespace
 
 std::string section(std::string_view title, std::string_view body, std::string_view css_class) {
@@ -106,6 +117,7 @@ std::string provenance(const Json& report) {
       row("Pixels (SHA-256)", text(report, "pixels_sha256"), true) +
       row("Numeric class", text(report, "numeric_class"), true) + row("Build", text(report, "build")) +
       row("Integrator", text(report, "integrator")) + row("Seed", whole(number(report, "seed"))) +
+      asked(report) +
       row("Threads", threads_words(number(report, "threads"))) +
       row("Reference", text(member(report, "reference"), "digest"), true);
   std::string warnings;

@@ -117,7 +117,7 @@ std::string time_split(const Json& report) {
         "<tr><th scope=\"row\"><svg class=\"swatch\" viewBox=\"0 0 10 10\" aria-hidden=\"true\"><rect "
         "class=\"t{}\" width=\"10\" "
         "height=\"10\" rx=\"2\"/></svg>{}</th><td>{}</td><td>{}</td><td class=\"why\">{}</td></tr>\n",
-        i, kParts[i].name, duration(seconds), percent(seconds / total), kParts[i].meaning);
+        i, kParts[i].name, duration(seconds), escape_html(percent(seconds / total)), kParts[i].meaning);
   }
   return section("Where the time went",
                  bar(time, total) +

@@ -27,10 +27,15 @@ std::string name_of(const Json& report) {
   return "render";
 }
 
+std::string target_reached(const Json& report) {
+  return doubtful(report) ? "the target error is reached by its own estimate: don't trust yet"
+                          : "the target error is reached";
+}
+
 std::string how_it_ended(const Json& report) {
   const std::string state = text(report, "state"), stopped = text(report, "stopped");
   const std::string why = stopped == "spp"     ? "all its samples are in"
-                          : stopped == "error" ? "the target error is reached"
+                          : stopped == "error" ? target_reached(report)
                           : stopped == "time"  ? "its time was up"
                           : stopped == "user"  ? "someone stopped it"
                                                : "";
@@ -85,9 +90,9 @@ std::string pictures(const JobPage& page, const Json& report) {
       map(page.error_map, "error",
           flagged ? "of each pixel: its relative standard error; magenta: too few hits to know it"
                   : "of each pixel: its relative standard error",
-          legend(given(100 * kMapLeastError) + " %", given(100 * kMapMostError) + " %")) +
+          legend(given(100 * kMapLeastError) + " %", given(100 * kMapMostError) + " % or more")) +
       map(page.samples_map, "samples", "of each pixel",
-          legend(count(kMapLeastSamples), count(kMapMostSamples)));
+          legend(count(kMapLeastSamples), count(kMapMostSamples) + " or more"));
   return out + (maps.empty() ? "" : "<div class=\"pair\">" + maps + "</div>");
 }
 

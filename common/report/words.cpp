@@ -57,6 +57,10 @@ std::string count(double n) {
   return grouped;
 }
 
+std::string sample_count(double spp) {
+  return std::isfinite(spp) && spp < 100 ? fmt::format("{:g}", std::round(10 * spp) / 10) : count(spp);
+}
+
 std::string threads_words(double n) {
   return std::isfinite(n) && std::abs(n) < 1e6 ? fmt::format("{:g}", std::round(10 * n) / 10) : kAbsent;
 }
@@ -73,7 +77,9 @@ std::string byte_size(double n) {
 std::string percent(double part) {
   if (!std::isfinite(part)) return kAbsent;
   const double whole = std::round(100 * part);
-  return fmt::format("{:.0f} %", part > 0 && part < 1 ? std::min(99.0, std::max(1.0, whole)) : whole);
+  if (part > 0 && whole == 0) return "< 1 %";
+  if (part < 1 && whole == 100) return "> 99 %";
+  return fmt::format("{:.0f} %", whole);
 }
 
 std::string date_time(double unix_seconds) {

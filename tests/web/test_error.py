@@ -122,6 +122,31 @@ def test_a_job_in_doubt_shows_no_interval(farm, dashboard, verdict):
     assert "Time left, at least" in facts and "at least 60 s left" in page.text(".job-head .sub")
     assert "95 %" not in plot and "not before" in plot and page.count(".plot-fan") == 0
     assert page.text(".plot-verdict .doubt") == verdict["words"]
+    assert page.count(".plot-band") == 0 and "−1.10 to −0.90" not in plot
+    page.click(".plot-table summary")
+    table = page.text(".plot-table")
+    assert "95 %" not in table and "0.0800" not in table and "No intervals" in table
+    assert page.evaluate("[...document.querySelectorAll('.plot-table tr')].map(r => r.cells.length)") == [4] * 5
+
+
+def test_bands_that_are_not_shown_take_no_room(farm, dashboard):
+    """The axis of errors ends with the points."""
+    wide = [{**point(s), "relmse_ci95": [1e-6, 1e3]} for s in (1, 2, 4, 8)]
+    farm.jobs["j-1"] = job(verdict=HEAVY, target_error=None)
+    farm.report = {**report(), "convergence": wide}
+    page = dashboard("#/jobs/j-1")
+
+    heights = [y for _, y in places(page)]
+
+    assert max(heights) - min(heights) > 200, "eight times the error over the height of the drawing"
+
+
+def test_a_target_reached_by_an_estimate_in_doubt_is_not_said_to_be_reached(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", stopped="error", verdict=HEAVY, target_error=0.001)
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.job-head .sub')")
+
+    assert "the target error is reached by its own estimate: don't trust yet." in page.text(".job-head .sub")
 
 
 def test_a_job_that_is_trusted_again_gets_its_interval_back(farm, dashboard):
@@ -188,7 +213,7 @@ def test_the_maps_are_shown_over_the_image_and_follow_what_is_folded(farm, dashb
     assert farm.asked("GET", "/api/v1/jobs/j-1/error.png") >= 2
 
     page.click(".image-tools [value=samples]")
-    page.wait("document.querySelector('.legend').innerText.includes('16,384')")
+    page.wait("document.querySelector('.legend').innerText.includes('16,384 or more')")
     page.click(".image-tools [value=picture]")
     page.wait("document.querySelector('#exposure')")
 
@@ -205,6 +230,15 @@ def test_the_parts_of_the_time_fill_the_bar(farm, dashboard):
 
     assert parts == ["load 1 s 1 %", "build 2 s 2 %", "render 90 s 90 %", "transfer 3 s 3 %", "merge 1 s 1 %", "idle 3 s 3 %"]
     assert sum(widths) == pytest.approx(1) and widths[2] == pytest.approx(0.9)
+
+
+def test_parts_that_are_too_small_to_count_are_less_than_one_percent(farm, dashboard):
+    farm.jobs["j-1"] = job(time={"load": 1e-4, "build": 0, "render": 100, "transfer": 1e-4, "merge": 0.4, "idle": 0})
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.time-parts')")
+
+    assert page.evaluate("[...document.querySelectorAll('.time-parts small')].map(e => e.innerText)") == ["< 1 %", "0 %", "> 99 %", "< 1 %", "< 1 %", "0 %"]
 
 
 # ---- what changes must not make the page jump ----

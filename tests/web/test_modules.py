@@ -31,7 +31,7 @@ def test_own_sha256_agrees_with_a_known_one(modules, size):
 @pytest.mark.parametrize("call, shown", [
     ("figure(0)", "0"), ("figure(null)", "–"), ("figure(0.0021)", "0.00210"), ("figure(7.2e-5)", "7.20 × 10⁻⁵"), ("figure(1234)", "1,230"),
     ("duration(0.42)", "0.4 s"), ("duration(59)", "59 s"), ("duration(252)", "4.2 min"), ("duration(4310)", "1 h 12 min"), ("duration(273600)", "3 d 4 h"), ("duration(null)", "–"),
-    ("bytes(1536)", "1.5 KiB"), ("bytes(0)", "0 B"), ("percent(1)", "100 %"), ("percent(0.9999)", "99 %"), ("percent(0.001)", "1 %"), ("percent(0)", "0 %"),
+    ("bytes(1536)", "1.5 KiB"), ("bytes(0)", "0 B"), ("percent(1)", "100 %"), ("percent(0.9999)", "> 99 %"), ("percent(0.9949)", "99 %"), ("percent(0.0051)", "1 %"), ("percent(1e-6)", "< 1 %"), ("percent(0)", "0 %"),
 ])
 def test_figures_are_written_for_people(modules, call, shown):
     assert modules.evaluate(f"import('/js/format.js').then(({{ figure, duration, bytes, percent }}) => {call})") == shown

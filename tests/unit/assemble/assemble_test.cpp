@@ -316,6 +316,21 @@ TEST(Report, HasEveryKeyOfTheContract) {
   EXPECT_EQ(j["stopped"], "spp");
 }
 
+TEST(Report, SaysWhatWasAskedFor) {
+  ReportFacts facts;
+  facts.job.settings.max_depth = 12;
+  facts.job.settings.rr_depth = 3;
+  auto j = nlohmann::json::parse(report_json(facts));
+  EXPECT_EQ(j["max_depth"], 12);
+  EXPECT_EQ(j["rr_depth"], 3);
+  for (const char* key : {"spp_asked", "time_asked", "target_error"}) EXPECT_TRUE(j.at(key).is_null()) << key;
+  facts.job.spp = 63;
+  facts.job.spec.time = 1.5;
+  j = nlohmann::json::parse(report_json(facts));
+  EXPECT_EQ(j["spp_asked"], 64) << "as the job says it: two halves";
+  EXPECT_EQ(j["time_asked"], 1.5);
+}
+
 // Error falling as 1/N exactly.
 ReportFacts falling() {
   ReportFacts facts;

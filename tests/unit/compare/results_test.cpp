@@ -63,6 +63,14 @@ TEST(Curves, LeaveOutWhatTheReferenceCannotSee) {
   EXPECT_THAT(markdown(r), HasSubstr("1 picture cannot be measured"));
 }
 
+TEST(Pages, SayHowManySamplesThereWereAndNotAbout) {
+  Results r = results();
+  for (JudgedLane& lane : r.races[0].lanes) lane.points.back().spp = 1024;
+  EXPECT_THAT(markdown(r), AllOf(HasSubstr("| 1,024 |"), Not(HasSubstr("1,020"))));
+  r.races[0].lanes[0].points.back().spp = 1030;
+  EXPECT_THAT(markdown(r), HasSubstr("| 1,026 |")) << "the geometric mean, 1025.998, of seeds that differ";
+}
+
 TEST(Rows, HaveEfficiencySlopeAndRatio) {
   const auto rows = rows_of(results().races[0]);
 

@@ -160,6 +160,30 @@ TEST(JobPage, InDoubtPromisesNothing) {
     expect_not(page, claim);
 }
 
+// Neither as bands, nor at the points, nor in the table, nor of the slope.
+TEST(JobPage, InDoubtTheCurveHasNoIntervals) {
+  json report = some_report();
+  expect(page_of(report), "class=\"band c0\"");
+  expect(page_of(report), "<th scope=\"col\">95 % interval</th>");
+  doubt(report);
+  const std::string page = page_of(report);
+
+  for (const char* claim : {"class=\"band", "95 %", "0.0250 to 0.0375", "−0.99 to −0.83"}) expect_not(page, claim);
+  expect(page, "<title>0.0312 at 32 s</title>");
+  expect(page, "Slope <b>−0.91</b> (independent samples give −1). No intervals are shown: the estimate can&#39;t be trusted yet.");
+  const std::size_t names = times(page, "<th scope=\"col\">"), cells = times(page, "<td>0.300</td>");
+  EXPECT_EQ(names, 5u) << "time, core time, samples, RMSE, relMSE";
+  EXPECT_EQ(cells, report["convergence"].size());
+}
+
+TEST(JobPage, ATargetReachedByAnEstimateInDoubtIsNotSaidToBeReached) {
+  json report = some_report();
+  report["stopped"] = "error";
+  expect(page_of(report), "done: the target error is reached ·");
+  doubt(report);
+  expect(page_of(report), "done: the target error is reached by its own estimate: don&#39;t trust yet ·");
+}
+
 TEST(JobPage, SaysTheVerdictAlsoBeforeThereIsASlope) {
   json report = some_report();
   report["slope"] = report["slope_ci95"] = report["trend"] = nullptr;
@@ -222,6 +246,37 @@ TEST(JobPage, SaysWhoseSecondsItCounts) {
                             "Seconds of threads: of <i>render</i> their CPU time, of the others by the clock.",
                             "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
     expect(page, words);
+}
+
+TEST(JobPage, PartsOfTheTimeThatAreTooSmallToCountAreLessThanOnePercent) {
+  json report = some_report();
+  report["time"] = {{"load", .0001}, {"build", 0}, {"render", 100}, {"transfer", .0001}, {"merge", .4}, {"idle", 0}};
+  const std::string page = page_of(report);
+
+  EXPECT_EQ(times(page, "<td>&lt; 1 %</td>"), 3u);
+  EXPECT_EQ(times(page, "<td>&gt; 99 %</td>"), 1u);
+  EXPECT_EQ(times(page, "<td>0 %</td>"), 2u);
+}
+
+TEST(JobPage, ProvenanceSaysWhatWasAskedFor) {
+  json report = some_report();
+  report.update(json::parse(R"({"max_depth": -1, "rr_depth": 5, "spp_asked": 4096, "time_asked": 90})"));
+  for (const char* row : {"<dt>Maximum depth</dt><dd><span>unlimited</span>",
+                          "<dt>Russian roulette</dt><dd><span>from depth 5</span>",
+                          "<dt>Samples asked</dt><dd><span>4,096 per pixel</span>",
+                          "<dt>Target relMSE</dt><dd><span>0.005</span>", "<dt>Time asked</dt><dd><span>90 s</span>"})
+    expect(page_of(report), row);
+  report["max_depth"] = 12;
+  expect(page_of(report), "<dt>Maximum depth</dt><dd><span>12</span>");
+  for (const char* key : {"spp_asked", "time_asked", "target_error"}) report[key] = nullptr;
+  for (const char* name : {"Samples asked", "Time asked", "Target relMSE"}) expect_not(page_of(report), name);
+}
+
+TEST(JobPage, TheLegendOfSamplesSaysThatThereMayBeMore) {
+  auto page = job_page({some_report().dump(), {}, {std::byte{1}}, {std::byte{2}}});
+  ASSERT_TRUE(page);
+  expect(*page, "</svg>16,384 or more</span>");
+  expect(*page, "</svg>100 % or more</span>");
 }
 
 TEST(JobPage, ThreadsAreThoseOfOneMachineOrTheMeanOfAFarm) {

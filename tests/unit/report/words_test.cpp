@@ -50,10 +50,21 @@ TEST(Words, CountsAndSizesAreGrouped) {
   EXPECT_EQ(byte_size(12), "12 B");
 }
 
+TEST(Words, SamplesAreCountedNotAbout) {
+  EXPECT_EQ(sample_count(1024), "1,024");
+  EXPECT_EQ(sample_count(1025.996), "1,026") << "a mean over seeds";
+  EXPECT_EQ(sample_count(5.657), "5.7");
+  EXPECT_EQ(sample_count(63.99999999), "64");
+  EXPECT_EQ(sample_count(std::numeric_limits<double>::quiet_NaN()), "–");
+}
+
 TEST(Words, NothingAndEverythingAloneAreZeroAndAHundredPercent) {
   EXPECT_EQ(percent(0), "0 %");
-  EXPECT_EQ(percent(0.001), "1 %");
-  EXPECT_EQ(percent(0.9999), "99 %");
+  EXPECT_EQ(percent(1e-6), "< 1 %") << "not 1 %: the parts of a whole would be more than it";
+  EXPECT_EQ(percent(0.0049), "< 1 %");
+  EXPECT_EQ(percent(0.0051), "1 %");
+  EXPECT_EQ(percent(0.9949), "99 %");
+  EXPECT_EQ(percent(0.9999), "> 99 %");
   EXPECT_EQ(percent(1), "100 %");
 }
 

@@ -99,5 +99,57 @@ TEST(Outlook, WithMoreWorkersIsShorterInProportion) {
   EXPECT_DOUBLE_EQ(out.with_more_ci95->second, out.ci95->second / 5);
 }
 
+// 1.5 core seconds in four units: a fifth thread has nothing to do, and no unit takes less than its own time.
+TEST(Outlook, NoMoreThreadsHelpThanThereAreUnitsLeft) {
+  OutlookFacts f;
+  f.core_left = 1.5;
+  f.unit_seconds = 1.5 / 4;
+  f.threads = 1;
+  f.threads_with_more = 9;
+  const Outlook out = outlook_of(f, {});
+  EXPECT_DOUBLE_EQ(*out.seconds, 1.5);
+  EXPECT_DOUBLE_EQ(out.with_more.value(), 1.5 / 4);
+  f.threads = 4;
+  EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 1.5 / 4);
+  EXPECT_FALSE(outlook_of(f, {}).with_more) << "all four are under way";
+}
+
+TEST(Outlook, NoMoreThreadsHelpThanUnitsMayBeUnderWayAtOnce) {
+  OutlookFacts f;
+  f.core_left = 64;
+  f.unit_seconds = 1;
+  f.units_at_once = 4;
+  f.threads = 2;
+  f.threads_with_more = 18;
+  EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 32);
+  EXPECT_DOUBLE_EQ(outlook_of(f, {}).with_more.value(), 16);
+  f.threads = 16;
+  EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 16);
+  EXPECT_FALSE(outlook_of(f, {}).with_more);
+}
+
+TEST(Outlook, OfThePartOfAUnitThatIsLeftIsThatPart) {
+  OutlookFacts f;
+  f.core_left = .25;
+  f.unit_seconds = 1;
+  f.threads = 8;
+  EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, .25);
+  f.threads = .5;  // of a worker that it shares with other jobs
+  EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, .5);
+}
+
+// Each end is on as many threads as help it.
+TEST(Outlook, AnIntervalHoldsItsMiddleWhereUnitsAreFew) {
+  OutlookFacts f = facts();
+  f.unit_seconds = 3;
+  f.threads = 16;
+  f.threads_with_more = 32;
+  const auto forecast = forecast_of(points(256), 1e-3);
+  const Outlook out = outlook_of(f, points(256));
+  EXPECT_DOUBLE_EQ(*out.seconds, 3) << "of about 7 core seconds";
+  EXPECT_DOUBLE_EQ(out.ci95->first, std::min(3., forecast->core_seconds_lo));
+  EXPECT_DOUBLE_EQ(out.ci95->second, 3);
+}
+
 }  // namespace
 }  // namespace ls::coordinator

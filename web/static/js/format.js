@@ -46,7 +46,12 @@ export function bytes(n) {
 
 export const count = (n) => (known(n) ? Math.round(n).toLocaleString("en") : kAbsent);
 /** 0 % and 100 % are kept for nothing and everything. */
-export const percent = (x) => (known(x) ? `${x > 0 && x < 1 ? Math.min(99, Math.max(1, Math.round(x * 100))) : Math.round(x * 100)} %` : kAbsent);
+export function percent(x) {
+  if (!known(x)) return kAbsent;
+  const whole = Math.round(x * 100);
+  if (x > 0 && whole === 0) return "< 1 %";
+  return x < 1 && whole === 100 ? "> 99 %" : `${whole} %`;
+}
 export const plural = (n, one, many = `${one}s`) => `${count(n)} ${n === 1 ? one : many}`;
 export const spp = (x) => (known(x) ? (x < 100 && x % 1 ? x.toFixed(1) : count(x)) : kAbsent);
 export const exposure = (ev) => `${ev > 0 ? "+" : ev < 0 ? "−" : ""}${Math.abs(ev).toFixed(1)} EV`;

@@ -9,7 +9,7 @@ import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
-import { timeLeft } from "../verdict.js";
+import { doubtful, kDoubt, timeLeft } from "../verdict.js";
 
 const kStopped = { spp: "all its samples are in", error: "the target error is reached", time: "its time was up", user: "someone stopped it" };
 
@@ -45,7 +45,7 @@ function heading(state, job, actions) {
 }
 
 function sentence(job) {
-  if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${kStopped[job.stopped] ?? "finished"}.`;
+  if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${kStopped[job.stopped] ?? "finished"}${job.stopped === "error" && doubtful(job.verdict) ? ` by its own estimate: ${kDoubt}` : ""}.`;
   if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · handed in ${moment(job.submitted_unix)}`;
   if (job.state === "queued") return "Waiting for a worker that may take it.";
   return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && kStopped[job.stopped] ? `: ${kStopped[job.stopped]}` : ""}.`;

@@ -15,13 +15,19 @@ export function errorPlot(job, { clock, picked, report }, actions, narrow) {
   const plot = { points, key: clock, target: job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
   const verdict = verdictOf(job, report);
   plot.doubt = doubtful(verdict);
-  if (plot.doubt && plot.ahead) plot.ahead = { ...plot.ahead, lo: null, hi: null };
+  if (plot.doubt) withoutIntervals(plot);
   plot.chosen = points[picked] ? picked : points.length - 1;
   return h("section", { key: "plot", class: "panel plot", "aria-labelledby": "plot-title" },
     h("div", { class: "panel-head" }, h("h2", { id: "plot-title" }, "Error against time"), choice("clock", "Time axis", kClocks, clock, actions.setClock)),
     points.length === 0 ? empty(narrow) : figureOf(plot, actions),
     h("p", { class: "plot-verdict" }, verdictWords(report, verdict)),
-    table(points));
+    table(plot));
+}
+
+/** What each checkpoint was worth is not kept: in doubt about the last there are none at all. */
+function withoutIntervals(plot) {
+  plot.points = plot.points.map((p) => ({ ...p, relmse_ci95: null }));
+  if (plot.ahead) plot.ahead = { ...plot.ahead, lo: null, hi: null };
 }
 
 function empty(narrow) {
@@ -84,7 +90,7 @@ function forecastText({ ahead, target, doubt }) {
 function verdictWords(report, verdict) {
   if (!report) return null;
   const signed = (x) => x.toFixed(2).replace("-", "−");
-  const ci = Array.isArray(report.slope_ci95) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
+  const ci = Array.isArray(report.slope_ci95) && !doubtful(verdict) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
   return [
     typeof report.slope === "number" ? h("span", { key: "slope", title: "Of log error over log time; independent samples give −1" }, "slope ", h("b", null, signed(report.slope)), ci) : null,
     doubtful(verdict)
@@ -92,15 +98,18 @@ function verdictWords(report, verdict) {
       : h("span", { key: "words" }, verdict.words)];
 }
 
-const kColumns = ["Time", "Core time", "Samples", "relMSE", "95 % interval"];
+const kColumns = [
+  ["Time", (p) => duration(p.seconds)], ["Core time", (p) => duration(p.core_seconds)], ["Samples", (p) => spp(p.spp)],
+  ["relMSE", (p) => figure(p.relmse)], ["95 % interval", (p) => interval(p.relmse_ci95)], ["True relMSE", (p) => figure(p.true_relmse)]];
 
-function table(points) {
+function table({ points, doubt }) {
   const truth = points.some((p) => p.true_relmse > 0);
-  const cells = (p) => [duration(p.seconds), duration(p.core_seconds), spp(p.spp), figure(p.relmse), interval(p.relmse_ci95), ...(truth ? [figure(p.true_relmse)] : [])];
+  const columns = kColumns.filter(([name]) => (name === "95 % interval" ? !doubt : name === "True relMSE" ? truth : true));
   return h("details", { key: "table", class: "plot-table" }, h("summary", null, "As a table"),
+    doubt ? h("p", { key: "why", class: "help" }, "No intervals are shown: the estimate can't be trusted yet.") : null,
     h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Error at each checkpoint" }, h("table", null,
-      h("thead", null, h("tr", null, [...kColumns, ...(truth ? ["True relMSE"] : [])].map((name) => h("th", { key: name, scope: "col" }, name)))),
-      h("tbody", null, points.map((p, i) => h("tr", { key: i }, cells(p).map((text, k) => h("td", { key: k }, text))))))));
+      h("thead", null, h("tr", null, columns.map(([name]) => h("th", { key: name, scope: "col" }, name)))),
+      h("tbody", null, points.map((p, i) => h("tr", { key: i }, columns.map(([name, text]) => h("td", { key: name }, text(p)))))))));
 }
 
 function summary({ points, key, target }) {
