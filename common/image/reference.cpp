@@ -54,7 +54,12 @@ Result<Reference> read_reference(std::span<const std::byte> exr, const std::stri
   if (bad > 0) return refuse(name, fmt::format("{} of its values are NaN or infinite", bad));
   if (std::any_of(read->error.begin(), read->error.end(), [](float v) { return !(v >= 0) || std::isinf(v); }))
     return refuse(name, "its layers stderr.R, stderr.G, stderr.B hold values that are no standard errors");
-  return Reference{image.size, std::move(read->image.rgb), std::move(read->error)};
+  return Reference{image.size, std::move(read->image.rgb), std::move(read->error),
+                   {read->strings["lightshaft:scene"], read->strings["lightshaft:seed"]}};
+}
+
+bool same_noise(const ReferenceOrigin& origin, const Digest& scene, std::uint64_t seed) {
+  return origin.scene == scene.hex() && origin.seed == std::to_string(seed);
 }
 
 ReferenceNoise noise_of(const Reference& reference) {

@@ -30,22 +30,35 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/image/exr_file.h"
 #include "common/image/frame.h"
 
 namespace ls {
 
+// What its header says of who made it, lightshaft:scene and lightshaft:seed; empty: nothing.
+struct ReferenceOrigin {
+  std::string scene, seed;
+};
+// Whether it was rendered of this scene with this seed. Then image and reference share their samples: the noise that they
+// share is in no difference between them, and no figure says how wrong the image is.
+bool same_noise(const ReferenceOrigin& origin, const Digest& scene, std::uint64_t seed);
+inline constexpr const char* kSameSeed =
+    "the reference shares this job's seed: its noise is the same noise; render it with another --seed";
+
 struct Reference {
   FrameSize size;
   std::vector<float> rgb;    // interleaved, row by row
   std::vector<float> error;  // standard error of each value; empty: not known
+  ReferenceOrigin origin = {};
 };
 // invalid_argument: no such picture, another size than `size`, or values that are not finite. `name` is for the
 // messages. Layers of errors that are not finite and positive are refused, too, rather than half used.
