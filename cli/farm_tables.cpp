@@ -120,8 +120,12 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_known(rows, "target relMSE", job, "target_error", "{:g}");
   rows.push_back({"RMSE", estimate_text(job, "rmse", "rmse_ci95")});
   if (const auto reference = job.find("reference"); reference != job.end() && reference->is_object()) {
-    add_known(rows, "true relMSE", *reference, "relmse");
-    add_known(rows, "true RMSE", *reference, "rmse");
+    const auto add_truth = [&](const char* name, const char* key, const char* below) {
+      const std::string text = truth_text(*reference, key, below, flag_field(job, "reference_same_seed"), 4);
+      if (!text.empty()) rows.push_back({name, text});
+    };
+    add_truth("true relMSE", "relmse", "below_noise");
+    add_truth("true RMSE", "rmse", "rmse_below_noise");
     add_known(rows, "FLIP", *reference, "flip");
   }
   add_pixels(rows, "few hits", job, "few_hits", "too few for their error to be known");

@@ -9,6 +9,11 @@ std::string text_field(const json& object, const char* key, const std::string& o
   return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
 }
 
+bool flag_field(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && *found == json(true);
+}
+
 std::optional<double> number_field(const json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;

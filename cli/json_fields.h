@@ -10,6 +10,7 @@ namespace ls::cli {
 
 std::string text_field(const nlohmann::json& object, const char* key, const std::string& otherwise = "");
 std::optional<double> number_field(const nlohmann::json& object, const char* key);
+bool flag_field(const nlohmann::json& object, const char* key);  // false: none, or no flag
 int int_field(const nlohmann::json& object, const char* key, int otherwise);
 std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object,
                                                     const char* key);  // [1.5, 2]

@@ -17,6 +17,7 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/say.h"
+#include "common/image/reference.h"
 #include "worker/render/thread_limit.h"
 
 namespace ls::cli {
@@ -106,6 +107,7 @@ class LocalRender {
     if (!view) return say_error(view.error());
     for (const std::string& warning : view->warnings)
       fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
+    if (view->reference_same_seed) say(fmt::format("warning: {}", kSameSeed));
     if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
     if (const auto opened = open_keepers(keepers_, options_); !opened) return say_error(opened.error());
     if (const auto started = start(); !started) return say_error(started.error());

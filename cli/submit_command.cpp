@@ -12,6 +12,7 @@
 #include "cli/output_file.h"
 #include "cli/say.h"
 #include "common/base/plain_text.h"
+#include "common/image/reference.h"
 
 namespace ls::cli {
 namespace {
@@ -96,6 +97,7 @@ int run(const Flags& flags) {
   if (!job) return say_rejected(job.error());
   const std::string id = text_field(*job, "id");
   if (id.empty()) return say_error({Errc::internal, "the coordinator's answer names no job"});
+  if (flag_field(*job, "reference_same_seed")) say(fmt::format("warning: {}", kSameSeed));
   print(flags.farm.json ? job->dump() : plain_text(id));
   if (!flags.wait && flags.out.empty() && flags.report.empty() && flags.html.empty()) return kOk;
   return wait_and_fetch(id, flags);

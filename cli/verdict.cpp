@@ -23,12 +23,13 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
 }
 
 // A reference's figures, each after a comma.
-std::string truth_text(const json& job) {
+std::string truths_text(const json& job) {
   const auto reference = job.find("reference");
   if (reference == job.end() || !reference->is_object()) return "";
   std::string out;
-  if (const auto relmse = number_field(*reference, "relmse"))
-    out += fmt::format(", true relMSE {:.3g}", *relmse);
+  const bool same_seed = flag_field(job, "reference_same_seed");
+  if (const std::string relmse = truth_text(*reference, "relmse", "below_noise", same_seed); !relmse.empty())
+    out += ", true relMSE " + relmse;
   if (const auto flip = number_field(*reference, "flip")) out += fmt::format(", FLIP {:.3g}", *flip);
   return out;
 }
@@ -60,6 +61,13 @@ std::string time_left_text(const json& job, const char* key, const char* interva
          (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());
 }
 
+std::string truth_text(const json& object, const char* key, const char* below, bool same_seed, int digits) {
+  const auto value = number_field(object, key);
+  if (!value) return "";
+  if (same_seed) return fmt::format("{:.{}g} (not to be trusted: the reference has this job's seed)", *value, digits);
+  return flag_field(object, below) ? "below the reference's noise" : fmt::format("{:.{}g}", *value, digits);
+}
+
 std::string error_text(const json& job) {
   const Verdict verdict = verdict_of(job);
   const auto relmse = number_field(job, "relmse");
@@ -67,7 +75,7 @@ std::string error_text(const json& job) {
   std::string out = fmt::format("relMSE {:.3g}", *relmse);
   if (const auto ci = pair_field(job, "relmse_ci95"); ci && !verdict.doubtful)
     out += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
-  out += truth_text(job);
+  out += truths_text(job);
   return verdict.doubtful ? out + ": " + verdict.words : out;
 }
 

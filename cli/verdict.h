@@ -19,6 +19,10 @@ Verdict verdict_of_report(const nlohmann::json& report);  // of GET /jobs/ID/rep
 std::string estimate_text(const nlohmann::json& job, const char* key, const char* interval);
 // "4:12 (3:06 to 5:30)", "at least 4:12", "-".
 std::string time_left_text(const nlohmann::json& job, const char* key, const char* interval = nullptr);
+// "0.0123", "below the reference's noise", "0.0123 (not to be trusted: ...)"; empty: not known.
+// `below`: the flag that says so.
+std::string truth_text(const nlohmann::json& object, const char* key, const char* below, bool same_seed,
+                       int digits = 3);
 // What a job's image is worth, one line; empty: nothing is known of it.
 std::string error_text(const nlohmann::json& job);
 

@@ -139,8 +139,12 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return refuse(settings.error());
   job.settings = std::move(*settings);
-  if (request.spec.reference)
-    if (auto right = load_reference(request.spec, job.settings.size, blobs); !right) return refuse(right.error());
+  ReferenceOrigin origin;
+  if (request.spec.reference) {
+    auto right = load_reference(request.spec, job.settings.size, blobs);
+    if (!right) return refuse(right.error());
+    origin = std::move(right->origin);
+  }
   if (!wants_labels(job.settings)) {  // then what things are called is no part of the scene
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
@@ -167,6 +171,7 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
   intake.text_bytes = request.scene_text.size() + read->text_bytes;
   intake.scene_json = serialize(scene);
   job.scene = sha256(intake.scene_json);
+  job.reference_same_seed = same_noise(origin, job.scene, job.settings.seed);
   JobPlan plan = plan_of(job);
   plan.brief.job.value = "new";
   if (auto ok = check_plan(plan); !ok) return refuse(ok.error());

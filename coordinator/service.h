@@ -18,6 +18,7 @@
 #include "common/base/frame_range.h"
 #include "common/base/id.h"
 #include "common/image/convergence.h"
+#include "common/image/reference.h"
 #include "common/job/health_notes.h"
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
@@ -40,6 +41,10 @@ struct ErrorFigures {  // of the image as folded up to one complete round over a
 struct TrueFigures {  // against a reference, its own noise subtracted (common/image/reference.h)
   double rmse = 0, relmse = 0;
   std::optional<double> flip;  // mean HDR-FLIP (common/image/flip.h); at doubling samples only
+  std::optional<double> mse_stderr = {}, relmse_stderr = {};
+  // Less than the reference's own noise lets one tell: what is shown in the place of the figure.
+  bool rmse_below_noise() const { return below_noise(rmse * rmse, mse_stderr); }
+  bool relmse_below_noise() const { return below_noise(relmse, relmse_stderr); }
   bool operator==(const TrueFigures&) const = default;
 };
 struct ConvergencePoint {
@@ -89,6 +94,7 @@ struct JobView {
   double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
   std::optional<TrueFigures> truth;              // as of the last checkpoint that has it
+  bool reference_same_seed = false;              // truth says nothing: see same_noise() there
   std::optional<Judgement> judgement;            // nothing: no sample yet
   std::optional<std::uint64_t> few_hits;         // pixels of the image as it is
   std::optional<Trend> trend;                    // nothing: too few checkpoints

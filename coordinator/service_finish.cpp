@@ -52,7 +52,8 @@ Provenance Service::provenance_of(const ReportFacts& facts) const {
           job.totals.core_seconds,
           std::move(stopped),
           judgement_of(facts),
-          header_figures(facts)};
+          header_figures(facts),
+          header_notes(facts)};
 }
 
 MatteManifests Service::mattes_of(const StoredJob& job) const {

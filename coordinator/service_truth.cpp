@@ -77,16 +77,14 @@ void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp, co
   const FrameSize size = job.settings.size;
   const std::vector<float> image = joined(tiles, size);
   const TrueError error = true_error(*reference, image);
-  TrueFigures truth{error.rmse, error.relmse, std::nullopt};
+  TrueFigures truth{error.rmse, error.relmse, std::nullopt, error.mse_stderr, error.relmse_stderr};
+  const auto noise = reference->error.empty() ? std::nullopt : std::optional(noise_of(*reference));
   if (flip) truth.flip = mean_of(hdr_flip({size, reference->rgb}, {size, image}));
   lock.lock();
   const auto point = std::find_if(entry->points.begin(), entry->points.end(), of_spp);
   if (entry->removed || entry->curve != curve || point == entry->points.end()) return;
   point->truth = truth;
-  if (reference->error.empty())
-    entry->reference_noise.reset();
-  else
-    entry->reference_noise = noise_of(*reference);
+  entry->reference_noise = noise;
   publish_progress_locked(*entry);
   chores_.push([this, id = job.id, spp, truth] {
     if (const auto added = store_->set_truth(id, spp, truth); !added)

@@ -66,7 +66,7 @@ double done_of(const StoredJob& job, double spp_done) {
 
 // What the curve so far says.
 void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::string& doubt) {
-  const std::vector<ErrorPoint> points = error_points(all);
+  const std::vector<ErrorPoint> points = error_points(all, !v.reference_same_seed);
   v.judgement = judge(points, doubt);
   v.trend = trend_of(points);
   const double cost = points.empty() ? 0 : points.back().relmse * points.back().core_seconds;
@@ -129,6 +129,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.units_total = std::max(job.totals.units, job.totals.units_planned);
   if (!entry.points.empty()) v.error_now = entry.points.back().error;
   v.truth = last_truth(entry.points);
+  v.reference_same_seed = job.reference_same_seed;
   v.few_hits = job.totals.few_hits;
   if (v.few_hits) put_curve(v, entry.points, job.totals.doubt);
   if (entry.assembly) v.pixels_without_samples = entry.assembly->film().pixels_without_samples();

@@ -84,8 +84,11 @@ json to_value(const JobView& v) {
       v.error_now ? json{number(v.error_now->relmse_lo), number(v.error_now->relmse_hi)} : json();
   j["reference"] = v.truth ? json{{"rmse", number(v.truth->rmse)},
                                   {"relmse", number(v.truth->relmse)},
-                                  {"flip", v.truth->flip ? number(*v.truth->flip) : json()}}
+                                  {"flip", v.truth->flip ? number(*v.truth->flip) : json()},
+                                  {"below_noise", v.truth->relmse_below_noise()},
+                                  {"rmse_below_noise", v.truth->rmse_below_noise()}}
                            : json();
+  j["reference_same_seed"] = v.reference_same_seed;
   j["verdict"] =
       v.judgement ? json{{"kind", to_string(v.judgement->kind)},
                          {"words", v.judgement->words},

@@ -157,7 +157,9 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   const ErrorPoint& now = points.back();
   if (!(*now.true_relmse > 0)) return false;
   const double sigma = std::log(now.relmse_hi / now.relmse_lo) / (2 * kNormal95);
-  if (std::log(*now.true_relmse / now.relmse) < kSigmas * sigma) return false;
+  const double by_estimate = now.relmse * std::expm1(kSigmas * sigma);
+  const double by_reference = kSigmas * now.true_stderr.value_or(0);
+  if (excess(now) < std::hypot(by_estimate, by_reference)) return false;
   for (std::size_t i = points.size() - 1; i-- > 0;) {
     const ErrorPoint& before = points[i];
     if (!usable(before) || !before.true_relmse || 2 * before.spp > now.spp) continue;
@@ -244,9 +246,10 @@ Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt) {
     return {
         Kind::bias_floor,
         fmt::format("bias floor: the true relMSE stays near {:.2g} while the estimated one falls to {:.2g}: "
-                    "image and reference do not agree, or the reference is noisy and brings no error of its "
-                    "own",
-                    *points.back().true_relmse, points.back().relmse),
+                    "image and reference do not agree{}",
+                    *points.back().true_relmse, points.back().relmse,
+                    points.back().true_stderr ? ", by more than the noise of both"
+                                              : ", or the reference is noisy and brings no error of its own"),
         false};
   if (!trend) return {Kind::early, "too early to tell how it converges"};
   if (trend->slope_hi < kSlow) return {Kind::heavy_tail, "don't trust yet: " + trend->verdict, false};

@@ -21,6 +21,8 @@ struct ErrorPoint {
   double core_seconds = 0;  // spent on rendering up to here
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   std::optional<double> true_relmse = {};  // against a reference
+  // Of true_relmse, by what is left of the reference's own noise (reference.h); nothing: it is not known.
+  std::optional<double> true_stderr = {};
 };
 
 // relMSE ~ time^-slope; 1 for independent samples of finite variance.
@@ -50,10 +52,11 @@ const char* to_string(Judgement::Kind kind);
 // bias floor, the slope.
 //
 // Bias floor: of the true error that part which the estimated one lacks is a squared bias, if it is there,
-// and does not fall with samples; what chance puts between the two falls as they do. It is told where the
-// last true error is above the estimated one by four standard deviations of the interval's logarithm (chance:
-// once in 30,000), and has kept more of its excess since half the samples or fewer than the root of their
-// ratio, which is half way between staying and falling like 1/N.
+// and does not fall with samples; what chance puts between the two falls as they do, but for what the
+// reference's own noise puts there: that stays, too. It is told where the last true error is above the estimated
+// one by four standard deviations of the interval's logarithm and of the reference's noise together (chance: once
+// in 30,000), and has kept more of its excess since half the samples or fewer than the root of their ratio, which
+// is half way between staying and falling like 1/N.
 Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {

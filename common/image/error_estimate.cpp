@@ -39,14 +39,6 @@ std::vector<double> window_sums(const std::vector<double>& values, std::size_t w
 
 int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::max(0, i - kReach) + 1; }
 
-// 1 / (m^2 + c) less what noise of m, of variance s2, adds to it in the mean.
-double weight_of(double m, double s2) {
-  const double q = m * m + kDark, f = 1 / q;
-  const double unbiased =
-      f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
-  return std::clamp(unbiased, f / 2, 2 * f);
-}
-
 // What is known of one channel of a pixel: its own values, and sums over its window without it.
 struct Surroundings {
   double own, own_noise;       // S, D^2
@@ -65,7 +57,7 @@ double lean_of(double m, double g) {
 }
 
 Weight weight_of(const Surroundings& s) {
-  if (s.others == 0) return {weight_of(s.own, 0), 1, lean_of(s.own, 1)};
+  if (s.others == 0) return {relative_weight(s.own, 0), 1, lean_of(s.own, 1)};
   constexpr double kSignificant = 9;
   const double mean = s.sum / s.others, u = s.noise / s.others, apart = (s.own - mean) * (s.own - mean);
   double structure = std::max(0.0, s.squares / s.others - mean * mean - u * (1 - 1 / s.others));
@@ -73,7 +65,7 @@ Weight weight_of(const Surroundings& s) {
   const double v = s.own_noise > structure + u ? s.own_noise : u;
   const double g = structure > 0 ? structure / (structure + v) : 0;
   const double m = mean + g * (s.own - mean);
-  return {weight_of(m, u * (g * g + (1 - g) * (1 - g) / s.others)), g, lean_of(m, g)};
+  return {relative_weight(m, u * (g * g + (1 - g) * (1 - g) / s.others)), g, lean_of(m, g)};
 }
 
 // Of each pixel: the square root of the weight in each channel and how it leans, planar, and the square of
@@ -242,6 +234,13 @@ double light(std::span<const double> half, std::size_t pixel, std::size_t pixels
 }
 
 }  // namespace
+
+double relative_weight(double m, double s2) {
+  const double q = m * m + kDark, f = 1 / q;
+  const double unbiased =
+      f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
+  return std::clamp(unbiased, f / 2, 2 * f);
+}
 
 bool has_few_hits(const HalfMeans& h, int x, int y) {
   constexpr double kOneSided = 19;

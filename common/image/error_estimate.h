@@ -105,6 +105,8 @@ struct EarlierMeans {
 // `spp`: samples per pixel behind the means, both halves together. Without `earlier` skewed noise is not
 // corrected for.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
+// 1 / (m^2 + 0.01) less what noise of m, of variance s2, adds to it in the mean.
+double relative_weight(double m, double s2);
 // Whether pixel (x, y) is one of few_hits.
 bool has_few_hits(const HalfMeans& halves, int x, int y);
 

@@ -6,6 +6,7 @@
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfPartType.h>
+#include <ImfStringAttribute.h>
 
 #include <fstream>
 #include <optional>
@@ -91,6 +92,13 @@ std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Sour
   return source;
 }
 
+std::map<std::string, std::string> strings_of(const Imf::Header& header) {
+  std::map<std::string, std::string> out;
+  for (auto at = header.begin(); at != header.end(); ++at)
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute())) out.emplace(at.name(), text->value());
+  return out;
+}
+
 Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::string& name,
                                  const ExrLimits& limits, bool with_error) {
   if (bytes.size() > limits.max_bytes)
@@ -105,7 +113,7 @@ Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::st
         if (!source) return tl::unexpected(source.error());
         auto image = read_part(file, *source);
         if (!image) return tl::unexpected(image.error());
-        RgbWithError out{std::move(*image), {}};
+        RgbWithError out{std::move(*image), {}, strings_of(file.header(source->part))};
         const auto layers = with_error ? find_error(file, *source) : std::nullopt;
         if (!layers) return out;
         auto error = read_part(file, *layers);

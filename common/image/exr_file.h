@@ -40,7 +40,8 @@ Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits
 // full resolution; `error` is empty where it has not.
 struct RgbWithError {
   RgbImage image;
-  std::vector<float> error;  // interleaved as image.rgb
+  std::vector<float> error;                    // interleaved as image.rgb
+  std::map<std::string, std::string> strings;  // of its header
 };
 Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
                                          const ExrLimits& limits = {});

@@ -140,6 +140,7 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
   if (from.core_seconds > 0) strings["lightshaft:core_seconds"] = fmt::format("{:.3f}", from.core_seconds);
   if (!from.stopped.empty()) strings["lightshaft:stopped"] = from.stopped;
   for (const auto& [name, value] : from.figures) strings["lightshaft:" + name] = fmt::format("{:.9g}", value);
+  for (const auto& [name, words] : from.notes) strings["lightshaft:" + name] = words;
   return strings;
 }
 

@@ -39,6 +39,7 @@ struct Provenance {
   std::string stopped = {};  // why there are no more samples, and what that means; empty: not written
   std::optional<Judgement> judgement = {};          // knows of the curve, too, what the film alone does not
   std::map<std::string, double> figures = {};       // more of them, by what follows "lightshaft:"
+  std::map<std::string, std::string> notes = {};    // the same in words
 };
 struct FinalImage {
   std::vector<std::byte> exr;

@@ -86,7 +86,7 @@ std::string table(const std::vector<Json>& points, bool doubt) {
             cell(given(number(p, "spp"))) + cell(figure(number(p, "rmse"))) +
             cell(figure(number(p, "relmse")));
     if (!doubt) rows += cell(range(shown_interval(p, doubt), figure));
-    if (truth) rows += cell(figure(number(p, "true_relmse")));
+    if (truth) rows += cell(true_figure(number(p, "true_relmse"), flag(p, "true_relmse_below_noise", false)));
     if (flip) rows += cell(figure(number(p, "true_flip")));
     rows += "</tr>\n";
   }

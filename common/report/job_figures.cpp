@@ -54,10 +54,11 @@ std::string true_figures(const Json& report) {
   const double relmse = nested ? number(reference, "relmse") : number(report, "true_relmse");
   const double rmse = nested ? number(reference, "rmse") : number(report, "true_rmse");
   const double noise = number(reference, "noise_relmse");
-  return fact("True relMSE", figure(relmse),
-              noise > 0 ? fmt::format("the reference's own, {}, taken off", figure(noise))
-                        : "against the reference") +
-         fact("True RMSE", figure(rmse), "") +
+  const std::string note = flag(reference, "same_seed", false) ? "not to be trusted: one seed"
+                           : noise > 0 ? fmt::format("the reference's own, {}, taken off", figure(noise))
+                                       : "against the reference";
+  return fact("True relMSE", true_figure(relmse, flag(reference, "below_noise", false)), note) +
+         fact("True RMSE", true_figure(rmse, flag(reference, "rmse_below_noise", false)), "") +
          fact("FLIP", figure(number(reference, "flip")), "0: looks the same");
 }
 

@@ -28,6 +28,10 @@ std::string figure(double x) {
   return count(std::round(x / unit) * unit);
 }
 
+std::string true_figure(double x, bool below_noise) {
+  return below_noise ? "below the reference's noise" : figure(x);
+}
+
 std::string given(double x) {
   return x != 0 && std::abs(x) < 1e-4 ? figure(x) : std::isfinite(x) ? fmt::format("{:g}", x) : kAbsent;
 }

@@ -11,6 +11,7 @@ inline constexpr const char* kAbsent = "–";  // for what is not known: not fin
 std::string superscript(int n);  // "⁻⁴"
 // Three significant digits: "0.0213", "3.20 × 10⁻⁵".
 std::string figure(double x);
+std::string true_figure(double x, bool below_noise);  // against a reference
 std::string given(double x);  // a figure that a person chose, with the digits it was given: "0.001"
 // "0.4 s", "12 s", "4.2 min", "1 h 12 min", "3 d 4 h".
 std::string duration(double seconds);

@@ -20,11 +20,13 @@ json spp_value(double spp) {
   return number(spp);
 }
 
-// true_rmse, true_relmse, true_flip.
+// true_rmse, true_relmse, true_flip, and whether the first two are below the reference's noise.
 void put_truth(json& object, const TrueFigures& truth) {
   object["true_rmse"] = number(truth.rmse);
   object["true_relmse"] = number(truth.relmse);
-  object["true_flip"] = truth.flip ? number(*truth.flip) : json();
+  object["true_flip"] = number(truth.flip);
+  object["true_rmse_below_noise"] = truth.rmse_below_noise();
+  object["true_relmse_below_noise"] = truth.relmse_below_noise();
 }
 
 json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& truth) {
@@ -34,8 +36,12 @@ json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& tr
           {"rmse", truth ? number(truth->rmse) : json()},
           {"relmse", truth ? number(truth->relmse) : json()},
           {"flip", truth && truth->flip ? number(*truth->flip) : json()},
+          {"same_seed", facts.job.reference_same_seed},
           // The difference to the reference is no larger than its own noise: how wrong the image is it cannot tell.
-          {"below_noise", truth && noise && !(truth->relmse > 0)},
+          {"below_noise", truth && truth->relmse_below_noise()},
+          {"rmse_below_noise", truth && truth->rmse_below_noise()},
+          {"mse_stderr", truth ? number(truth->mse_stderr) : json()},
+          {"relmse_stderr", truth ? number(truth->relmse_stderr) : json()},
           {"noise_rmse", noise ? number(std::sqrt(noise->mse)) : json()},
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
@@ -115,12 +121,15 @@ ErrorFigures figures_of(const ImageError& e) {
   return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi, e.rmse_lo, e.rmse_hi};
 }
 
-std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points) {
+std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points, bool with_truth) {
   std::vector<ErrorPoint> out;
   out.reserve(points.size());
-  for (const ConvergencePoint& p : points)
-    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
-                   p.truth ? std::optional(p.truth->relmse) : std::nullopt});
+  for (const ConvergencePoint& p : points) {
+    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi});
+    if (!p.truth || !with_truth) continue;
+    out.back().true_relmse = p.truth->relmse;
+    out.back().true_stderr = p.truth->relmse_stderr;
+  }
   return out;
 }
 
@@ -147,7 +156,7 @@ Judgement judgement_of(const ReportFacts& facts) {
             fmt::format("don't trust yet: {} pixels have no sample; the figures are of the others",
                         facts.pixels_without_samples),
             false};
-  return judge(error_points(facts.convergence), facts.error->verdict);
+  return judge(error_points(facts.convergence, !facts.job.reference_same_seed), facts.error->verdict);
 }
 
 // Error reached per second of wall clock; per core second for comparisons between farms.
@@ -174,6 +183,17 @@ std::map<std::string, double> header_figures(const ReportFacts& facts) {
     put("true_relmse", truth->relmse);
   }
   return figures;
+}
+
+std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
+  std::map<std::string, std::string> notes;
+  if (facts.job.reference_same_seed) notes["reference_same_seed"] = kSameSeed;
+  const auto truth = last_truth(facts.convergence);
+  if (!truth) return notes;
+  std::string below = truth->rmse_below_noise() ? "rmse" : "";
+  if (truth->relmse_below_noise()) below += below.empty() ? "relmse" : " relmse";
+  if (!below.empty()) notes["true_below_noise"] = below;
+  return notes;
 }
 
 std::string report_json(const ReportFacts& facts) {

@@ -39,12 +39,15 @@ Efficiency efficiency_of(const ReportFacts& facts);
 // Of the final EXR's header besides those of the film: slope, efficiency, efficiency_per_core, target_error, true_rmse,
 // true_relmse, as far as they are known.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
+// true_below_noise and reference_same_seed, where they are so.
+std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
 // What to know of an image that was not ended by its samples; else empty.
 std::string note_on(StopReason stopped);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
-std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points);
+// Without `with_truth` nothing is concluded from the true figures.
+std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points, bool with_truth = true);
 // Of the last checkpoint that has them.
 std::optional<TrueFigures> last_truth(const std::vector<ConvergencePoint>& points);
 

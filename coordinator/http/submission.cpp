@@ -37,6 +37,7 @@ Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& 
   const auto job = api.coordinator().job(*id);
   nlohmann::ordered_json body{{"id", id->value}, {"url", url}};
   body["warnings"] = job ? job->warnings : std::vector<std::string>{};
+  body["reference_same_seed"] = job && job->reference_same_seed;
   Response response = json_response(201, write_json(body));
   response.headers.emplace_back("Location", url);
   return response;

@@ -51,6 +51,7 @@ struct StoredJob {
   std::optional<std::uint64_t> spp;  // resolved; nothing: until target or time
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
+  bool reference_same_seed = false;  // same_noise() of its reference
   std::vector<std::string> features_used, features_left_out;
   std::string needs;     // canonical JSON (common/scene/needs.h); empty in records of earlier versions
   std::string analysis;  // JSON: the parts of the renderer with reasons, and what was pruned; for the report

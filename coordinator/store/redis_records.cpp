@@ -51,13 +51,18 @@ std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::
 std::optional<TrueFigures> truth_of(const json& t) {
   if (t.is_null()) return {};
   TrueFigures truth{t.at(0), t.at(1), {}};
-  if (!t.at(2).is_null()) truth.flip = t.at(2).get<double>();
+  const auto known = [&](std::size_t i) {  // the last two are not in earlier records
+    return i < t.size() && !t.at(i).is_null() ? std::optional(t.at(i).get<double>()) : std::nullopt;
+  };
+  truth.flip = known(2), truth.mse_stderr = known(3), truth.relmse_stderr = known(4);
   return truth;
 }
 
 json truth_value(const std::optional<TrueFigures>& truth) {
   if (!truth) return nullptr;
-  return json::array({truth->rmse, truth->relmse, truth->flip ? json(*truth->flip) : json()});
+  const auto or_null = [](const std::optional<double>& v) { return v ? json(*v) : json(); };
+  return json::array({truth->rmse, truth->relmse, or_null(truth->flip), or_null(truth->mse_stderr),
+                      or_null(truth->relmse_stderr)});
 }
 
 std::vector<ConvergencePoint> parse_points(const std::string& text) {

@@ -16,7 +16,8 @@ CREATE TABLE IF NOT EXISTS jobs(ordinal INTEGER PRIMARY KEY, id TEXT UNIQUE NOT 
 CREATE TABLE IF NOT EXISTS points(n INTEGER PRIMARY KEY, job TEXT NOT NULL, seconds REAL, core_seconds REAL, spp REAL,
   rmse REAL, relmse REAL, relmse_lo REAL, relmse_hi REAL, rmse_lo REAL, rmse_hi REAL);
 CREATE INDEX IF NOT EXISTS points_of_job ON points(job);
-CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL, PRIMARY KEY(job, spp));
+CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL,
+  mse_stderr REAL, relmse_stderr REAL, PRIMARY KEY(job, spp));
 CREATE TABLE IF NOT EXISTS log(n INTEGER PRIMARY KEY, job TEXT NOT NULL, unix REAL, text TEXT);
 CREATE INDEX IF NOT EXISTS log_of_job ON log(job);
 CREATE TABLE IF NOT EXISTS barred(worker TEXT PRIMARY KEY, evidence TEXT NOT NULL);
@@ -57,8 +58,9 @@ class Statement {
     sqlite3_bind_double(statement_.get(), ++bound_, value);
     return *this;
   }
-  Statement& bind_null() {  // what is not bound is null
-    ++bound_;
+  Statement& bind(const std::optional<double>& value) {
+    if (value) return bind(*value);
+    ++bound_;  // what is not bound is null
     return *this;
   }
   Statement& bind(std::int64_t value) {
@@ -86,6 +88,7 @@ class Statement {
   }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
   bool null(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
+  std::optional<double> known(int column) const { return null(column) ? std::nullopt : std::optional(real(column)); }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 
  private:
@@ -172,10 +175,11 @@ class SqliteJobStore final : public JobStore {
 
   Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
     const std::lock_guard lock(mutex_);
-    Statement put(db_.get(), "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip) VALUES(?, ?, ?, ?, ?)");
+    Statement put(db_.get(),
+                  "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
+                  "VALUES(?, ?, ?, ?, ?, ?, ?)");
     put.bind(job.value).bind(spp).bind(truth.rmse).bind(truth.relmse);
-    truth.flip ? put.bind(*truth.flip) : put.bind_null();
-    return put.run("store a comparison with the reference");
+    return put.bind(truth.flip).bind(truth.mse_stderr).bind(truth.relmse_stderr).run("store a comparison with the reference");
   }
 
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
@@ -183,7 +187,7 @@ class SqliteJobStore final : public JobStore {
     std::vector<ConvergencePoint> all;
     Statement rows(db_.get(),
                    "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
-                   "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi "
+                   "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi, mse_stderr, relmse_stderr "
                    "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
     rows.bind(job.value);
     auto row = rows.step("read the convergence");
@@ -193,8 +197,7 @@ class SqliteJobStore final : public JobStore {
                      rows.real(2),
                      {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}});
       if (!rows.null(7))
-        all.back().truth = TrueFigures{rows.real(7), rows.real(8),
-                                       rows.null(9) ? std::nullopt : std::optional(rows.real(9))};
+        all.back().truth = TrueFigures{rows.real(7), rows.real(8), rows.known(9), rows.known(12), rows.known(13)};
     }
     if (!row) return tl::unexpected(row.error());
     return all;
@@ -299,12 +302,13 @@ class SqliteJobStore final : public JobStore {
 
 // To a database of an earlier version, which goes on being able to read it.
 Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
-  for (const char* column : {"rmse_lo", "rmse_hi"}) {
-    Statement known(db, "SELECT 1 FROM pragma_table_info('points') WHERE name = ?");
-    const auto found = known.bind(column).step(what);
+  for (const auto& [table, column] : {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"),
+                                      std::pair("truths", "mse_stderr"), std::pair("truths", "relmse_stderr")}) {
+    Statement known(db, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?");
+    const auto found = known.bind(std::string_view(table)).bind(std::string_view(column)).step(what);
     if (!found) return tl::unexpected(found.error());
     if (*found) continue;
-    if (auto done = execute(db, fmt::format("ALTER TABLE points ADD COLUMN {} REAL", column).c_str(), what); !done) return done;
+    if (auto done = execute(db, fmt::format("ALTER TABLE {} ADD COLUMN {} REAL", table, column).c_str(), what); !done) return done;
   }
   return {};
 }

@@ -102,6 +102,7 @@ StoredJob stored_from(const json& j) {
   for (const auto& a : j.at("assets"))
     job.assets.push_back({digest_from(a.at("digest")), count_of(a.at("bytes")), a.at("name")});
   job.warnings = j.at("warnings");
+  job.reference_same_seed = j.value("reference_same_seed", false);  // not in records of earlier versions
   job.features_used = j.at("features_used");
   job.features_left_out = j.at("features_left_out");
   job.needs = j.value("needs", std::string());
@@ -152,6 +153,7 @@ std::string to_json(const StoredJob& job) {
          {"totals", to_value(job.totals)}};
   for (const WorkerId& worker : job.distrusted) j["distrusted"].push_back(worker.value);
   for (const Digest& digest : job.awaited) j["awaited"].push_back(digest.hex());
+  if (job.reference_same_seed) j["reference_same_seed"] = true;
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;
   // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.

@@ -120,12 +120,15 @@ def test_a_page_that_cannot_be_written_is_told_before_rendering(fog, tmp_path):
 def test_a_reference_gives_the_true_error(fog, tmp_path):
     reference = tmp_path / "reference.exr"
     lightshaft("render", fog, "-o", reference, "--spp", SPP, "--float")
-    render(fog, tmp_path, "--reference", reference, "--report", tmp_path / "same.json")
+    said = render(fog, tmp_path, "--reference", reference, "--report", tmp_path / "same.json").stderr
     render(fog, tmp_path, "--seed", 1, "--reference", reference, "--report", tmp_path / "other.json")
     same, other = load(tmp_path / "same.json"), load(tmp_path / "other.json")
 
     # The reference is this very image in float32, and its own noise is taken away from no difference at all.
     assert same["true_rmse"] == 0 and same["true_flip"] < 1e-4
+    assert same["reference"]["below_noise"] and same["reference"]["rmse_below_noise"]
+    assert same["reference"]["same_seed"] and same["verdict_kind"] != "bias_floor" and "shares this job's seed" in said
+    assert not other["reference"]["same_seed"] and not other["true_relmse_below_noise"]
     # Two independent images of one variance: their difference has twice the squared error, of which the reference's layers of
     # errors take one half away. A factor 2 is wide for 72 * 40 * 3 values.
     assert other["rmse"] / 2 < other["true_rmse"] < other["rmse"] * 2

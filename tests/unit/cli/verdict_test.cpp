@@ -75,6 +75,19 @@ TEST(ShownJob, TellsAllOfItsErrorsFigures) {
     EXPECT_THAT(shown, ContainsRegex(row));
 }
 
+TEST(ShownJob, NeverTellsNoughtOfWhatAReferenceCannotTell) {
+  json job = some_job();
+  job["reference"] = {{"rmse", 0}, {"relmse", 0}, {"below_noise", true}, {"rmse_below_noise", true}};
+
+  const std::string below = job_text(job);
+  job["reference_same_seed"] = true;
+  const std::string same = job_text(job);
+
+  EXPECT_THAT(below, ContainsRegex("true relMSE +below the reference's noise"));
+  EXPECT_THAT(below, ContainsRegex("true RMSE +below the reference's noise"));
+  EXPECT_THAT(same, ContainsRegex("true relMSE +0 \\(not to be trusted: the reference has this job's seed\\)"));
+}
+
 TEST(ShownJob, LeavesOutWhatIsNotKnown) {
   const std::string shown = job_text({{"id", "j-1"}, {"reference", nullptr}, {"few_hits", nullptr}});
 
@@ -134,6 +147,9 @@ TEST(WatchedJob, SaysItsErrorAtItsEnd) {
   compared["reference"] = {{"relmse", 0.00443}, {"flip", 0.0271}};
   EXPECT_EQ(said_at_the_end(compared, false),
             "relMSE 0.00418 (0.0039 to 0.00448), true relMSE 0.00443, FLIP 0.0271\n");
+  compared["reference"]["below_noise"] = true;
+  EXPECT_EQ(said_at_the_end(compared, false),
+            "relMSE 0.00418 (0.0039 to 0.00448), true relMSE below the reference's noise, FLIP 0.0271\n");
   EXPECT_EQ(said_at_the_end(some_job(), true), "");
   EXPECT_EQ(said_at_the_end({{"id", "j-1"}}, false), "") << "there is nothing to tell";
 }
@@ -156,6 +172,15 @@ TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
   EXPECT_THAT(report_summary(report.dump()), Not(HasSubstr("0.8")));
   report["trusted"] = true;
   EXPECT_THAT(report_summary(report.dump()), HasSubstr("relMSE 0.39 (0.2 to 0.8); 0.2 would cost 1:00 more"));
+}
+
+TEST(ReportSummary, SaysWhatTheReferenceCannotTell) {
+  json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "true_relmse": 0,
+    "true_relmse_below_noise": true, "reference": {"same_seed": false}})");
+
+  EXPECT_THAT(report_summary(report.dump()), HasSubstr("true relMSE below the reference's noise"));
+  report["reference"]["same_seed"] = true;
+  EXPECT_THAT(report_summary(report.dump()), HasSubstr("true relMSE 0 (not to be trusted"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "common/image/error_estimate.h"
 #include "common/image/final_image.h"
 #include "common/image/maps.h"
 #include "tests/unit/image/support.h"
@@ -54,9 +55,11 @@ TEST(Reference, TakesItsOwnErrorAway) {
   const TrueError e = true_error(*reference, std::vector<float>(kValues, 2.5F));
 
   EXPECT_DOUBLE_EQ(e.rmse, std::sqrt(.25 - .0625));
-  EXPECT_NEAR(e.relmse, (.25 - .0625) / 4.01, kRounding);
+  // Halves of 2.25 and 1.75, each with the variance 2 s^2.
+  const double h = (relative_weight(2.25, .125) + relative_weight(1.75, .125)) / 2;
+  EXPECT_NEAR(e.relmse, (.25 - .0625) * h, kRounding);
   EXPECT_DOUBLE_EQ(noise_of(*reference).mse, .0625);
-  EXPECT_NEAR(noise_of(*reference).relmse, .0625 / 4.01, kRounding);
+  EXPECT_NEAR(noise_of(*reference).relmse, .0625 * h, kRounding);
   EXPECT_EQ(true_error(*reference, std::vector<float>(kValues, 2.1F)).rmse, 0);  // .01 - .0625
 }
 

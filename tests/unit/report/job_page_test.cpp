@@ -105,6 +105,22 @@ TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
   EXPECT_EQ(times(page_of(some_report()), "polyline class=\"line c1"), 0u);
 }
 
+TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
+  json report = some_report();
+  for (json& p : report["convergence"]) p["true_relmse"] = .1, p["true_relmse_below_noise"] = false;
+  report["convergence"].back()["true_relmse_below_noise"] = true;
+  report["reference"] = {{"relmse", 0.}, {"rmse", 0.}, {"below_noise", true}, {"rmse_below_noise", true}, {"same_seed", false}};
+
+  const std::string page = page_of(report);
+  report["reference"]["same_seed"] = true;
+  const std::string same = page_of(report);
+
+  EXPECT_EQ(times(page, "<b>below the reference's noise</b>"), 2u);
+  EXPECT_EQ(times(page, "<td>below the reference's noise</td>"), 1u);
+  EXPECT_EQ(times(page, "shares this job"), 0u);
+  expect(same, "The reference shares this job&#39;s seed");
+}
+
 void doubt(json& report) {
   report["trusted"] = false;
   report["verdict"] = "don't trust yet: few pixels carry the error";

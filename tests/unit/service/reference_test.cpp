@@ -130,6 +130,41 @@ TEST(ServiceReference, IsReadWhenTheJobIsSubmitted) {
   EXPECT_THAT(coordinator->submit(request).error().error.message, HasSubstr("PUT /api/v1/blobs/"));
 }
 
+// As a render of the job's own scene with `seed` would say.
+JobSpec against_own_scene(Coordinator& coordinator, const std::string& seed) {
+  JobSpec spec;
+  spec.spp = 16;
+  const std::string scene = report(coordinator, submit(coordinator, spec))["scene"];
+  ExrPicture p{{40, 24}, {}, {{"lightshaft:scene", scene}, {"lightshaft:seed", seed}}};
+  for (const char* c : {"R", "G", "B"}) {
+    p.channels[c] = ExrFloat{std::vector<float>(960, .5F)};
+    p.channels[std::string("stderr.") + c] = ExrFloat{std::vector<float>(960, 1e-6F)};
+  }
+  const auto exr = write_exr(p).value();
+  spec.reference = sha256(std::span<const std::byte>(exr));
+  EXPECT_TRUE(coordinator.blobs().put(*spec.reference, exr));
+  return spec;
+}
+
+TEST(ServiceReference, OfTheJobsOwnSeedIsToldAndGivesNoVerdict) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId same = submit(*coordinator, against_own_scene(*coordinator, "0")),
+              other = submit(*coordinator, against_own_scene(*coordinator, "1"));
+  EXPECT_TRUE(coordinator->job(same)->reference_same_seed);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(same));
+  ASSERT_TRUE(farm.finish(other));
+
+  const auto told = report(*coordinator, same), apart = report(*coordinator, other);
+
+  EXPECT_EQ(told["reference"]["same_seed"], true);
+  EXPECT_EQ(apart["reference"]["same_seed"], false);
+  EXPECT_EQ(told["true_relmse"], apart["true_relmse"]);  // it is told as before
+  EXPECT_NE(told["verdict_kind"], "bias_floor");
+  EXPECT_EQ(coordinator->job(same)->judgement->words, told["verdict"]);
+}
+
 TEST(ServiceReference, IsNotNeededForMaps) {
   auto coordinator = open_at({});
   JobSpec spec;

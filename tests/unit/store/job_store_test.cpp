@@ -1,6 +1,7 @@
 #include "coordinator/store/job_store.h"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <limits>
 
@@ -118,6 +119,21 @@ TEST_P(JobStores, KeepsPointsAndLogsByJob) {
   EXPECT_TRUE(store->log({"b"}).value().empty());
 }
 
+TEST_P(JobStores, KeepsComparisonsWithAReference) {
+  const auto store = open();
+  const TrueFigures all{.5, .25, .1, .01, .02}, few{.4, .2};
+  ASSERT_TRUE(store->add_point({"a"}, {1, 2, 4, {}}));
+  ASSERT_TRUE(store->add_point({"a"}, {2, 4, 8, {}}));
+  ASSERT_TRUE(store->set_truth({"a"}, 4, all));
+  ASSERT_TRUE(store->set_truth({"a"}, 8, few));
+
+  const auto points = store->points({"a"}).value();
+
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0].truth, all);
+  EXPECT_EQ(points[1].truth, few);
+}
+
 TEST_P(JobStores, KeepsBarredWorkersForGoodWithTheFirstEvidence) {
   const auto store = open();
   ASSERT_TRUE(store->bar({{"w-2"}, "it rendered tile 3 otherwise"}));
@@ -149,6 +165,28 @@ TEST(SqliteJobStore, RemembersOverReopening) {
   EXPECT_EQ(store->barred().value().size(), 1u);
   EXPECT_EQ(store->jobs().value(), std::vector{sample_job("j-1")});
   EXPECT_EQ(store->reserve("events", 1).value(), 7u);
+}
+
+TEST(SqliteJobStore, AddsWhatADatabaseOfAnEarlierVersionLacks) {
+  TempFolder dir;
+  const auto file = dir.path() / "jobs.sqlite";
+  const auto with_truth = [&](const TrueFigures& truth) {
+    const auto store = open_sqlite_job_store(file).value();
+    EXPECT_TRUE(store->add_point({"a"}, {1, 2, 4, {}}));
+    EXPECT_TRUE(store->set_truth({"a"}, 4, truth));
+  };
+  with_truth({.5, .25, .1, .01, .02});
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
+  for (const char* sql : {"ALTER TABLE truths DROP COLUMN mse_stderr", "ALTER TABLE truths DROP COLUMN relmse_stderr",
+                          "ALTER TABLE points DROP COLUMN rmse_lo"})
+    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+  sqlite3_close(db);
+
+  const auto points = open_sqlite_job_store(file).value()->points({"a"});
+
+  ASSERT_TRUE(points) << points.error().message;
+  EXPECT_EQ(points->at(0).truth, (TrueFigures{.5, .25, .1}));
 }
 
 TEST(SqliteJobStore, SaysThatAFileIsNoDatabase) {

@@ -20,6 +20,7 @@ inline StoredJob sample_job(std::string id) {
   job.spec.defines = {{"density", "2"}};
   job.assets = {{sha256("grid"), 4, "grid.vol"}};
   job.warnings = {"a \"quoted\" warning\n"};
+  job.reference_same_seed = true;
   job.features_used = {"volume grids"};
   job.state = JobState::running;
   job.stopped = StopReason::error;

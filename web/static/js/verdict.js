@@ -1,5 +1,5 @@
 // Whether a job's figures of its own error are to be relied on, and what is said in their place where they are not.
-import { duration, interval } from "./format.js";
+import { duration, figure, interval } from "./format.js";
 
 export const kDoubt = "don't trust yet";
 const kDoubtful = new Set(["heavy_tail", "bias_floor"]);
@@ -18,6 +18,9 @@ export function confidence(job, ci) {
   const known = interval(ci);
   return known ? `95 %: ${known}` : null;
 }
+
+/** A figure against a reference; 0 is never what is meant. */
+export const trueFigure = (value, belowNoise) => (belowNoise === true ? "below the reference's noise" : figure(value));
 
 /** Bright outliers that are still missing only ever add to it. */
 export function timeLeft(job) {

@@ -2,7 +2,7 @@
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
 import { count, duration, figure, given, plural, spp } from "../format.js";
-import { confidence, doubtful, kDoubt } from "../verdict.js";
+import { confidence, doubtful, kDoubt, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
@@ -17,7 +17,7 @@ export function figures(job) {
     fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),
     fact("Core time", duration(job.core_seconds)),
     fact("Efficiency", figure(job.efficiency_per_core), ["1 / (relMSE × core s)"]),
-    job.reference ? trueFigures(job.reference) : null,
+    job.reference ? trueFigures(job.reference, job.reference_same_seed === true) : null,
     fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
     fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
 }
@@ -39,8 +39,9 @@ function timeNotes(job) {
     typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}${sure ? between(job.eta_with_8_more_ci95) : ""}` : null];
 }
 
-const trueFigures = ({ relmse, rmse, flip }) => [
-  fact("True relMSE", figure(relmse), ["against the reference"], "true"), fact("True RMSE", figure(rmse), [], "true"),
+const trueFigures = ({ relmse, rmse, flip, below_noise: below, rmse_below_noise: rmseBelow }, sameSeed) => [
+  fact("True relMSE", trueFigure(relmse, below), [sameSeed ? "not to be trusted: one seed" : "against the reference"], "true"),
+  fact("True RMSE", trueFigure(rmse, rmseBelow), [], "true"),
   flip === null || flip === undefined ? null : fact("FLIP", figure(flip), [], "true")];
 
 const fact = (name, value, notes = [], className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name),

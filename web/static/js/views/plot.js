@@ -2,7 +2,7 @@
 import { h } from "../dom.js";
 import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
-import { doubtful, kDoubt, verdictOf } from "../verdict.js";
+import { doubtful, kDoubt, trueFigure, verdictOf } from "../verdict.js";
 import { choice } from "./pieces.js";
 import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
@@ -100,7 +100,7 @@ function verdictWords(report, verdict) {
 
 const kColumns = [
   ["Time", (p) => duration(p.seconds)], ["Core time", (p) => duration(p.core_seconds)], ["Samples", (p) => spp(p.spp)],
-  ["relMSE", (p) => figure(p.relmse)], ["95 % interval", (p) => interval(p.relmse_ci95)], ["True relMSE", (p) => figure(p.true_relmse)]];
+  ["relMSE", (p) => figure(p.relmse)], ["95 % interval", (p) => interval(p.relmse_ci95)], ["True relMSE", (p) => trueFigure(p.true_relmse, p.true_relmse_below_noise)]];
 
 function table({ points, doubt }) {
   const truth = points.some((p) => p.true_relmse > 0);

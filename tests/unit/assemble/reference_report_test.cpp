@@ -1,0 +1,64 @@
+// What a report says of a reference, and what it leaves open.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "coordinator/assemble/report.h"
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+// Errors that fall like 1/N, with a squared bias of `floor`, by a reference of this standard error.
+ReportFacts compared(double floor, std::optional<double> standard_error) {
+  ReportFacts facts;
+  facts.job.spec.reference = sha256("reference");
+  facts.error = ImageError{.trusted = true};
+  for (double spp = 8; spp <= 1024; spp *= 2) {
+    const double e = 1 / spp;
+    ConvergencePoint point{spp, spp, spp, {e, e, .9 * e, 1.1 * e}};
+    point.truth = TrueFigures{std::sqrt(e + floor), e + floor, {}, standard_error, standard_error};
+    facts.convergence.push_back(point);
+  }
+  return facts;
+}
+
+json told(const ReportFacts& facts) { return json::parse(report_json(facts)); }
+
+TEST(ReferenceReport, TellsAFloorOnlyAboveTheReferencesNoise) {
+  EXPECT_EQ(told(compared(.01, {}))["verdict_kind"], "bias_floor");
+  EXPECT_EQ(told(compared(.01, .002))["verdict_kind"], "bias_floor");  // five standard errors
+  EXPECT_EQ(told(compared(.01, .003))["verdict_kind"], "converging");  // three
+}
+
+TEST(ReferenceReport, OfTheJobsOwnSeedDrawsNoVerdict) {
+  ReportFacts facts = compared(.01, 1e-6);
+  facts.job.reference_same_seed = true;
+
+  const json report = told(facts);
+
+  EXPECT_EQ(report["verdict_kind"], "converging");
+  EXPECT_EQ(report["reference"]["same_seed"], true);
+  EXPECT_EQ(header_notes(facts).at("reference_same_seed"), kSameSeed);
+  EXPECT_GT(header_figures(facts).at("true_relmse"), .01) << "it is told as before";
+}
+
+TEST(ReferenceReport, SaysWhatIsBelowItsNoise) {
+  const ReportFacts facts = compared(0, .001);  // of the last checkpoint, 1 / 1024
+  const json below = told(facts), without = told(compared(0, {}));
+
+  EXPECT_EQ(below["reference"]["below_noise"], true);
+  EXPECT_EQ(below["reference"]["rmse_below_noise"], true);
+  EXPECT_EQ(below["reference"]["relmse_stderr"], .001);
+  EXPECT_EQ(below["convergence"][0]["true_relmse_below_noise"], false);
+  EXPECT_EQ(below["true_relmse"], 1. / 1024) << "the number stands as before";
+  EXPECT_EQ(header_notes(facts).at("true_below_noise"), "rmse relmse");
+  EXPECT_EQ(without["reference"]["below_noise"], false);
+  EXPECT_EQ(without["reference"]["relmse_stderr"], nullptr);
+  EXPECT_TRUE(header_notes(compared(0, {})).empty());
+}
+
+}  // namespace
+}  // namespace ls::coordinator
