@@ -1,5 +1,7 @@
 #include "tests/fuzz/fuzz.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cstdio>
 
@@ -27,23 +29,46 @@ std::string with_length(std::string_view part) {
   return out.append(part);
 }
 
+namespace {
+
+void put_size(std::string& to, std::size_t size) {
+  for (int shift = 0; shift < 32; shift += 8) to += static_cast<char>(size >> shift & 255);
+}
+std::size_t size_at(std::string_view from) {
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < 4; ++i) size |= std::size_t{static_cast<unsigned char>(from[i])} << 8 * i;
+  return size;
+}
+
+}  // namespace
+
 std::string packed(const std::vector<std::string>& inputs) {
-  std::string pack;
+  std::string all, pack;
   for (const std::string& input : inputs) {
-    for (int shift = 0; shift < 32; shift += 8) pack += static_cast<char>(input.size() >> shift & 255);
-    pack += input;
+    put_size(all, input.size());
+    all += input;
   }
+  put_size(pack, all.size());
+  uLongf size = compressBound(all.size());
+  pack.resize(4 + size);
+  compress2(reinterpret_cast<Bytef*>(pack.data() + 4), &size, reinterpret_cast<const Bytef*>(all.data()), all.size(),
+            Z_BEST_COMPRESSION);
+  pack.resize(4 + size);
   return pack;
 }
 
 std::vector<std::string> unpacked(std::string_view pack) {
+  constexpr std::size_t kMost = std::size_t{1} << 28;
   std::vector<std::string> inputs;
-  while (pack.size() >= 4) {
-    std::size_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i) length |= std::size_t{static_cast<unsigned char>(pack[i])} << 8 * i;
-    if (pack.size() - 4 < length) break;
-    inputs.emplace_back(pack.substr(4, length));
-    pack.remove_prefix(4 + length);
+  if (pack.size() < 4 || size_at(pack) > kMost) return inputs;
+  std::string all(size_at(pack), '\0');
+  uLongf size = all.size();
+  if (uncompress(reinterpret_cast<Bytef*>(all.data()), &size, reinterpret_cast<const Bytef*>(pack.data() + 4),
+                 pack.size() - 4) != Z_OK)
+    return inputs;
+  for (std::string_view left(all.data(), size); left.size() >= 4 && left.size() - 4 >= size_at(left);) {
+    inputs.emplace_back(left.substr(4, size_at(left)));
+    left.remove_prefix(4 + inputs.back().size());
   }
   return inputs;
 }

@@ -62,7 +62,7 @@ TEST_P(Replay, FindingsOfThePastComeBack) {
 TEST_P(Replay, CorpusOfTheFuzzersComesBack) {
   const auto pack = std::filesystem::path(FUZZ_CORPUS) / (std::string(GetParam().name) + ".pack");
   const auto inputs = unpacked(content(pack));
-  ASSERT_EQ(inputs.empty(), !std::filesystem::exists(pack)) << pack;
+  ASSERT_FALSE(inputs.empty()) << pack;
   for (const std::string& input : inputs) GetParam().run(input_of(input));
 }
 
@@ -71,7 +71,8 @@ TEST(Pack, HoldsWhatWasPackedAndNothingThatIsCutShort) {
   const std::string pack = packed(inputs);
 
   EXPECT_EQ(unpacked(pack), inputs);
-  EXPECT_EQ(unpacked(pack.substr(0, pack.size() - 1)), (std::vector<std::string>{"", "a"}));
+  EXPECT_TRUE(unpacked(pack.substr(0, pack.size() - 1)).empty());
+  EXPECT_TRUE(unpacked("abc").empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Fuzz, Replay, testing::ValuesIn(targets().begin(), targets().end()),
