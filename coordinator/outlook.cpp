@@ -31,8 +31,8 @@ std::optional<CoreSeconds> core_seconds_left(const OutlookFacts& facts, std::spa
 
 // A unit is one thread's: no more threads help than units may be under way, and none is done before its time. Of what is
 // less than a unit it is the part of it that is left.
-double seconds_on(double threads, double core, const OutlookFacts& facts) {
-  const double busy = facts.units_at_once > 0 ? std::min(threads, facts.units_at_once) : threads;
+double seconds_on(double cores, double core, const OutlookFacts& facts) {
+  const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   return std::max(core / busy, std::min(core, facts.unit_seconds));
 }
 
@@ -42,18 +42,18 @@ Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points
   Outlook out;
   out.progress = facts.done;
   const auto core = core_seconds_left(facts, points, out);
-  if (facts.threads > 0 && core) {
-    const auto on = [&](double threads) {
-      return core->ci95 ? std::optional(std::pair(seconds_on(threads, core->ci95->first, facts),
-                                                  seconds_on(threads, core->ci95->second, facts)))
+  if (facts.cores > 0 && core) {
+    const auto on = [&](double cores) {
+      return core->ci95 ? std::optional(std::pair(seconds_on(cores, core->ci95->first, facts),
+                                                  seconds_on(cores, core->ci95->second, facts)))
                         : std::nullopt;
     };
-    out.seconds = seconds_on(facts.threads, core->to_end, facts);
-    out.ci95 = on(facts.threads);
-    const double more = std::max(facts.threads, facts.threads_with_more);
+    out.seconds = seconds_on(facts.cores, core->to_end, facts);
+    out.ci95 = on(facts.cores);
+    const double more = std::max(facts.cores, facts.cores_with_more);
     if (const double sooner = seconds_on(more, core->to_end, facts); sooner < *out.seconds) {
       out.with_more = sooner;
-      out.with_more_ci95 = on(facts.threads_with_more);
+      out.with_more_ci95 = on(facts.cores_with_more);
     }
   }
   if (!facts.time) return out;

@@ -16,8 +16,8 @@ struct OutlookFacts {
   double core_to_limit = 0;  // until the samples end it, whatever the error; 0: not known yet
   std::optional<double> target, time;    // relMSE; seconds since the first ray
   double elapsed = 0;                    // seconds since the first ray
-  double threads = 0;                    // that work on it, or would
-  double threads_with_more = 0;          // with more workers; not above `threads`: they would not help
+  double cores = 0;                      // of the threads that work on it, or would: CPU seconds in a second of the clock
+  double cores_with_more = 0;            // with more workers; not above `cores`: they would not help
   double unit_seconds = 0;               // core seconds of one of the units left, in the mean; 0: not known
   double units_at_once = 0;              // that may be under way, each on one thread; 0: no limit
 };

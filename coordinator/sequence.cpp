@@ -81,6 +81,7 @@ std::string trouble_of(std::span<const JobView> frames) {
 
 struct WorkLeft {
   double core_left = 0, core_queued = 0;
+  std::uint64_t units = 0;
 };
 
 // A frame that has not begun costs what the others cost, by the share of them that is done.
@@ -93,6 +94,7 @@ WorkLeft work_left(std::span<const JobView> frames) {
   for (const JobView& f : frames) {
     if (ended(f.state)) continue;
     out.core_left += each * (1 - f.progress);
+    out.units += f.units_total - std::min(f.units_total, f.units_done);
     if (f.state == JobState::queued)
       out.core_queued += f.queued_core_seconds > 0 ? f.queued_core_seconds : each;
     else if (f.state == JobState::running)
@@ -118,6 +120,15 @@ void add_up(JobView& v, std::span<const JobView> frames) {
     if (const auto id = frame_of(f.id)) add_notes(v.notes, f.notes, id->frame);
   }
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
+}
+
+// Of the farm's: a worker more than it may have, or a thread more than it has units, is none of its.
+double cores_for(const JobView& v, const SequenceFacts& facts, std::uint64_t units_left) {
+  double cores = facts.cores;
+  if (v.max_workers && facts.workers > 0)
+    cores *= std::min(1., static_cast<double>(*v.max_workers) / facts.workers);
+  if (v.max_units) cores = std::min(cores, static_cast<double>(*v.max_units));
+  return units_left > 0 ? std::min(cores, static_cast<double>(units_left)) : cores;
 }
 
 }  // namespace
@@ -180,7 +191,8 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   const WorkLeft out = work_left(frames);
   v.queued_core_seconds = out.core_queued;
   const bool goes_on = v.state == JobState::running || v.state == JobState::queued;
-  if (goes_on && out.core_left > 0 && facts.threads > 0) v.eta_seconds = out.core_left / facts.threads;
+  if (const double cores = cores_for(v, facts, out.units); goes_on && out.core_left > 0 && cores > 0)
+    v.eta_seconds = out.core_left / cores;
   v.frames = count(frames, facts.range);
   return v;
 }

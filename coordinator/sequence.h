@@ -18,11 +18,12 @@ struct SequenceFacts {
   FrameRange range;
   std::vector<std::string> warnings;  // of all frames, each once
   double elapsed_seconds = 0;
-  int threads = 0;  // of the connected workers
+  double cores = 0;  // of the connected workers
+  int workers = 0;   // connected
 };
 // `frames`: at least one, ascending. Error figures are the mean over the pixels of those frames that have
 // some, their interval that of independent estimates. What the frames left will cost is taken from what was
-// done of the others.
+// done of the others; their time left is that on as many cores as its limits and its units keep busy.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

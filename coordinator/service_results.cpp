@@ -16,7 +16,7 @@ namespace {
 // number at all is refused with the result (verify_result).
 void believe(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
-  for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle})
+  for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle, &result.times.wait})
     *part = believed_seconds(*part);
 }
 }  // namespace
@@ -162,7 +162,7 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
   if (wanted.verdict == Wanted::Verdict::yes && entry.log && !place)
     run_locked(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else
-    run_locked(UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds});
+    run_locked(UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds, r.times.wait});
   acknowledge_locked(a, std::nullopt);
 }
 

@@ -40,7 +40,8 @@ JobView Service::sequence_view_locked(const JobId& id, const Sequence& sequence,
   facts.id = id;
   facts.range = range_of(sequence.frames.front()->stored, sequence.frames.back()->stored);
   facts.warnings = sequence.warnings;
-  facts.threads = farm_.threads_connected();
+  facts.cores = farm_.cores_connected();
+  facts.workers = farm_.workers_connected();
   if (began > 0) facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? unix_now() : ended) - began);
   JobView view = sequence_view(facts, views);
   if (with_frames)

@@ -86,11 +86,12 @@ Outlook Service::outlook_locked(const JobEntry& entry, const JobFigures& figures
   facts.target = job.spec.target_error;
   facts.time = job.spec.time;
   facts.elapsed = v.elapsed_seconds;
-  const int threads = farm_.threads_connected(), workers = farm_.workers_connected();
-  facts.threads = figures.threads > 0 ? figures.threads : threads;
+  const double cores = farm_.cores_connected();
+  const int workers = farm_.workers_connected();
+  facts.cores = figures.cores > 0 ? figures.cores : cores;
   const int room = job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
   if (workers > 0)
-    facts.threads_with_more = facts.threads + static_cast<double>(std::min(room, kMoreWorkers)) * threads / workers;
+    facts.cores_with_more = facts.cores + static_cast<double>(std::min(room, kMoreWorkers)) * cores / workers;
   facts.units_at_once = static_cast<double>(entry.grid.count()) * kRoundsAhead;
   if (job.spec.max_units) facts.units_at_once = std::min<double>(facts.units_at_once, *job.spec.max_units);
   if (figures.units_total > figures.units_done)

@@ -134,7 +134,8 @@ Result<UnitTimes> times_from(const pb::UnitTimes& in) {
   LS_TRY(build, seconds_from(in.build(), "result.times.build"));
   LS_TRY(transfer, seconds_from(in.transfer(), "result.times.transfer"));
   LS_TRY(idle, seconds_from(in.idle(), "result.times.idle"));
-  return UnitTimes{load, build, transfer, idle};
+  LS_TRY(wait, seconds_from(in.wait(), "result.times.wait"));
+  return UnitTimes{load, build, transfer, idle, wait};
 }
 
 Result<FromWorker> result_from(const pb::UnitResult& in) {

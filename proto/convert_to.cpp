@@ -76,6 +76,7 @@ void put(const UnitResult& result, pb::FromWorker& out) {
   times->set_build(result.times.build);
   times->set_transfer(result.times.transfer);
   times->set_idle(result.times.idle);
+  times->set_wait(result.times.wait);
 }
 
 void put(const UnitFailure& failure, pb::FromWorker& out) {

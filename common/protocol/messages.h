@@ -73,6 +73,7 @@ struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // to pack the result: encode and digest
   double idle = 0;      // that its thread stood still since the last unit of the job
+  double wait = 0;      // that its thread waited for a core while it rendered: wall seconds less cpu_seconds
   bool operator==(const UnitTimes&) const = default;
 };
 

@@ -59,7 +59,8 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
     const double x = number(p, clock.key);
     const auto ci = shown_interval(p, doubt).value_or(std::pair(0.0, 0.0));
     estimate.points.push_back({x, number(p, "relmse"), ci.first, ci.second});
-    if (const double error = number(p, "true_relmse"); error > 0) truth.points.push_back({x, error});
+    const double error = number(p, "true_relmse");
+    if (error > 0 && !flag(p, "true_relmse_below_noise", false)) truth.points.push_back({x, error});
   }
   const bool has_truth = !truth.points.empty();
   plot.curves.push_back(std::move(estimate));

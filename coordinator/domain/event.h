@@ -158,6 +158,7 @@ struct UnitAccepted {
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
+  double wait_seconds = 0;  // that its thread waited meanwhile: core_share.h
 };
 // The assembler did what Fold asked for.
 struct UnitFolded {

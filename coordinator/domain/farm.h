@@ -58,7 +58,7 @@ struct JobFigures {
   // reached.
   double core_seconds_left = 0;
   double core_seconds_to_limit = 0;  // the same until all samples are there, whatever the error
-  double threads = 0;                // of the workers that hold leases of it, by its share of their leases
+  double cores = 0;                  // of the workers that hold leases of it, by its share of their leases
   double core_seconds_queued = 0;  // of those, predicted for units that no worker has
   double seconds_per_sample = 0;  // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
@@ -127,7 +127,7 @@ class Farm {
   bool barred(const WorkerId& worker) const;
   // Whether a job that has no numeric class yet may get this worker's.
   bool may_pin(const JobId& id, const WorkerId& worker) const;
-  int threads_connected() const;
+  double cores_connected() const;  // of connected workers: threads, by the core that each gets
   int workers_connected() const;
 
   // How much there is of everything that it keeps; for tests: what grows without an end?

@@ -27,7 +27,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   lease.units = std::move(units);
   lease.seconds_per_unit = sum / lease.remaining;
   lease.charge_per_unit = job.cost.known() ? lease.seconds_per_unit : kAssumedUnitSeconds;
-  lease.predicted = from_seconds(std::max(longest, (worker.seconds_out + sum) / worker.threads));
+  lease.predicted = from_seconds(std::max(longest / worker.core_share.get(), (worker.seconds_out + sum) / worker.cores()));
   lease.deadline = now + from_seconds(kDeadlineFactor * seconds(lease.predicted)) + kDeadlineSlack +
                    (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
 
@@ -172,7 +172,7 @@ std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
 
 void Farm::State::renew(LeaseRecord& lease) {
   const Worker& worker = *lease.worker;
-  const double left = std::max(lease.seconds_per_unit, worker.seconds_out / worker.threads);
+  const double left = std::max(lease.seconds_per_unit / worker.core_share.get(), worker.seconds_until_free());
   const bool warm = worker.warmed_up.contains(lease.job->seq);
   const TimePoint deadline = now + from_seconds(kDeadlineFactor * left) + kDeadlineSlack +
                              (warm ? Duration{} : Duration{kLoadSlack});

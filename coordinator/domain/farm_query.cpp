@@ -101,7 +101,7 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   }
   for (const auto& [index, leases] : job->load.leases_at) {
     const Worker& w = *state_->workers.all().at(index);
-    f.threads += w.threads * static_cast<double>(leases) / static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
+    f.cores += w.cores() * static_cast<double>(leases) / static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
   }
   f.first_ray = job->first_ray;
   f.numeric_class = job->numeric_class;
@@ -214,7 +214,11 @@ bool Farm::may_pin(const JobId& id, const WorkerId& worker) const {
   return job != nullptr && known != nullptr && state_->may_pin(*job, *known);
 }
 
-int Farm::threads_connected() const { return state_->workers.threads(); }
+double Farm::cores_connected() const {
+  double cores = 0;
+  for (const auto& [index, worker] : state_->workers.all()) cores += worker->connected ? worker->cores() : 0;
+  return cores;
+}
 int Farm::workers_connected() const { return state_->workers.connected(); }
 
 }  // namespace ls::coordinator

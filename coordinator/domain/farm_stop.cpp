@@ -68,7 +68,7 @@ void Farm::State::stop_at_level(Job& job) {
 }
 
 // Units wait in the order of rounds; as many are kept as their predicted cost fits into the time that all
-// threads have, besides what is lent already. One is begun if at least half of it fits: so the end comes as
+// cores have, besides what is lent already. One is begun if at least half of it fits: so the end comes as
 // often before the limit as after it. What is lent stays lent, whatever it takes: to drop slow units would
 // bias the image. Looked at again until the limit, since predictions get better.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
@@ -77,10 +77,10 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
     job.stopping.reset();
     job.plan_all();
   }
-  int threads = 0;
+  double cores = 0;
   for (const auto& [index, worker] : workers.all())
-    threads += worker->available() && fits(job, *worker) ? worker->threads : 0;
-  double room = seconds(limit - now) * threads;
+    cores += worker->available() && fits(job, *worker) ? worker->cores() : 0;
+  double room = seconds(limit - now) * cores;
   for (const auto& [code, holders] : job.out) room -= job.predict(code);
   std::vector<RoundIndex> ends(job.units.tiles());
   RoundIndex round = job.queue.longest();

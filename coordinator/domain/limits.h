@@ -36,6 +36,7 @@ inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked a
 // ---- whose turn it is ----
 inline constexpr double kMostUnitSeconds = 86400;   // what a result reports beyond is not believed
 inline double believed_seconds(double reported) { return reported >= 0 && reported <= kMostUnitSeconds ? reported : 0; }
+inline constexpr double kLeastCoreShare = 1.0 / 64;  // of a core that a worker's thread is taken to have, at least
 inline constexpr double kAssumedUnitSeconds = 1.0;  // charged for a unit of a job of which nothing is measured
 // So much longer than fair all threads may go on with jobs whose world they hold before they load another.
 inline constexpr double kLocalitySeconds = 5.0;

@@ -18,7 +18,7 @@ struct LeaseSize {
 double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
-  return std::max(0.0, seconds(*limit - now) - worker.seconds_out / worker.threads);
+  return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
 }
 
 // Guided self-scheduling: a thread's share is half of an even split of what waits, so that all end at about
@@ -30,7 +30,7 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   const std::uint64_t most =
       job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
   const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
-  return {std::min(share, most), lasts * worker.threads};
+  return {std::min(share, most), lasts * worker.cores()};
 }
 
 // A job with a time budget leases nothing beyond it, and nothing ahead that would only be begun beyond it.
@@ -39,7 +39,7 @@ bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint 
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen || round_of(code) == 0) return false;
   if (now >= *limit) return true;
-  return worker.covered() && now + from_seconds(worker.seconds_out / worker.threads) >= *limit;
+  return worker.covered() && now + from_seconds(worker.seconds_until_free()) >= *limit;
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
     // As it is known now; when the first leases were made out, nothing was.
     before += earlier.remaining * earlier.job->predict(earlier.units.front());
   }
-  return before / lease.worker->threads;
+  return before / lease.worker->cores();
 }
 
 LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "coordinator/domain/core_share.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/job.h"
@@ -43,10 +44,14 @@ struct Worker {
   std::uint32_t units_out = 0;
   double seconds_out = 0;  // predicted CPU seconds of units_out
   std::uint64_t units_done = 0;
+  CoreShare core_share;
   std::set<JobSeq> briefed;    // jobs this stream has had the brief of
   std::set<JobSeq> warmed_up;  // jobs it has finished a unit of on this stream: the world is loaded
   std::map<JobSeq, WorkerFailures> failures;
 
+  // That its threads have together: in a second of the clock it renders so many CPU seconds.
+  double cores() const { return threads * core_share.get(); }
+  double seconds_until_free() const { return seconds_out / cores(); }
   bool covered() const { return units_out >= static_cast<std::uint32_t>(threads); }
   bool blocked(JobSeq job, TimePoint now) const {
     const auto it = failures.find(job);
@@ -56,7 +61,7 @@ struct Worker {
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < 2 * static_cast<std::uint32_t>(threads)) return true;
-    return leases.size() < kLeasesPerWorker && seconds_out < kLeasesPerWorker * kLeaseSeconds * threads;
+    return leases.size() < kLeasesPerWorker && seconds_until_free() < kLeasesPerWorker * kLeaseSeconds;
   }
   bool available() const {
     return connected && !draining && pause == Pause::none && !sick_since && !barred;

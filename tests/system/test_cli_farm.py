@@ -68,6 +68,16 @@ def test_a_farm_compares_with_a_reference_as_render_does(rendering, tmp_path):
         assert png.startswith(b"\x89PNG") and struct.unpack(">II", png[16:24]) == (72, 40)
 
 
+def test_a_reference_of_the_jobs_own_seed_is_warned_of(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    lightshaft("render", scene, "-o", tmp_path / "right.exr", "--spp", 8, "--float")
+
+    same = call(rendering, "submit", scene, "--spp", 8, "--reference", tmp_path / "right.exr")
+    other = call(rendering, "submit", scene, "--spp", 8, "--seed", 1, "--reference", tmp_path / "right.exr")
+
+    assert "shares this job's seed" in same.stderr and "seed" not in other.stderr
+
+
 def test_a_reference_that_is_none_is_refused_before_anything_is_rendered(rendering, tmp_path):
     scene = write_fog(tmp_path)
     (tmp_path / "text.exr").write_text("no picture")

@@ -81,6 +81,17 @@ def test_the_true_error_has_a_curve_of_its_own(open_page, farm):
     assert open_page(f"{farm.url}/demo.html?view=job").count(".plot-true") == 0
 
 
+def test_what_a_reference_cannot_tell_is_neither_drawn_nor_nought(dashboard, farm):
+    farm.jobs["j-1"] = job()
+    farm.report = {**report(), "convergence": [point(s, true_relmse=0.12 / s, true_relmse_below_noise=s == 8) for s in (1, 2, 4, 8)]}
+
+    page = dashboard("#/jobs/j-1")
+
+    line = page.wait("document.querySelector('.plot-true')?.getAttribute('points')")
+    assert len(line.split()) == 3
+    assert "true error below the reference's noise" in page.text(".plot-reading")
+
+
 @pytest.mark.parametrize("lo, hi, shown", [
     (1e-5, 2, ["10⁻⁵", "10⁻⁴", "0.001", "0.01", "0.1", "1"]), (0.009, 0.3, ["0.01", "0.02", "0.05", "0.1", "0.2"]), (9e-6, 6e-5, ["10⁻⁵", "2·10⁻⁵", "5·10⁻⁵"])])
 def test_ticks_of_error_are_those_of_the_reports(open_page, farm, lo, hi, shown):

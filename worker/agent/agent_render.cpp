@@ -50,6 +50,7 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   result.cpu_seconds = rendered->cpu_seconds;
   result.health = rendered->health;
   result.times.idle = std::max(0., gap - std::exchange(slot.last_transfer, 0));
+  result.times.wait = std::max(0., rendered->wall_seconds - rendered->cpu_seconds);
   result.times.transfer = slot.last_transfer = seconds(clock.now() - packing);
   return result;
 }

@@ -7,7 +7,7 @@ namespace ls::worker {
 namespace {
 
 // The fake, on a clock that only moves when it prepares a job (2 s) and begins a unit (1/4 s of standing
-// still, 1/2 s of rendering).
+// still, 1/2 s of rendering, of which its thread has a core for 1/8).
 class TimedBackend final : public RenderBackend {
  public:
   TimedBackend(std::unique_ptr<RenderBackend> fake, AtomicClock& clock)
@@ -21,7 +21,7 @@ class TimedBackend final : public RenderBackend {
                                                  const std::atomic<bool>& stop) override {
     auto rendered = fake_->render(job, unit, stop);
     clock_.advance(std::chrono::milliseconds(750));
-    if (rendered) rendered->wall_seconds = .5;
+    if (rendered) rendered->wall_seconds = .5, rendered->cpu_seconds = .125;
     return rendered;
   }
   void forget(const JobId& job) override { fake_->forget(job); }
@@ -32,7 +32,7 @@ class TimedBackend final : public RenderBackend {
   AtomicClock& clock_;
 };
 
-TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStill) {
+TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStillOrWaited) {
   start_with(std::make_unique<TimedBackend>(make_fake_backend({}), clock_));
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(5)));
   coordinator_.wait_for([](auto& c) { return c.results.size() == 5; });
@@ -42,6 +42,7 @@ TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStill) {
     const UnitTimes& times = coordinator_.results[i].times;
     EXPECT_DOUBLE_EQ(times.build, i == 0 ? 2 : 0);
     EXPECT_DOUBLE_EQ(times.idle, i == 0 ? 0 : .25) << "before the first unit it waits for the world";
+    EXPECT_DOUBLE_EQ(times.wait, .375);
     EXPECT_DOUBLE_EQ(times.load, 0);
     EXPECT_DOUBLE_EQ(times.transfer, 0) << "this clock stands still meanwhile";
   }

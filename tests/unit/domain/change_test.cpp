@@ -195,15 +195,51 @@ TEST(Figures, TellWhatTheQueueWillCost) {
   EXPECT_EQ(f.core_seconds_to_limit, f.core_seconds_left) << "no target ends it sooner";
 }
 
+// A job's time left is told from these.
+TEST(Figures, CountAThreadByTheCoreThatItGets) {
+  Rig rig;
+  rig.cpu_seconds = 1;
+  rig.join("w", 4);
+  rig.join("v", 4);
+  rig.submit(plan_of("j", 1000, 2));
+  rig.render("v");
+  EXPECT_DOUBLE_EQ(rig.farm.cores_connected(), 8);
+
+  rig.wait_seconds = 3;
+  rig.render("w");
+
+  EXPECT_DOUBLE_EQ(rig.farm.cores_connected(), 5);
+  EXPECT_DOUBLE_EQ(rig.job().cores, 5);
+}
+
+// Copies of units that are only late because their worker shares its cores would be rendered in vain.
+TEST(Figures, AWorkerThatSharesItsCoresIsExpectedLater) {
+  for (const double wait : {0., 9.}) {
+    Rig rig;
+    rig.cpu_seconds = 1;
+    rig.wait_seconds = wait;
+    rig.join("w", 1);
+    rig.submit(plan_of("j", 5, 2));
+    rig.render("w");
+    rig.render("w");
+    while (rig.job().units_queued > 0) rig.render("w");
+    rig.join("idle", 1);
+
+    rig.pass(7s);
+
+    EXPECT_EQ(rig.held[{"idle"}].empty(), wait > 0) << "a unit takes " << 1 + wait << " s";
+  }
+}
+
 TEST(Figures, TellWhoseThreadsWorkOnAJob) {
   Rig rig;
   rig.join("w", 4);
   rig.submit(plan_of("j", 1000, 2));
-  EXPECT_EQ(rig.job().threads, 4);
+  EXPECT_EQ(rig.job().cores, 4);
   rig.join("v", 2);
-  EXPECT_EQ(rig.job().threads, 6);
+  EXPECT_EQ(rig.job().cores, 6);
   rig.lose("v");
-  EXPECT_EQ(rig.job().threads, 4);
+  EXPECT_EQ(rig.job().cores, 4);
 }
 
 }  // namespace

@@ -72,6 +72,7 @@ class Rig {
   std::map<WorkerId, std::deque<Held>> held;
   std::function<double(const UnitKey&)> rel_error = [](const UnitKey&) { return 1.0; };
   double cpu_seconds = 0.01;  // that each unit reports
+  double wait_seconds = 0;    // and that its thread waited
 
   // The effects of the event and of all folds that it led to.
   std::vector<Effect> send(const Event& event) {
@@ -117,7 +118,7 @@ class Rig {
   }
   std::vector<Effect> result(const std::string& name, const Held& unit) {
     return send(UnitAccepted{
-        unit.key(), unit.unit.samples, honest(unit.key(), unit.unit.samples), {name}, cpu_seconds});
+        unit.key(), unit.unit.samples, honest(unit.key(), unit.unit.samples), {name}, cpu_seconds, wait_seconds});
   }
   std::vector<Effect> fail(const std::string& name, bool scene_at_fault = false) {
     const Held unit = take(name);

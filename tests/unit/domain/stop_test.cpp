@@ -362,6 +362,28 @@ TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
             stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
 }
 
+// Its thread gets a twelfth of a core: costs are CPU seconds, the limit is one of the clock.
+TEST(StopByTime, AWorkerThatSharesItsCoresEndsInTimeToo) {
+  constexpr double kCpu = .05, kWall = .6;
+  Rig rig;
+  rig.join("w", 1);
+  rig.cpu_seconds = kCpu;
+  rig.wait_seconds = kWall - kCpu;
+  JobPlan plan = plan_of("j", 4, std::nullopt);
+  plan.time = 30;
+  rig.submit(plan);
+  for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
+    rig.now += from_seconds(kWall);
+    rig.render("w");
+    rig.pass(0s);
+  }
+
+  EXPECT_EQ(rig.job().stopped, StopReason::time);
+  // A lease of two CPU seconds would take 24 of the clock, three of them 72.
+  EXPECT_GE(seconds(rig.now.time_since_epoch()), 30 - kWall);
+  EXPECT_LE(seconds(rig.now.time_since_epoch()), 30 + 3 * kWall);
+}
+
 TEST(StopByTime, EveryTileGetsItsFirstRound) {
   Rig rig;
   rig.join("w", 1);

@@ -150,6 +150,7 @@ const Damage kDamages[] = {
     {"result.digest", [](pb::FromWorker& m) { m.mutable_result()->set_digest(std::string(33, 'x')); }, 2},
     {"result.cpu_seconds", [](pb::FromWorker& m) { m.mutable_result()->set_cpu_seconds(1.7e308); }, 2},
     {"result.times.load", [](pb::FromWorker& m) { m.mutable_result()->mutable_times()->set_load(1e13); }, 2},
+    {"result.times.wait", [](pb::FromWorker& m) { m.mutable_result()->mutable_times()->set_wait(-1); }, 2},
     {"result.exr", [](pb::FromWorker& m) { m.mutable_result()->clear_exr(); }, 2},
     {"result.exr",
      [](pb::FromWorker& m) { m.mutable_result()->set_exr(std::string(limits::kPartialBytes + 1, 'x')); }, 2},

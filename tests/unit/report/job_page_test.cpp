@@ -107,7 +107,7 @@ TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
 
 TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
   json report = some_report();
-  for (json& p : report["convergence"]) p["true_relmse"] = .1, p["true_relmse_below_noise"] = false;
+  for (json& p : report["convergence"]) p["true_relmse"] = .1234, p["true_relmse_below_noise"] = false;
   report["convergence"].back()["true_relmse_below_noise"] = true;
   report["reference"] = {{"relmse", 0.}, {"rmse", 0.}, {"below_noise", true}, {"rmse_below_noise", true}, {"same_seed", false}};
 
@@ -117,6 +117,8 @@ TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
 
   EXPECT_EQ(times(page, "<b>below the reference's noise</b>"), 2u);
   EXPECT_EQ(times(page, "<td>below the reference's noise</td>"), 1u);
+  // Not drawn either: in both plots one dot less than there are checkpoints.
+  EXPECT_EQ(times(page, "<title>0.123 at "), 2 * (report["convergence"].size() - 1));
   EXPECT_EQ(times(page, "shares this job"), 0u);
   expect(same, "The reference shares this job&#39;s seed");
 }

@@ -24,7 +24,7 @@ OutlookFacts facts() {
   f.core_to_limit = 30;
   f.target = 1e-3;
   f.elapsed = 2;
-  f.threads = 2;
+  f.cores = 2;
   return f;
 }
 
@@ -72,7 +72,7 @@ TEST(Outlook, IsTheJobsOwnForesightUntilThereArePoints) {
 
 TEST(Outlook, IsNothingWhereNothingIsMeasuredOrNobodyWorks) {
   OutlookFacts f = facts();
-  f.threads = 0;
+  f.cores = 0;
   EXPECT_FALSE(outlook_of(f, points(256)).seconds);
   EXPECT_FALSE(outlook_of({}, {}).seconds);
 }
@@ -80,7 +80,7 @@ TEST(Outlook, IsNothingWhereNothingIsMeasuredOrNobodyWorks) {
 TEST(Outlook, OfTheClockNeedsNoForecast) {
   OutlookFacts f = facts();
   f.time = 2.5;
-  f.threads_with_more = 10;
+  f.cores_with_more = 10;
   const Outlook out = outlook_of(f, points(256));
   EXPECT_EQ(out.seconds, .5);
   EXPECT_FALSE(out.ci95);
@@ -93,7 +93,7 @@ TEST(Outlook, OfTheClockNeedsNoForecast) {
 TEST(Outlook, WithMoreWorkersIsShorterInProportion) {
   OutlookFacts f = facts();
   EXPECT_FALSE(outlook_of(f, points(256)).with_more) << "they would not help";
-  f.threads_with_more = 10;
+  f.cores_with_more = 10;
   const Outlook out = outlook_of(f, points(256));
   EXPECT_DOUBLE_EQ(*out.with_more, *out.seconds / 5);
   EXPECT_DOUBLE_EQ(out.with_more_ci95->second, out.ci95->second / 5);
@@ -104,12 +104,12 @@ TEST(Outlook, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   OutlookFacts f;
   f.core_left = 1.5;
   f.unit_seconds = 1.5 / 4;
-  f.threads = 1;
-  f.threads_with_more = 9;
+  f.cores = 1;
+  f.cores_with_more = 9;
   const Outlook out = outlook_of(f, {});
   EXPECT_DOUBLE_EQ(*out.seconds, 1.5);
   EXPECT_DOUBLE_EQ(out.with_more.value(), 1.5 / 4);
-  f.threads = 4;
+  f.cores = 4;
   EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 1.5 / 4);
   EXPECT_FALSE(outlook_of(f, {}).with_more) << "all four are under way";
 }
@@ -119,11 +119,11 @@ TEST(Outlook, NoMoreThreadsHelpThanUnitsMayBeUnderWayAtOnce) {
   f.core_left = 64;
   f.unit_seconds = 1;
   f.units_at_once = 4;
-  f.threads = 2;
-  f.threads_with_more = 18;
+  f.cores = 2;
+  f.cores_with_more = 18;
   EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 32);
   EXPECT_DOUBLE_EQ(outlook_of(f, {}).with_more.value(), 16);
-  f.threads = 16;
+  f.cores = 16;
   EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, 16);
   EXPECT_FALSE(outlook_of(f, {}).with_more);
 }
@@ -132,18 +132,18 @@ TEST(Outlook, OfThePartOfAUnitThatIsLeftIsThatPart) {
   OutlookFacts f;
   f.core_left = .25;
   f.unit_seconds = 1;
-  f.threads = 8;
+  f.cores = 8;
   EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, .25);
-  f.threads = .5;  // of a worker that it shares with other jobs
+  f.cores = .5;  // of a worker that it shares with other jobs
   EXPECT_DOUBLE_EQ(*outlook_of(f, {}).seconds, .5);
 }
 
-// Each end is on as many threads as help it.
+// Each end is on as many cores as help it.
 TEST(Outlook, AnIntervalHoldsItsMiddleWhereUnitsAreFew) {
   OutlookFacts f = facts();
   f.unit_seconds = 3;
-  f.threads = 16;
-  f.threads_with_more = 32;
+  f.cores = 16;
+  f.cores_with_more = 32;
   const auto forecast = forecast_of(points(256), 1e-3);
   const Outlook out = outlook_of(f, points(256));
   EXPECT_DOUBLE_EQ(*out.seconds, 3) << "of about 7 core seconds";

@@ -24,7 +24,7 @@ std::vector<JobView> with(std::initializer_list<JobState> states) {
 }
 
 JobView whole(const std::vector<JobView>& frames, int threads = 0) {
-  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, threads}, frames);
+  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, static_cast<double>(threads), 1}, frames);
 }
 
 TEST(SequenceView, HasTheStateOfItsFramesTogether) {
@@ -116,6 +116,22 @@ TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
   EXPECT_DOUBLE_EQ(v.eta_seconds.value(), 15);
   EXPECT_DOUBLE_EQ(v.queued_core_seconds, 47);
   EXPECT_FALSE(whole(frames, 0).eta_seconds);
+}
+
+TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
+  auto frames = with({JobState::done, JobState::queued});
+  frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;
+  const auto eta = [&](int cores, int workers) {
+    SequenceFacts facts{{"j-1"}, {1, 2, 1}, {}, 12, static_cast<double>(cores), workers};
+    return sequence_view(facts, frames).eta_seconds.value();
+  };
+
+  EXPECT_DOUBLE_EQ(eta(8, 4), 5);
+  EXPECT_DOUBLE_EQ(eta(1000, 4), 4) << "ten units are left";
+  frames[0].max_workers = 1;  // a sequence's limits stand at its first frame
+  EXPECT_DOUBLE_EQ(eta(8, 4), 20);
+  frames[0].max_units = 1;
+  EXPECT_DOUBLE_EQ(eta(8, 4), 40);
 }
 
 TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {

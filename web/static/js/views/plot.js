@@ -75,7 +75,7 @@ function reading(point, { key, doubt }) {
   return [
     h("span", { key: "t" }, h("b", null, duration(point[key])), ` ${kSince[key]}`),
     h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), within),
-    point.true_relmse > 0 ? h("span", { key: "r", class: "true" }, "against the reference ", h("b", null, figure(point.true_relmse)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
+    Number.isFinite(point.true_relmse) ? h("span", { key: "r", class: "true" }, point.true_relmse_below_noise === true ? "true error " : "against the reference ", h("b", null, trueFigure(point.true_relmse, point.true_relmse_below_noise)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 

@@ -15,7 +15,7 @@ export const boxOf = (narrow) => (narrow ? kNarrow : kWide);
 export function frameOf({ points, key, target, ahead, narrow }) {
   const box = boxOf(narrow);
   const positive = (values) => values.filter((value) => Number.isFinite(value) && value > 0);
-  const errors = positive(points.flatMap((p) => [p.relmse, ...(p.relmse_ci95 ?? []), p.true_relmse, target]));
+  const errors = positive(points.flatMap((p) => [p.relmse, ...(p.relmse_ci95 ?? []), shown(p, "true_relmse"), target]));
   const farthest = kFarthest * points.at(-1)[key];
   const times = positive([points[0][key], points.at(-1)[key], ...(drawn(ahead, farthest) ? [ahead.x, ahead.hi].map((x) => Math.min(x, farthest)) : [])]);
   return {
@@ -24,6 +24,9 @@ export function frameOf({ points, key, target, ahead, narrow }) {
     y: logAxis(Math.min(...errors), Math.max(...errors), box.bottom, box.top),
   };
 }
+
+/** What a reference cannot tell, since it is below its own noise, is not drawn. */
+const shown = (point, name) => (name === "true_relmse" && point.true_relmse_below_noise === true ? null : point[name]);
 
 const drawn = (ahead, farthest) => ahead && ahead.x < farthest;
 
@@ -60,7 +63,7 @@ function band(points, key, { x, y }) {
 }
 
 function line(points, key, name, className, { x, y }) {
-  const known = points.filter((p) => p[name] > 0);
+  const known = points.filter((p) => shown(p, name) > 0);
   return known.length < 2 ? null : h("polyline", { class: className, points: known.map((p) => `${x.at(p[key])},${y.at(p[name])}`).join(" ") });
 }
 
