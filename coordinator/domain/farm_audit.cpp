@@ -69,8 +69,6 @@ std::string audit_load(const std::string& whose, const Load& kept, const Load& c
   return "";
 }
 
-std::uint32_t tighter(std::uint32_t a, std::uint32_t b) { return a == 0 || b == 0 ? a + b : std::min(a, b); }
-
 // What is lent of each job, group and user, as the leases say.
 struct Lent {
   std::map<JobSeq, Load> jobs;
@@ -143,6 +141,7 @@ std::string Farm::audit() const {
   State& state = *state_;
   std::map<WorkerIndex, std::uint32_t> units_out;
   int threads = 0;
+  double cores = 0;
   for (const auto& [seq, lease] : state.leases.all()) {
     if (std::string wrong = audit_lease(lease, State::has); !wrong.empty()) return wrong;
     units_out[lease.worker->index] += lease.remaining;
@@ -152,6 +151,7 @@ std::string Farm::audit() const {
   }
   for (const auto& [index, worker] : state.workers.all()) {
     threads += worker->connected ? worker->threads : 0;
+    cores += worker->connected ? worker->cores() : 0;
     if (worker->units_out != units_out[index])
       return "worker " + worker->id.value + ": its load is counted wrong";
     if (!worker->available() || worker->covered() || !worker->wants_more()) continue;
@@ -170,6 +170,8 @@ std::string Farm::audit() const {
   if (wrong.empty())
     wrong = audit_loads("group", state.groups, lent.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
+  // The book adds and subtracts as workers come, go and are measured: some 2^-52 of the farm's threads are lost each time.
+  if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }
 

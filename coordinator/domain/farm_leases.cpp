@@ -103,10 +103,7 @@ void Farm::State::leave_load(Job& job, const Worker& worker) {
   if (!job.plan.group.empty() && leave(groups[job.plan.group])) groups.erase(job.plan.group);
 }
 
-namespace {
-// The smaller of two limits, where 0 is none.
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b) { return a == 0 || b == 0 ? a + b : std::min(a, b); }
-}  // namespace
 
 bool Farm::State::limited(const Job& job) const {
   const ShareLimits& l = options.limits;

@@ -214,11 +214,7 @@ bool Farm::may_pin(const JobId& id, const WorkerId& worker) const {
   return job != nullptr && known != nullptr && state_->may_pin(*job, *known);
 }
 
-double Farm::cores_connected() const {
-  double cores = 0;
-  for (const auto& [index, worker] : state_->workers.all()) cores += worker->connected ? worker->cores() : 0;
-  return cores;
-}
+double Farm::cores_connected() const { return state_->workers.cores(); }
 int Farm::workers_connected() const { return state_->workers.connected(); }
 
 }  // namespace ls::coordinator

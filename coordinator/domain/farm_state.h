@@ -16,6 +16,9 @@
 
 namespace ls::coordinator {
 
+// The smaller of two limits, where 0 is none.
+std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
+
 struct Farm::State {
   explicit State(Options given) : options(std::move(given)), leases(options.lease_prefix) {}
 

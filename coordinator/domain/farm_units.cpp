@@ -41,7 +41,7 @@ void Farm::State::on(const UnitAccepted& event) {
   charge(job, event.cpu_seconds);
   if (worker != nullptr) {
     ++worker->units_done;
-    worker->core_share.measured(event.cpu_seconds, event.wait_seconds);
+    workers.measured(*worker, event.cpu_seconds, event.wait_seconds);
     if (worker->connected) worker->warmed_up.insert(job.seq);
   }
   consider_audit(job, code, workers.index_of(event.worker));

@@ -18,6 +18,7 @@ inline constexpr std::uint32_t kMaxTiles = 1u << 22;
 
 // ---- leases ----
 inline constexpr double kLeaseSeconds = 2.0;  // that a lease should keep all threads of a worker busy
+inline constexpr double kLeastCoreShare = 1.0 / 64;  // of a core that a worker's thread is taken to have, at least
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;     // keeps an assignment well below 1 MiB
 inline constexpr std::uint32_t kLeasesPerWorker = 3;      // one being rendered, two ahead
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // at a job's tail leases are single units
@@ -36,7 +37,6 @@ inline constexpr std::uint32_t kSpeculationScan = 64;  // oldest leases looked a
 // ---- whose turn it is ----
 inline constexpr double kMostUnitSeconds = 86400;   // what a result reports beyond is not believed
 inline double believed_seconds(double reported) { return reported >= 0 && reported <= kMostUnitSeconds ? reported : 0; }
-inline constexpr double kLeastCoreShare = 1.0 / 64;  // of a core that a worker's thread is taken to have, at least
 inline constexpr double kAssumedUnitSeconds = 1.0;  // charged for a unit of a job of which nothing is measured
 // So much longer than fair all threads may go on with jobs whose world they hold before they load another.
 inline constexpr double kLocalitySeconds = 5.0;

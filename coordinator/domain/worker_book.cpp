@@ -69,8 +69,15 @@ void WorkerBook::connected(Worker& worker, bool yes) {
   worker.connected = yes;
   threads_ += yes ? worker.threads : -worker.threads;
   connected_ += yes ? 1 : -1;
+  cores_ = connected_ > 0 ? cores_ + (yes ? worker.cores() : -worker.cores()) : 0;
   if (worker.barred) return;
   yes ? ++classes_[worker.numeric_class] : --classes_[worker.numeric_class];
+}
+
+void WorkerBook::measured(Worker& worker, double cpu_seconds, double wait_seconds) {
+  const double before = worker.cores();
+  worker.core_share.measured(cpu_seconds, wait_seconds);
+  if (worker.connected) cores_ += worker.cores() - before;
 }
 
 void WorkerBook::bar(Worker& worker) {

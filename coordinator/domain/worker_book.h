@@ -96,8 +96,10 @@ class WorkerBook {
 
   const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
   int threads() const { return threads_; }  // of connected workers
+  double cores() const { return cores_; }   // theirs, to rounding: threads, by the core that each gets
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
+  void measured(Worker& worker, double cpu_seconds, double wait_seconds);  // core_share.h
   void bar(Worker& worker);
   std::uint32_t of_class(const Digest& numeric_class) const;  // connected ones that are not barred
 
@@ -109,6 +111,7 @@ class WorkerBook {
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> hungry_;
   int threads_ = 0, connected_ = 0;
+  double cores_ = 0;
   std::map<Digest, std::uint32_t> classes_;
 };
 

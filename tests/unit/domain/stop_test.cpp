@@ -248,6 +248,15 @@ TEST(Adaptive, FewUnitsAreRenderedInVain) {
   EXPECT_LE(rendered, rig.job().units_folded * 115 / 100) << "the end is foreseen";
 }
 
+// One unit after the other, each in so many seconds of the clock, with a tick behind each.
+void render_all_of_w(Rig& rig, double unit_seconds) {
+  for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
+    rig.now += from_seconds(unit_seconds);
+    rig.render("w");
+    rig.pass(0s);
+  }
+}
+
 TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
   constexpr double kUnit = 0.05;
   Rig rig;
@@ -256,11 +265,7 @@ TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
   JobPlan plan = plan_of("j", 4, std::nullopt);
   plan.time = 3;
   rig.submit(plan);
-  for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
-    rig.now += from_seconds(kUnit);
-    rig.render("w");
-    rig.pass(0s);
-  }
+  render_all_of_w(rig, kUnit);
 
   EXPECT_EQ(rig.job().stopped, StopReason::time);
   // A lease of the usual length would end two seconds later.
@@ -307,11 +312,7 @@ TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
     JobPlan plan = plan_of("j", 11, 4096);  // rounds 0 and 1, of 2 samples each, take 22 s
     plan.time = time;
     rig.submit(plan);
-    for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
-      rig.now += from_seconds(1);
-      rig.render("w");
-      rig.pass(0s);
-    }
+    render_all_of_w(rig, 1);
 
     EXPECT_EQ(rig.job().stopped, StopReason::time);
     EXPECT_EQ(rig.job().units_folded, rig.job().units_total);
@@ -371,11 +372,7 @@ TEST(StopByTime, AWorkerThatSharesItsCoresEndsInTimeToo) {
   JobPlan plan = plan_of("j", 4, std::nullopt);
   plan.time = 30;
   rig.submit(plan);
-  for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
-    rig.now += from_seconds(kWall);
-    rig.render("w");
-    rig.pass(0s);
-  }
+  render_all_of_w(rig, kWall);
 
   EXPECT_EQ(rig.job().stopped, StopReason::time);
   EXPECT_NEAR(seconds(rig.now.time_since_epoch()), 30, 3 * kWall) << "a lease of two CPU seconds would take 24";

@@ -187,7 +187,8 @@ void Walk::render(const std::string& name) {
                          unit.unit.samples,
                          pixels(name, unit.key(), unit.unit.samples),
                          {name},
-                         0.001 * static_cast<double>(1 + pick(500))});
+                         0.001 * static_cast<double>(1 + pick(500)),
+                         0.001 * static_cast<double>(pick(5000))});
 }
 
 // kill -9: what was stored is all that is left. Streams break; workers keep what they hold.

@@ -23,8 +23,8 @@ std::vector<JobView> with(std::initializer_list<JobState> states) {
   return all;
 }
 
-JobView whole(const std::vector<JobView>& frames, int threads = 0) {
-  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, static_cast<double>(threads), 1}, frames);
+JobView whole(const std::vector<JobView>& frames, double cores = 0) {
+  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, cores, 1}, frames);
 }
 
 TEST(SequenceView, HasTheStateOfItsFramesTogether) {
@@ -121,8 +121,8 @@ TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
 TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
   auto frames = with({JobState::done, JobState::queued});
   frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;
-  const auto eta = [&](int cores, int workers) {
-    SequenceFacts facts{{"j-1"}, {1, 2, 1}, {}, 12, static_cast<double>(cores), workers};
+  const auto eta = [&](double cores, int workers) {
+    SequenceFacts facts{{"j-1"}, {1, 2, 1}, {}, 12, cores, workers};
     return sequence_view(facts, frames).eta_seconds.value();
   };
 
