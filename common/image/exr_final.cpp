@@ -18,6 +18,7 @@ namespace ls {
 namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
+constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
   return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
@@ -33,6 +34,11 @@ Result<void> check_layers(const Imf::Header& header, const std::string& name, Fi
   const Imf::Channel* spp = header.channels().findChannel("spp");
   if (!spp || spp->type != Imf::UINT || spp->xSampling != 1 || spp->ySampling != 1)
     return bad(name, "it has no layer spp of integers");
+  for (const char* error : kErrors) {
+    const Imf::Channel* channel = header.channels().findChannel(error);
+    if (!channel || channel->type != Imf::FLOAT || channel->xSampling != 1 || channel->ySampling != 1)
+      return bad(name, fmt::format("it has no layer {} of floats", error));
+  }
   return {};
 }
 
@@ -44,12 +50,17 @@ void read_pixels(Imf::InputFile& file, FinalPicture& image) {
     const int rows = std::min(kBand, image.size.height - y0);
     const std::size_t first = image.spp.size(), pixels = width * static_cast<std::size_t>(rows);
     image.rgb.resize(3 * (first + pixels));
+    image.error.resize(3 * (first + pixels));
     image.spp.resize(first + pixels);
     Imf::FrameBuffer buffer;
-    for (std::size_t c = 0; c < 3; ++c)
-      buffer.insert(kColours[c],
-                    Imf::Slice::Make(Imf::FLOAT, &image.rgb[3 * first + c], {0, y0}, image.size.width, rows,
-                                     3 * sizeof(float), 3 * sizeof(float) * width));
+    const auto insert = [&](const char* layer, float* to) {
+      buffer.insert(layer, Imf::Slice::Make(Imf::FLOAT, to, {0, y0}, image.size.width, rows, 3 * sizeof(float),
+                                            3 * sizeof(float) * width));
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      insert(kColours[c], &image.rgb[3 * first + c]);
+      insert(kErrors[c], &image.error[3 * first + c]);
+    }
     buffer.insert("spp", Imf::Slice::Make(Imf::UINT, &image.spp[first], {0, y0}, image.size.width, rows));
     file.setFrameBuffer(buffer);
     file.readPixels(y0, y0 + rows - 1);

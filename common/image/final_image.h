@@ -62,6 +62,7 @@ inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
 struct FinalPicture {
   FrameSize size;
   std::vector<float> rgb;          // interleaved, row by row, as stored
+  std::vector<float> error;        // stderr.R, G, B, likewise
   std::vector<std::uint32_t> spp;  // samples of each pixel
   bool half = false;               // colours are stored as halves
   std::map<std::string, std::string> strings;

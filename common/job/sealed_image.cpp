@@ -91,6 +91,7 @@ Result<SealedImage> read_sealed_image(std::span<const std::byte> exr, const std:
   if (const auto ok = read_settings(*picture, name, image); !ok) return tl::unexpected(ok.error());
   if (const auto ok = read_tiles(*picture, name, image); !ok) return tl::unexpected(ok.error());
   image.rgb = std::move(picture->rgb);
+  image.error = std::move(picture->error);
   image.spp = std::move(picture->spp);
   return image;
 }
@@ -115,14 +116,18 @@ Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile) {
   return first;
 }
 
-std::optional<std::pair<int, int>> first_difference(const SealedImage& image, const TilePixels& tile) {
+std::optional<PixelDifference> first_difference(const SealedImage& image, const TilePixels& tile) {
   std::size_t from = 0;
   for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
     for (int x = tile.rect.x0; x < tile.rect.x1; ++x, from += 3) {
       const std::size_t at = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
                                   static_cast<std::size_t>(x));
-      for (std::size_t c = 0; c < 3; ++c)
-        if (!(image.rgb[at + c] == stored(tile.mean[from + c], image.half))) return std::pair(x, y);
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (!(image.rgb[at + c] == stored(tile.mean[from + c], image.half)))
+          return PixelDifference{x, y, "colour"};
+        if (!(image.error[at + c] == static_cast<float>(tile.standard_error[from + c])))
+          return PixelDifference{x, y, "standard error"};
+      }
     }
   }
   return std::nullopt;

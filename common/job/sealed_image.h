@@ -7,7 +7,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/base/digest.h"
@@ -22,6 +21,7 @@ namespace ls {
 struct SealedImage {
   FrameSize size;
   std::vector<float> rgb;          // interleaved, row by row, as stored
+  std::vector<float> error;        // standard errors of those, likewise
   std::vector<std::uint32_t> spp;  // samples of each pixel
   bool half = false;               // colours are stored as halves
   Digest scene, numeric_class;
@@ -38,7 +38,12 @@ Result<SealedImage> read_sealed_image(std::span<const std::byte> exr, const std:
 // How many samples the tile's pixels say they have. invalid_argument: they do not agree.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The first pixel of the tile whose colour is not that of the film, as final_exr() would store it.
-std::optional<std::pair<int, int>> first_difference(const SealedImage& image, const TilePixels& tile);
+// The first pixel of the tile whose colour, or else its standard error, is not that of the film, as final_exr()
+// would store it.
+struct PixelDifference {
+  int x = 0, y = 0;
+  std::string what;  // "colour" or "standard error"
+};
+std::optional<PixelDifference> first_difference(const SealedImage& image, const TilePixels& tile);
 
 }  // namespace ls

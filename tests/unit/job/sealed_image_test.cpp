@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <tuple>
 
 #include "common/image/exr_file.h"
 #include "tests/unit/image/support.h"
@@ -73,7 +74,21 @@ TEST(SealedImage, FindsTheFirstPixelThatIsNotOfItsSamples) {
   float& green = image.rgb[3 * (y * 25 + x) + 1];
   green = std::nextafter(green, 1e9f);
 
-  EXPECT_EQ(first_difference(image, film.pixels(5)), std::pair(x, y));
+  const auto found = first_difference(image, film.pixels(5));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(std::tuple(found->x, found->y, found->what), std::tuple(x, y, "colour"));
+  EXPECT_FALSE(first_difference(image, film.pixels(3)));
+}
+
+TEST(SealedImage, FindsTheFirstStandardErrorThatIsNotOfItsSamples) {
+  const Film film = make_film(kGrid, 6);
+  auto image = read_sealed_image(sealed(film, false), "image.exr").value();
+  const int x = 12, y = 10;  // of tile 5
+  image.error[3 * (y * 25 + x) + 2] /= 2;
+
+  const auto found = first_difference(image, film.pixels(5));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(std::tuple(found->x, found->y, found->what), std::tuple(x, y, "standard error"));
   EXPECT_FALSE(first_difference(image, film.pixels(3)));
 }
 
@@ -111,6 +126,8 @@ TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
   for (const char* c : {"R", "G", "B"}) other.channels[c] = ExrFloat{std::vector<float>(4, 1.f)};
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("no layer spp"));
   other.channels["spp"] = ExrUint{std::vector<std::uint32_t>(4, 2)};
+  EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("no layer stderr.R"));
+  for (const char* c : {"stderr.R", "stderr.G", "stderr.B"}) other.channels[c] = ExrFloat{std::vector<float>(4)};
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("only images that Lightshaft has finished"));
 }
 
