@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::uint64_t kMostSeeds = 100;
 
-struct Flags {
+struct CompareFlags {
   std::vector<std::string> scenes, integrators, programs, reference, defines;
   std::string time, spp, seeds, first_seed, threads, size, references, report, clock = "wall";
   bool strict = false, quiet = false;
@@ -37,7 +37,7 @@ Result<void> take(const char* name, const std::string& text, std::uint64_t least
   return {};
 }
 
-Result<void> take_numbers(const Flags& flags, CompareOptions& options) {
+Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   const auto time = parse_positive("--time", flags.time, kMaxSeconds);
   if (!time) return tl::unexpected(time.error());
   options.conditions.time = *time;
@@ -61,7 +61,7 @@ Result<void> take_numbers(const Flags& flags, CompareOptions& options) {
 
 tl::unexpected<Error> wrong(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
 
-Result<void> take_programs(const Flags& flags, CompareOptions& options) {
+Result<void> take_programs(const CompareFlags& flags, CompareOptions& options) {
   for (const std::string& file : flags.programs) {
     auto adapter = race::read_adapter(file);
     if (!adapter) return wrong("--program: " + adapter.error().message);
@@ -75,7 +75,7 @@ Result<void> take_programs(const Flags& flags, CompareOptions& options) {
   return {};
 }
 
-Result<void> take_reference(const Flags& flags, CompareOptions& options) {
+Result<void> take_reference(const CompareFlags& flags, CompareOptions& options) {
   if (flags.reference.size() > 2)
     return wrong("--reference: one picture, or two that are independent of each other");
   if (!flags.reference.empty() && flags.scenes.size() > 1)
@@ -102,7 +102,7 @@ Result<void> make_folder(const std::filesystem::path& folder) {
   return check_folder("--report", folder);
 }
 
-Result<CompareOptions> options_of(const Flags& flags) {
+Result<CompareOptions> options_of(const CompareFlags& flags) {
   CompareOptions options;
   options.scenes = flags.scenes;
   options.integrators = flags.integrators;
@@ -152,7 +152,7 @@ void warn_if_busy(const CompareOptions& options) {
         load));
 }
 
-int run(const Flags& flags) {
+int run(const CompareFlags& flags) {
   std::atomic<bool> stop{false};  // outlives the thread that sets it
   Interrupt interrupt;
   auto options = options_of(flags);
@@ -182,7 +182,7 @@ int run(const Flags& flags) {
   return failed ? kFailed : kOk;
 }
 
-void add_options(CLI::App& compare, const std::shared_ptr<Flags>& flags) {
+void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) {
   compare.add_option("scenes", flags->scenes, "one scene, or a set")->required()->type_name("SCENE...");
   compare.add_option("--integrators", flags->integrators, "ours that race; default: the scene's")
       ->delimiter(',')
@@ -227,7 +227,7 @@ void add_options(CLI::App& compare, const std::shared_ptr<Flags>& flags) {
 }  // namespace
 
 void add_compare(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<CompareFlags>();
   CLI::App* compare = app.add_subcommand(
       "compare", "race integrators and other programs: error against time, with intervals");
   add_options(*compare, flags);

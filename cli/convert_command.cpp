@@ -14,13 +14,13 @@
 namespace ls::cli {
 namespace {
 
-struct Flags {
+struct ConvertFlags {
   std::string in, out;
   std::vector<std::string> defines;
   bool strict = false, quiet = false;
 };
 
-int run(const Flags& flags) {
+int run(const ConvertFlags& flags) {
   const auto defines = parse_defines(flags.defines);
   if (!defines) return say_error(defines.error());
   if (const auto ok = check_output("OUT", flags.out); !ok) return say_error(ok.error());
@@ -45,7 +45,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_convert(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ConvertFlags>();
   CLI::App* convert = app.add_subcommand("convert",
                                          "write a scene as canonical Mitsuba 3 XML. Its files are copied to "
                                          "OUT's folder under the names that the scene "

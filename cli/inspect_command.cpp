@@ -15,7 +15,7 @@
 namespace ls::cli {
 namespace {
 
-struct Flags {
+struct InspectFlags {
   std::string scene, frame;
   std::vector<std::string> defines;
   bool json = false, strict = false, variants = false, work = false;
@@ -68,7 +68,7 @@ tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
 #endif
 }
 
-int run(const Flags& flags) {
+int run(const InspectFlags& flags) {
   JobSpec spec;
   auto defines = parse_defines(flags.defines);
   if (!defines) return say_error(defines.error());
@@ -106,7 +106,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_inspect(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<InspectFlags>();
   CLI::App* inspect =
       app.add_subcommand("inspect", "read and check a scene without rendering; say what it needs");
   inspect->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct MergeFlags {
   std::vector<std::string> partials, defines;
   std::string out, report, scene;
   std::optional<std::uint32_t> frame;
@@ -50,7 +50,7 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments
   return files;
 }
 
-Result<void> write_report(const Flags& flags, const Merged& merged, const std::string& digest,
+Result<void> write_report(const MergeFlags& flags, const Merged& merged, const std::string& digest,
                           std::uint64_t clamped) {
   const FrameSize size = merged.film.grid().frame;
   const ImageError error = image_error(merged.film.error());
@@ -85,7 +85,7 @@ bool is_of(const Scene& scene, const Digest& digest) {
 }
 
 // Partials bear numbers alone; the names behind the mattes' numbers are the scene's.
-tl::expected<MatteManifests, coordinator::Rejected> manifests(const Flags& flags, const Merged& merged) {
+tl::expected<MatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags, const Merged& merged) {
   const AovSet aovs = merged.film.aovs();
   const auto defines = parse_defines(flags.defines);
   if (!defines) return tl::unexpected(coordinator::Rejected{defines.error(), {}});
@@ -102,7 +102,7 @@ tl::expected<MatteManifests, coordinator::Rejected> manifests(const Flags& flags
   return coordinator::manifests_of(scene->scene, aovs);
 }
 
-int run(const Flags& flags) {
+int run(const MergeFlags& flags) {
   if (const auto ok = check_output("-o", flags.out); !ok) return say_error(ok.error());
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return say_error(ok.error());
@@ -139,7 +139,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_merge(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<MergeFlags>();
   CLI::App* merge =
       app.add_subcommand("merge", "fold partial images into the final one, exactly as the coordinator does");
   merge->add_option("partials", flags->partials, "partial images, or folders of them")

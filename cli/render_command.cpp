@@ -16,7 +16,7 @@
 namespace ls::cli {
 namespace {
 
-struct Flags {
+struct RenderFlags {
   std::string scene, out, threads, pixel, sample, reference, report, html, partial_dir;
   JobOptions job;
   bool isolate = false, quiet = false;
@@ -26,7 +26,7 @@ std::optional<std::filesystem::path> path_of(const std::string& text) {
   return text.empty() ? std::nullopt : std::optional<std::filesystem::path>(text);
 }
 
-Result<LocalRenderOptions> options_of(const Flags& flags) {
+Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   LocalRenderOptions options;
   auto spec = flags.job.parse();
   if (!spec) return tl::unexpected(spec.error());
@@ -50,7 +50,7 @@ Result<LocalRenderOptions> options_of(const Flags& flags) {
   return options;
 }
 
-int replay(const Flags& flags, const LocalScene& scene, const LocalRenderOptions& options) {
+int replay(const RenderFlags& flags, const LocalScene& scene, const LocalRenderOptions& options) {
   if (flags.pixel.empty() || flags.sample.empty())
     return usage_error("--pixel and --sample belong together: one sample of one pixel");
   const auto pixel = parse_pixel(flags.pixel);
@@ -60,7 +60,7 @@ int replay(const Flags& flags, const LocalScene& scene, const LocalRenderOptions
   return replay_sample(scene, options.spec, options.threads, *pixel, *sample);
 }
 
-int run(const Flags& flags) {
+int run(const RenderFlags& flags) {
   const auto options = options_of(flags);
   if (!options) return say_error(options.error());
   const bool one_sample = !flags.pixel.empty() || !flags.sample.empty();
@@ -84,7 +84,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_render(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<RenderFlags>();
   CLI::App* render = app.add_subcommand("render", "render a scene on this machine");
   render->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
   render

@@ -21,7 +21,7 @@ LocalRenderOptions of_frame(const LocalRenderOptions& options, std::uint32_t fra
   return o;
 }
 
-Result<void> check_outputs(const FrameRange& frames, const LocalRenderOptions& options) {
+Result<void> check_frames_outputs(const FrameRange& frames, const LocalRenderOptions& options) {
   const auto check = [&](const char* option, const std::filesystem::path& path,
                          bool is_file) -> Result<void> {
     if (auto ok = check_numbered(option, path.string(), frames); !ok) return ok;
@@ -41,7 +41,7 @@ Result<void> check_outputs(const FrameRange& frames, const LocalRenderOptions& o
 }  // namespace
 
 int render_sequence(const std::string& path, const FrameRange& frames, const LocalRenderOptions& options) {
-  if (const auto ok = check_outputs(frames, options); !ok) return say_error(ok.error());
+  if (const auto ok = check_frames_outputs(frames, options); !ok) return say_error(ok.error());
   auto reader = SceneReader::open(path, options.spec.defines, options.strict);
   if (!reader) return say_rejected(reader.error());
   if (const auto all = reader->read_all(frames); !all) return say_rejected(all.error());

@@ -17,7 +17,7 @@
 namespace ls::cli {
 namespace {
 
-struct Flags {
+struct SubmitFlags {
   std::string scene, out, report, html, reference;
   JobOptions job;
   FarmOptions farm;
@@ -27,7 +27,7 @@ struct Flags {
 using Job = FarmApi::Answer<FarmApi::Json>;
 
 // Here first: what is wrong with the scene is told before anything is sent.
-Job submit_scene(const Flags& flags, const JobSpec& spec) {
+Job submit_scene(const SubmitFlags& flags, const JobSpec& spec) {
   auto reader = SceneReader::open(flags.scene, spec.defines, flags.job.strict);
   if (!reader) return tl::unexpected(reader.error());
   const auto scene = spec.frames ? reader->read_all(*spec.frames) : reader->read({});
@@ -40,7 +40,7 @@ Job submit_scene(const Flags& flags, const JobSpec& spec) {
   });
 }
 
-Job submit_bundle(const Flags& flags, const JobSpec& spec, const std::string& type) {
+Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::string& type) {
   const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
   if (flags.job.strict)
     return refuse(
@@ -58,7 +58,7 @@ Job submit_bundle(const Flags& flags, const JobSpec& spec, const std::string& ty
   return job;
 }
 
-int wait_and_fetch(const std::string& id, const Flags& flags) {
+int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   auto api = FarmApi::open(flags.farm);
   if (!api) return say_error(api.error());
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
@@ -68,7 +68,7 @@ int wait_and_fetch(const std::string& id, const Flags& flags) {
 }
 
 // Sent before the job that names it.
-FarmApi::Answer<void> send_reference(const Flags& flags, JobSpec& spec) {
+FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
   const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
   if (spec.frames && spec.frames->count() > 1)
     return refuse({Errc::invalid_argument,
@@ -83,7 +83,7 @@ FarmApi::Answer<void> send_reference(const Flags& flags, JobSpec& spec) {
   return {};
 }
 
-int run(const Flags& flags) {
+int run(const SubmitFlags& flags) {
   auto spec = flags.job.parse();
   if (!spec) return say_error(spec.error());
   for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report),
@@ -106,7 +106,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_submit(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<SubmitFlags>();
   CLI::App* submit =
       app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
   submit

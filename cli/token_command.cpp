@@ -12,15 +12,15 @@ namespace {
 
 using nlohmann::json;
 
-struct Flags {
+struct TokenFlags {
   FarmOptions farm;
   std::string role, user, id;
 };
-using Run = int (*)(FarmApi& api, const Flags& flags);
+using Run = int (*)(FarmApi& api, const TokenFlags& flags);
 
 std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
 
-int add_token(FarmApi& api, const Flags& flags) {
+int add_token(FarmApi& api, const TokenFlags& flags) {
   json body{{"role", flags.role}};
   if (!flags.user.empty()) body["user"] = flags.user;
   const auto made = api.post("/api/v1/tokens", body);
@@ -29,14 +29,14 @@ int add_token(FarmApi& api, const Flags& flags) {
   return kOk;
 }
 
-int list_tokens(FarmApi& api, const Flags& flags) {
+int list_tokens(FarmApi& api, const TokenFlags& flags) {
   const auto answer = api.get("/api/v1/tokens");
   if (!answer) return say_rejected(answer.error());
   print(flags.farm.json ? dump(*answer) : tokens_table(*answer));
   return kOk;
 }
 
-int revoke_token(FarmApi& api, const Flags& flags) {
+int revoke_token(FarmApi& api, const TokenFlags& flags) {
   if (flags.id.find_first_not_of("0123456789abcdef") != std::string::npos)
     return usage_error(fmt::format("'{}' is no token's id: `lightshaft token list` prints them", flags.id));
   const auto done = api.remove("/api/v1/tokens/" + flags.id);
@@ -44,7 +44,7 @@ int revoke_token(FarmApi& api, const Flags& flags) {
 }
 
 CLI::App* add(CLI::App& parent, Action& action, const char* name, const char* help, Run run,
-              const std::shared_ptr<Flags>& flags) {
+              const std::shared_ptr<TokenFlags>& flags) {
   CLI::App* command = parent.add_subcommand(name, help);
   flags->farm.add_to(*command);
   command->callback([flags, run, &action] {
@@ -61,7 +61,7 @@ CLI::App* add(CLI::App& parent, Action& action, const char* name, const char* he
 void add_tokens(CLI::App& app, Action& action) {
   CLI::App* token = app.add_subcommand("token", "who may use a farm: for its admin");
   token->require_subcommand(1);
-  auto adding = std::make_shared<Flags>();
+  auto adding = std::make_shared<TokenFlags>();
   CLI::App* add_command =
       add(*token, action, "add", "makes a token and prints it; it is kept nowhere else", add_token, adding);
   add_command
@@ -71,8 +71,8 @@ void add_tokens(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"submit", "read", "join", "admin"}));
   add_command->add_option("--user", adding->user, "whose it is: owner of the jobs handed in with it")
       ->type_name("NAME");
-  add(*token, action, "list", "the tokens, without their secrets", list_tokens, std::make_shared<Flags>());
-  auto revoking = std::make_shared<Flags>();
+  add(*token, action, "list", "the tokens, without their secrets", list_tokens, std::make_shared<TokenFlags>());
+  auto revoking = std::make_shared<TokenFlags>();
   add(*token, action, "revoke", "makes a token worthless, at once", revoke_token, revoking)
       ->add_option("id", revoking->id, "its id, as `list` prints it")
       ->required()

@@ -15,14 +15,14 @@
 namespace ls::cli {
 namespace {
 
-struct Flags {
+struct ValidateFlags {
   std::string file, json, only;
   std::uint64_t seed = 0;
   int threads = 0;
   bool strict = false, quick = false;
 };
 
-int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, const Flags& flags) {
+int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, const ValidateFlags& flags) {
   if (lines.empty()) return usage_error(fmt::format("--case {}: there is no such case", flags.only));
   std::size_t failed = 0;
   for (const ValidateCase& c : lines) failed += c.passed() ? 0 : 1;
@@ -46,7 +46,7 @@ nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vec
   return json;
 }
 
-int run_table(const Flags& flags) {
+int run_table(const ValidateFlags& flags) {
   cases::RunOptions options;
   options.threads = flags.threads > 0 ? flags.threads : worker::usable_cpus();
   options.seed = flags.seed;
@@ -59,7 +59,7 @@ int run_table(const Flags& flags) {
   return report(lines, table_with_rows(table, lines, flags.quick), flags);
 }
 
-int run_file(const Flags& flags) {
+int run_file(const ValidateFlags& flags) {
   auto local = read_local_test(flags.file, flags.strict);
   if (!local) return say_rejected(local.error());
   say_diagnostics(local->warnings);
@@ -77,7 +77,7 @@ int run_file(const Flags& flags) {
   return report(*lines, table_json(*lines), flags);
 }
 
-int run(const Flags& flags) {
+int run(const ValidateFlags& flags) {
   if (!flags.json.empty())
     if (const auto ok = check_output("--json", flags.json); !ok) return say_error(ok.error());
   if (flags.file.empty()) return run_table(flags);
@@ -89,7 +89,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_validate(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ValidateFlags>();
   CLI::App* validate = app.add_subcommand(
       "validate",
       "check the renderer against known answers: stiff and extreme cases, or the tests of a Nori file "

@@ -27,7 +27,7 @@ namespace {
 
 constexpr std::uint64_t kDefaultTiles = 4;
 
-struct Flags {
+struct VerifyFlags {
   std::string image, scene, frame, tiles, seed;
   std::vector<std::string> defines;
   int threads = 0;
@@ -41,7 +41,7 @@ Result<SealedImage> open_image(const std::string& path) {
 }
 
 // What must be equal before anything can be: the scene and the arithmetic.
-Result<void> check_same(const SealedImage& image, const LocalScene& scene, const Flags& flags) {
+Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return fail(
         Errc::invalid_argument,
@@ -116,7 +116,7 @@ struct Numbers {
   std::uint64_t tiles = kDefaultTiles, seed = 0;
   std::optional<std::uint32_t> frame;
 };
-Result<Numbers> numbers_of(const Flags& flags) {
+Result<Numbers> numbers_of(const VerifyFlags& flags) {
   Numbers n;
   n.seed = std::random_device{}();
   const auto read = [](const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
@@ -138,7 +138,7 @@ Result<Numbers> numbers_of(const Flags& flags) {
   return n;
 }
 
-int run(const Flags& flags) {
+int run(const VerifyFlags& flags) {
   std::atomic<bool> stop{false};  // outlives the thread that sets it
   Interrupt interrupt;
   interrupt.on_signal([&] { stop = true; });
@@ -175,7 +175,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_verify(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<VerifyFlags>();
   CLI::App* verify = app.add_subcommand(
       "verify",
       "render random tiles of a finished image again and compare them with the digests sealed in it");

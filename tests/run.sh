@@ -31,7 +31,7 @@ build() {  # preset, targets...
 # Each GoogleTest case counts: the binaries' own summaries are added up. (--output-on-failure would print failing ones twice.)
 run_ctest() {  # preset, label, log name
   local log="$logs/$3.log"
-  ctest --preset "$1" -L "$2" --verbose >"$log" 2>&1
+  ctest --preset "$1" -L "$2" --verbose -j "$(nproc)" >"$log" 2>&1
   local rc=$?
   # ctest -V prefixes lines with the test's number.
   local p f s

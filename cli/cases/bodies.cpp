@@ -68,7 +68,7 @@ void mean_way_through_a_cube(Table& t) {
 
 // A ball of albedo 1 - 1e-7 that gives off its absorption coefficient times 1e6: its light is the mean way,
 // 4/3, times that coefficient, 1.6 x 1e-6. An albedo that goes through float32 is off by a fifth of 1e-7.
-void all_but_white(Table& t) {
+void bodies_all_but_white(Table& t) {
   constexpr double kDepth = 16, kAbsorbed = 1e-7, kSource = 1e6;
   for (const Way& way : all_ways())
     t.mean("N16-light-of-an-albedo-of-1-less-1e-7" + way.name(), "N16 7.6d",
@@ -101,7 +101,7 @@ void all_but_white(Table& t) {
 
 void add_bodies(Table& t) {
   mean_way_through_a_cube(t);
-  all_but_white(t);
+  bodies_all_but_white(t);
 }
 
 }  // namespace ls::cases

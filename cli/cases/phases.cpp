@@ -12,7 +12,7 @@ namespace {
 
 // Towards a light straight ahead, seen from there: light travels against the view, so that what arrives is
 // scattered by 0 degrees. 4 pi p(0) = (1 + g) / (1 - g)^2, 1.9999e8 at g = .9999.
-void peaks(Table& t) {
+void phase_peaks(Table& t) {
   const auto add = [&](const std::string& id, const char* rows, const Way& way, double g) {
     t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
            [=] { return head_on(way, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
@@ -103,7 +103,7 @@ void slabs(Table& t) {
 }  // namespace
 
 void add_phases(Table& t) {
-  peaks(t);
+  phase_peaks(t);
   cones(t);
   small_and_forbidden(t);
   slabs(t);

@@ -31,10 +31,12 @@ double seconds_of(const timeval& t) {
 
 double cpu_seconds(int whose) {
   rusage usage{};
-  return ::getrusage(whose, &usage) == 0 ? seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime) : 0;
+  return ::getrusage(whose, &usage) == 0 ? race::cpu_seconds(usage) : 0;
 }
 
 }  // namespace
+
+double cpu_seconds(const rusage& usage) { return seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime); }
 
 Result<void> use_cores(int count) {
   cpu_set_t all, some;

@@ -1,6 +1,8 @@
 // The machine that a race runs on, and the cores of it that everybody gets.
 #pragma once
 
+#include <sys/resource.h>
+
 #include "cli/compare/results.h"
 #include "common/base/error.h"
 
@@ -12,6 +14,7 @@ Result<void> use_cores(int count);
 
 // "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
+double cpu_seconds(const rusage& usage);  // user and system
 double load_average();  // the kernel's, of a minute; negative: not known
 
 // How busy others are: counts from when it is made.

@@ -1,3 +1,4 @@
+#include "cli/compare/machine.h"
 #include "cli/compare/program.h"
 
 #include <fcntl.h>
@@ -25,10 +26,6 @@ namespace {
 constexpr std::size_t kKeptOutput = 8192;
 constexpr std::size_t kShownLine = 400;
 constexpr int kLookMilliseconds = 20;  // how often the program is looked after
-
-double seconds_of(const timeval& t) {
-  return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-}
 
 std::vector<char*> environment() {
   std::vector<char*> kept;
@@ -92,7 +89,7 @@ class Running {
     drain();
     return status;
   }
-  double cpu_seconds() const { return seconds_of(usage_.ru_utime) + seconds_of(usage_.ru_stime); }
+  double cpu_seconds() const { return race::cpu_seconds(usage_); }
   std::string last_words() const {
     const std::string line = last_line(output_);
     return line.empty() ? "; it said nothing" : fmt::format("; its last words: {}", line);

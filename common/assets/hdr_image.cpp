@@ -11,7 +11,7 @@ namespace ls {
 
 namespace {
 
-constexpr std::size_t kMaxHeaderLines = 200;
+constexpr std::size_t kMaxHdrLines = 200;
 
 using Rgbe = std::array<std::uint8_t, 4>;
 
@@ -80,7 +80,7 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   std::string_view text = as_text(file);
   if (!text.starts_with("#?")) return bad("it does not begin with \"#?\"");
   bool rgbe = false, blank = false;
-  for (std::size_t i = 0; i < kMaxHeaderLines && !blank && !text.empty(); ++i) {
+  for (std::size_t i = 0; i < kMaxHdrLines && !blank && !text.empty(); ++i) {
     const std::string_view line = next_line(text);
     rgbe |= line == "FORMAT=32-bit_rle_rgbe";
     blank = line.empty();

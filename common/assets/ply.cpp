@@ -16,7 +16,7 @@ namespace ls {
 
 namespace {
 
-constexpr std::size_t kMaxHeaderLines = 1000;
+constexpr std::size_t kMaxPlyLines = 1000;
 
 enum class Coding { ascii, little_endian, big_endian };
 enum class Type { i8, u8, i16, u16, i32, u32, f32, f64 };
@@ -88,7 +88,7 @@ class PlyReader {
   bool header() {
     std::string_view text = as_text(file_);
     bool has_format = false;
-    for (std::size_t line = 1; line <= kMaxHeaderLines; ++line) {
+    for (std::size_t line = 1; line <= kMaxPlyLines; ++line) {
       if (text.empty()) return complain("ends within the header (no end_header)");
       std::string_view rest = next_line(text);
       const std::string_view key = next_word(rest);
@@ -115,7 +115,7 @@ class PlyReader {
         return complain_line(line, fmt::format("unknown header line '{}'", key.substr(0, 40)));
       }
     }
-    return complain(fmt::format("the header has more than {} lines", kMaxHeaderLines));
+    return complain(fmt::format("the header has more than {} lines", kMaxPlyLines));
   }
 
   bool element(std::string_view rest, std::size_t line) {

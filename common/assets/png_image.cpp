@@ -38,13 +38,13 @@ struct Png {
   ~Png() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
-struct Shape {
+struct PngShape {
   png_uint_32 width = 0, height = 0, channels = 0, bits = 0;
   std::size_t row_bytes = 0;
 };
 
 // No object with a destructor lives in these two: longjmp would skip it.
-bool read_header(Png& p, Shape& shape) {
+bool read_header(Png& p, PngShape& shape) {
   if (setjmp(png_jmpbuf(p.png))) return false;
   png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
   png_read_info(p.png, p.info);
@@ -79,7 +79,7 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   if (p.png) p.info = png_create_info_struct(p.png);
   if (!p.info) return fail(Errc::resource_exhausted, fmt::format("'{}': no memory to read a PNG", name));
   png_set_read_fn(p.png, &source, read_bytes);
-  Shape shape;
+  PngShape shape;
   if (!read_header(p, shape)) return bad(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
   // Deflate packs at most 1032 to 1 and a palette of one bit becomes four bytes: a file that claims more

@@ -25,7 +25,7 @@ float value(ByteReader& r, std::int32_t type) {  // the caller has checked that 
   return h;
 }
 
-tl::unexpected<Error> bad(std::string_view name, const std::string& text) {
+tl::unexpected<Error> bad_vol(std::string_view name, const std::string& text) {
   return fail(Errc::invalid_argument, fmt::format("'{}': {}", name, text));
 }
 
@@ -35,31 +35,31 @@ struct Header {
   std::uint64_t count = 0;
 };
 
-Result<Header> read_header(std::string_view name, ByteReader& r, std::size_t size) {
+Result<Header> read_vol_header(std::string_view name, ByteReader& r, std::size_t size) {
   constexpr std::size_t kHeader = 48;
   if (size < kHeader)
-    return bad(name, fmt::format("{} bytes are too few for a .vol header of {}", size, kHeader));
+    return bad_vol(name, fmt::format("{} bytes are too few for a .vol header of {}", size, kHeader));
   const auto magic = *r.take<std::array<char, 3>>();
   const int version = *r.take<std::uint8_t>();
-  if (magic != std::array{'V', 'O', 'L'}) return bad(name, "does not begin with \"VOL\": not a Mitsuba grid");
+  if (magic != std::array{'V', 'O', 'L'}) return bad_vol(name, "does not begin with \"VOL\": not a Mitsuba grid");
   if (version != 3)
-    return bad(name, fmt::format("is version {} of the .vol format; only 3 is known", version));
+    return bad_vol(name, fmt::format("is version {} of the .vol format; only 3 is known", version));
   Header h;
   h.type = *r.take<std::int32_t>();
   if (bytes_of(h.type) == 0)
-    return bad(name, fmt::format("has value type {} at byte 4; known are 1 (float32), 2 (float16), 3 (uint8)",
+    return bad_vol(name, fmt::format("has value type {} at byte 4; known are 1 (float32), 2 (float16), 3 (uint8)",
                                  h.type));
   std::uint32_t* const sides[] = {&h.grid.nx, &h.grid.ny, &h.grid.nz};
   h.count = 1;
   for (std::uint32_t* side : sides) {
     const auto n = *r.take<std::int32_t>();
     if (n < 1 || static_cast<std::uint32_t>(n) > kMaxGridSide)
-      return bad(name, fmt::format("has {} voxels along an axis; 1 to {} are allowed", n, kMaxGridSide));
+      return bad_vol(name, fmt::format("has {} voxels along an axis; 1 to {} are allowed", n, kMaxGridSide));
     h.count *= * side = static_cast<std::uint32_t>(n);
   }
   const auto channels = *r.take<std::int32_t>();
   if (channels != 1 && channels != 3)
-    return bad(name, fmt::format("has {} channels; 1 or 3 are allowed", channels));
+    return bad_vol(name, fmt::format("has {} channels; 1 or 3 are allowed", channels));
   h.grid.channels = static_cast<std::uint32_t>(channels);
   h.count *= h.grid.channels;
   for (auto* corner : {&h.grid.bbox_min, &h.grid.bbox_max})
@@ -67,7 +67,7 @@ Result<Header> read_header(std::string_view name, ByteReader& r, std::size_t siz
   for (int a = 0; a < 3; ++a)
     if (!std::isfinite(h.grid.bbox_min[a]) || !std::isfinite(h.grid.bbox_max[a]) ||
         !(h.grid.bbox_min[a] < h.grid.bbox_max[a]))
-      return bad(name, fmt::format("has a bounding box from {} to {} along axis {}", h.grid.bbox_min[a],
+      return bad_vol(name, fmt::format("has a bounding box from {} to {} along axis {}", h.grid.bbox_min[a],
                                    h.grid.bbox_max[a], a));
   if (h.count > kMaxGridValues)
     return fail(Errc::resource_exhausted,
@@ -79,12 +79,12 @@ Result<Header> read_header(std::string_view name, ByteReader& r, std::size_t siz
 
 Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file) {
   ByteReader r(file);
-  auto header = read_header(name, r, file.size());
+  auto header = read_vol_header(name, r, file.size());
   if (!header) return tl::unexpected(header.error());
   GridData& g = header->grid;
   const std::uint64_t want = header->count * bytes_of(header->type);
   if (r.left() != want)
-    return bad(
+    return bad_vol(
         name,
         fmt::format("{} x {} x {} voxels of {} channel(s) need {} bytes after the header, but {} are there",
                     g.nx, g.ny, g.nz, g.channels, want, r.left()));
@@ -93,7 +93,7 @@ Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> fi
     float v = value(r, header->type);
     if (!std::isfinite(v)) {
       const std::uint64_t voxel = i / g.channels;
-      return bad(name, fmt::format("the voxel ({}, {}, {}) is {}; repair the grid", voxel % g.nx,
+      return bad_vol(name, fmt::format("the voxel ({}, {}, {}) is {}; repair the grid", voxel % g.nx,
                                    voxel / g.nx % g.ny, voxel / g.nx / g.ny,
                                    std::isnan(v) ? "not a number" : "infinite"));
     }

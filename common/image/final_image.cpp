@@ -15,16 +15,16 @@ namespace {
 // -0 + 0 is +0 when rounding to nearest; everything else is unchanged.
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
-struct Planes {
+struct Gathered {
   std::size_t width;
   std::vector<float> rgb[3], standard_error[3];
   std::vector<std::uint32_t> spp;
 };
 
-Planes gather(const Film& film) {
+Gathered gather(const Film& film) {
   const FrameSize frame = film.grid().frame;
   const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
-  Planes out{static_cast<std::size_t>(frame.width), {}, {}, std::vector<std::uint32_t>(pixels)};
+  Gathered out{static_cast<std::size_t>(frame.width), {}, {}, std::vector<std::uint32_t>(pixels)};
   for (int c = 0; c < 3; ++c) out.rgb[c].resize(pixels), out.standard_error[c].resize(pixels);
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     if (film.spp(t) == 0) continue;
@@ -95,7 +95,7 @@ namespace {
 
 // Of a film, or of one row of its tiles; without strings but those of the AOVs. Adds to `clamped`.
 ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool float_output, std::uint64_t& clamped) {
-  Planes planes = gather(film);
+  Gathered planes = gather(film);
   ExrPicture picture{film.grid().frame, {}, {}};
   constexpr const char* kRgb[3] = {"R", "G", "B"};
   for (int c = 0; c < 3; ++c) {

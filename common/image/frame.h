@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 
 namespace ls {
 
@@ -20,6 +21,8 @@ struct PixelRect {
   std::int64_t pixels() const { return static_cast<std::int64_t>(width()) * height(); }
   bool operator==(const PixelRect&) const = default;
 };
+// "[x0,y0,x1,y1]", as messages write it.
+std::string show(const PixelRect& r);
 
 using TileIndex = std::uint32_t;
 

@@ -28,7 +28,6 @@ using Tiles = std::map<PixelRect, std::vector<Entry>, ByPlace>;
 tl::unexpected<Error> refuse(std::string text) {
   return fail(Errc::invalid_argument, "merge: " + std::move(text));
 }
-std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]", r.x0, r.y0, r.x1, r.y1); }
 
 class Merger {
  public:

@@ -24,7 +24,7 @@ constexpr std::int32_t kMaxUnitJson = 1024;
 constexpr std::int32_t kMaxChannelList = 8192;  // all AOVs together need about 2700
 constexpr std::size_t kMaxNameBytes = 31;       // the format's limit without the long-names flag
 
-tl::unexpected<Error> refuse(std::string what) {
+tl::unexpected<Error> refuse_partial(std::string what) {
   return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
 }
 
@@ -47,13 +47,13 @@ constexpr Attribute kAttributes[] = {
 
 Result<void> check_magic(ByteCursor& in) {
   const auto magic = in.value<std::uint32_t>(), version = in.value<std::uint32_t>();
-  if (!magic || !version) return refuse("the file ends in its first 8 bytes");
-  if (*magic != 20000630u) return refuse("not an EXR file (wrong magic number)");
-  if ((*version & 0xff) != 2) return refuse(fmt::format("file version {}, expected 2", *version & 0xff));
-  if (*version & 0x200) return refuse("it is tiled; a partial has scanlines");
-  if (*version & 0x800) return refuse("it has deep data");
-  if (*version & 0x1000) return refuse("it has several parts; a partial has one");
-  if (*version >> 8) return refuse(fmt::format("unexpected version flags {:#x}", *version));
+  if (!magic || !version) return refuse_partial("the file ends in its first 8 bytes");
+  if (*magic != 20000630u) return refuse_partial("not an EXR file (wrong magic number)");
+  if ((*version & 0xff) != 2) return refuse_partial(fmt::format("file version {}, expected 2", *version & 0xff));
+  if (*version & 0x200) return refuse_partial("it is tiled; a partial has scanlines");
+  if (*version & 0x800) return refuse_partial("it has deep data");
+  if (*version & 0x1000) return refuse_partial("it has several parts; a partial has one");
+  if (*version >> 8) return refuse_partial(fmt::format("unexpected version flags {:#x}", *version));
   return {};
 }
 
@@ -71,17 +71,17 @@ Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> r
   std::vector<std::string_view> names;
   while (true) {
     const auto name = in.name(kMaxNameBytes);
-    if (!name) return refuse("the channel list is cut off");
+    if (!name) return refuse_partial("the channel list is cut off");
     if (name->empty()) break;
     const auto type = in.value<std::int32_t>(), linear = in.value<std::int32_t>(),
                xs = in.value<std::int32_t>(), ys = in.value<std::int32_t>();
-    if (!type || !linear || !xs || !ys) return refuse("the channel list is cut off");
-    if (*type != 2) return refuse(fmt::format("channel '{}' is not of type FLOAT", *name));
+    if (!type || !linear || !xs || !ys) return refuse_partial("the channel list is cut off");
+    if (*type != 2) return refuse_partial(fmt::format("channel '{}' is not of type FLOAT", *name));
     if (*xs != 1 || *ys != 1)
-      return refuse(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", *name, *xs, *ys));
+      return refuse_partial(fmt::format("channel '{}' has sampling {}x{}, expected 1x1", *name, *xs, *ys));
     names.push_back(*name);
   }
-  if (in.left() != 0) return refuse("the channel list has more bytes than channels");
+  if (in.left() != 0) return refuse_partial("the channel list has more bytes than channels");
   return names;
 }
 
@@ -105,7 +105,7 @@ Result<AovSet> check_channels(std::span<const std::byte> raw) {
     const std::string_view is = i < names->size() ? (*names)[i] : "nothing",
                            should = i < want.size() ? std::string_view(want[i]) : "nothing";
     if (is != should)
-      return refuse(fmt::format(
+      return refuse_partial(fmt::format(
           "channel '{}' stands where '{}' belongs (A.B A.G A.R B.B B.G B.R and those of AOVs, no others)", is,
           should));
   }
@@ -117,8 +117,8 @@ Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> 
   std::memcpy(v, raw.data(), sizeof v);
   for (const std::int32_t x : v)
     if (x < 0 || x >= kMaxFrameSide)
-      return refuse(fmt::format("{} [{},{},{},{}] is out of range", name, v[0], v[1], v[2], v[3]));
-  if (v[0] > v[2] || v[1] > v[3]) return refuse(fmt::format("{} is empty", name));
+      return refuse_partial(fmt::format("{} [{},{},{},{}] is out of range", name, v[0], v[1], v[2], v[3]));
+  if (v[0] > v[2] || v[1] > v[3]) return refuse_partial(fmt::format("{} is empty", name));
   return PixelRect{v[0], v[1], v[2] + 1, v[3] + 1};
 }
 
@@ -129,9 +129,9 @@ Result<void> read_attribute(const Attribute& attribute, std::span<const std::byt
     shape.aovs = *aovs;
   }
   if (attribute.name == "compression" && raw[0] != std::byte{0})
-    return refuse("it is compressed; partials are not");
+    return refuse_partial("it is compressed; partials are not");
   if (attribute.name == "lineOrder" && raw[0] != std::byte{0})
-    return refuse("its lines are not in order from the top");
+    return refuse_partial("its lines are not in order from the top");
   if (attribute.name == kUnitAttribute)
     shape.unit = std::string_view(reinterpret_cast<const char*>(raw.data()), raw.size());
   if (attribute.type == "box2i") {
@@ -146,13 +146,13 @@ Result<const Attribute*> find_attribute(std::string_view name, std::string_view 
   for (const Attribute& a : kAttributes) {
     if (a.name != name) continue;
     if (a.type != type)
-      return refuse(fmt::format("attribute '{}' has type '{}', expected '{}'", name, type, a.type));
+      return refuse_partial(fmt::format("attribute '{}' has type '{}', expected '{}'", name, type, a.type));
     if (size < 0 || size > (name == "channels" ? kMaxChannelList : kMaxUnitJson) ||
         (a.size && size != a.size))
-      return refuse(fmt::format("attribute '{}' has {} bytes", name, size));
+      return refuse_partial(fmt::format("attribute '{}' has {} bytes", name, size));
     return &a;
   }
-  return refuse(fmt::format("attribute '{}' does not belong in a partial", name));
+  return refuse_partial(fmt::format("attribute '{}' does not belong in a partial", name));
 }
 
 Result<Shape> read_shape(std::span<const std::byte> exr) {
@@ -162,30 +162,28 @@ Result<Shape> read_shape(std::span<const std::byte> exr) {
   std::uint32_t seen = 0;
   while (true) {
     const auto name = in.name(kMaxNameBytes);
-    if (!name) return refuse("the header is cut off or has an over-long name");
+    if (!name) return refuse_partial("the header is cut off or has an over-long name");
     if (name->empty()) break;
     const auto type = in.name(kMaxNameBytes);
     const auto size = in.value<std::int32_t>();
-    if (!type || !size) return refuse(fmt::format("the header is cut off at attribute '{}'", *name));
+    if (!type || !size) return refuse_partial(fmt::format("the header is cut off at attribute '{}'", *name));
     const auto attribute = find_attribute(*name, *type, *size);
     if (!attribute) return tl::unexpected(attribute.error());
     const auto bit = std::uint32_t{1} << (*attribute - kAttributes);
-    if (seen & bit) return refuse(fmt::format("attribute '{}' occurs twice", *name));
+    if (seen & bit) return refuse_partial(fmt::format("attribute '{}' occurs twice", *name));
     seen |= bit;
     const auto raw = in.take(static_cast<std::size_t>(*size));
-    if (!raw) return refuse(fmt::format("the header is cut off in attribute '{}'", *name));
+    if (!raw) return refuse_partial(fmt::format("the header is cut off in attribute '{}'", *name));
     if (const auto ok = read_attribute(**attribute, *raw, shape); !ok) return tl::unexpected(ok.error());
   }
   for (const Attribute& a : kAttributes)
     if (!(seen & (std::uint32_t{1} << (&a - kAttributes))))
-      return refuse(fmt::format("attribute '{}' is missing", a.name));
+      return refuse_partial(fmt::format("attribute '{}' is missing", a.name));
   if (shape.display->x0 != 0 || shape.display->y0 != 0)
-    return refuse("displayWindow does not begin at (0, 0)");
+    return refuse_partial("displayWindow does not begin at (0, 0)");
   shape.pixels_at = in.position();
   return shape;
 }
-
-std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]", r.x0, r.y0, r.x1, r.y1); }
 
 std::string pixel_name(const PixelRect& t, std::size_t i) {
   const auto p = static_cast<int>(i);
@@ -195,24 +193,24 @@ std::string pixel_name(const PixelRect& t, std::size_t i) {
 Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Shape& shape) {
   const PixelRect& t = *shape.data;
   if (t.pixels() > kMaxPartialPixels)
-    return refuse(
+    return refuse_partial(
         fmt::format("tile {} has {} pixels, the limit is {}", show(t), t.pixels(), kMaxPartialPixels));
   const auto width = static_cast<std::size_t>(t.width()), height = static_cast<std::size_t>(t.height());
   const std::size_t further = planes_of(shape.aovs).count(), channels = kPartialChannels + further;
   const std::size_t line = width * channels * sizeof(float);
   const std::size_t want = shape.pixels_at + height * (8 + 8 + line);
   if (exr.size() != want)
-    return refuse(fmt::format("{} bytes, but tile {} needs exactly {}", exr.size(), show(t), want));
+    return refuse_partial(fmt::format("{} bytes, but tile {} needs exactly {}", exr.size(), show(t), want));
 
   std::vector<float> sums(width * height * channels);
   ByteCursor table(exr.subspan(shape.pixels_at, height * 8)),
       lines(exr.subspan(shape.pixels_at + height * 8));
   for (std::size_t y = 0; y < height; ++y) {
     const std::uint64_t at = shape.pixels_at + height * 8 + y * (8 + line);
-    if (table.value<std::uint64_t>() != at) return refuse(fmt::format("line table: entry {} is wrong", y));
+    if (table.value<std::uint64_t>() != at) return refuse_partial(fmt::format("line table: entry {} is wrong", y));
     if (lines.value<std::int32_t>() != t.y0 + static_cast<std::int32_t>(y) ||
         lines.value<std::int32_t>() != static_cast<std::int32_t>(line))
-      return refuse(fmt::format("line {}: wrong number or size", y));
+      return refuse_partial(fmt::format("line {}: wrong number or size", y));
     for (std::size_t c = 0; c < channels; ++c) {
       const std::size_t plane = c < kFileOrder.size() ? static_cast<std::size_t>(kFileOrder[c]) : c;
       const auto row = lines.take(width * sizeof(float));  // there: the size was checked
@@ -224,28 +222,28 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
 
 Result<UnitHeader> read_header(const Shape& shape) {
   auto header = parse_unit_header(*shape.unit);
-  if (!header) return refuse(header.error().message);
+  if (!header) return refuse_partial(header.error().message);
   if (header->tile != *shape.data)
-    return refuse(
+    return refuse_partial(
         fmt::format("dataWindow {} is not the unit's tile {}", show(*shape.data), show(header->tile)));
   if (header->tile.x1 > shape.display->x1 || header->tile.y1 > shape.display->y1)
-    return refuse(fmt::format("tile {} is not inside the frame {}x{}", show(header->tile), shape.display->x1,
+    return refuse_partial(fmt::format("tile {} is not inside the frame {}x{}", show(header->tile), shape.display->x1,
                               shape.display->y1));
   return header;
 }
 
 Result<void> check_unit(const UnitHeader& got, const UnitHeader& want) {
   const auto digest = [](std::string_view what, const Digest& g, const Digest& w) {
-    return refuse(fmt::format("it is of {} {}, expected {}", what, g.hex(), w.hex()));
+    return refuse_partial(fmt::format("it is of {} {}, expected {}", what, g.hex(), w.hex()));
   };
   if (got.scene != want.scene) return digest("scene", got.scene, want.scene);
   if (got.settings != want.settings) return digest("settings", got.settings, want.settings);
   if (got.numeric_class != want.numeric_class)
     return digest("numeric class", got.numeric_class, want.numeric_class);
   if (got.tile != want.tile)
-    return refuse(fmt::format("it is of tile {}, expected {}", show(got.tile), show(want.tile)));
+    return refuse_partial(fmt::format("it is of tile {}, expected {}", show(got.tile), show(want.tile)));
   if (got.samples != want.samples)
-    return refuse(fmt::format("it has samples [{}, {}), expected [{}, {})", got.samples.s0, got.samples.s1,
+    return refuse_partial(fmt::format("it has samples [{}, {}), expected [{}, {})", got.samples.s0, got.samples.s1,
                               want.samples.s0, want.samples.s1));
   return {};
 }
@@ -270,7 +268,7 @@ Result<void> all_finite(const Partial& partial) {
     const std::string name = plane < kPartialChannels
                                  ? kPartialChannelNames[plane]
                                  : planes_of(partial.aovs).names[plane - kPartialChannels];
-    return refuse(fmt::format("channel {} of {} is {}", name, pixel_name(t, i % pixels), partial.sums[i]));
+    return refuse_partial(fmt::format("channel {} of {} is {}", name, pixel_name(t, i % pixels), partial.sums[i]));
   }
   return {};
 }
@@ -285,14 +283,14 @@ Result<void> counts_possible(const Partial& partial) {
   for (const Aov aov : planes.ids) {
     for (std::size_t i = 0; i < pixels; ++i)
       if (const std::string wrong = wrong_with(load_slots(ids + i, pixels), samples); !wrong.empty())
-        return refuse(fmt::format("{} of {}: {}", row_of(aov).name, pixel_name(t, i), wrong));
+        return refuse_partial(fmt::format("{} of {}: {}", row_of(aov).name, pixel_name(t, i), wrong));
     ids += kIdPlanes * pixels;
   }
   if (planes.hits == SIZE_MAX) return {};
   const float* hits = partial.sums.data() + (kPartialChannels + planes.hits) * pixels;
   for (std::size_t i = 0; i < pixels; ++i)
     if (!(hits[i] >= 0 && hits[i] <= static_cast<float>(samples) && hits[i] == std::floor(hits[i])))
-      return refuse(
+      return refuse_partial(
           fmt::format("channel aov.hits of {} is {}, of {} samples", pixel_name(t, i), hits[i], samples));
   return {};
 }
@@ -302,11 +300,11 @@ Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader&
   const auto shape = read_shape(exr);
   if (!shape) return tl::unexpected(shape.error());
   if (shape->aovs != aovs)
-    return refuse(fmt::format("it has the AOVs [{}], expected [{}]", fmt::join(names_of(shape->aovs), ", "),
+    return refuse_partial(fmt::format("it has the AOVs [{}], expected [{}]", fmt::join(names_of(shape->aovs), ", "),
                               fmt::join(names_of(aovs), ", ")));
   const PixelRect& display = *shape->display;
   if (display.x1 != frame.width || display.y1 != frame.height)
-    return refuse(
+    return refuse_partial(
         fmt::format("its frame is {}x{}, expected {}x{}", display.x1, display.y1, frame.width, frame.height));
   auto header = read_header(*shape);
   if (!header) return tl::unexpected(header.error());

@@ -17,7 +17,7 @@ constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
 constexpr double kHalfLabel = 25;  // of the widest label of time, which must not leave the drawing
 constexpr double kLetter = 7.4;    // mean width of one, in the legend
-constexpr double kFarthest = 100;  // times the last x: a forecast beyond it is not drawn
+constexpr double kFarthestAhead = 100;  // times the last x: a forecast beyond it is not drawn
 constexpr std::string_view kNothing =
     "The first point appears when every tile has finished a round of samples.";
 
@@ -80,7 +80,7 @@ class Drawing {
   bool shows_ahead() const {
     return plot_.ahead && plot_.target && *plot_.target > 0 && !curves_[0].points.empty() &&
            plot_.ahead->x > curves_[0].points.back().x &&
-           plot_.ahead->x < kFarthest * curves_[0].points.back().x;
+           plot_.ahead->x < kFarthestAhead * curves_[0].points.back().x;
   }
 
   void set_axes() {
@@ -93,7 +93,7 @@ class Drawing {
       }
     if (plot_.target && *plot_.target > 0) ys.push_back(*plot_.target);
     if (shows_ahead()) {
-      const double most = kFarthest * curves_[0].points.back().x;
+      const double most = kFarthestAhead * curves_[0].points.back().x;
       for (const double x : {plot_.ahead->x, plot_.ahead->x_hi})
         if (x > 0) xs.push_back(std::min(x, most));
     }

@@ -8,7 +8,7 @@
 namespace ls::scene {
 namespace {
 
-constexpr ChannelRow kRows[] = {
+constexpr ChannelRow kChannels[] = {
     {"albedo", "albedo"},
     {"depth", "depth"},
     {"geo_normal", "geo_normal"},
@@ -36,12 +36,12 @@ constexpr ChannelRow kRows[] = {
 
 }  // namespace
 
-std::span<const ChannelRow> channels() { return kRows; }
+std::span<const ChannelRow> channels() { return kChannels; }
 
 const ChannelRow* channel_row(std::string_view theirs) {
   const auto* it =
-      std::find_if(std::begin(kRows), std::end(kRows), [&](const auto& r) { return r.theirs == theirs; });
-  return it == std::end(kRows) ? nullptr : it;
+      std::find_if(std::begin(kChannels), std::end(kChannels), [&](const auto& r) { return r.theirs == theirs; });
+  return it == std::end(kChannels) ? nullptr : it;
 }
 
 std::string mitsuba_channels(std::string_view aovs) {
@@ -51,8 +51,8 @@ std::string mitsuba_channels(std::string_view aovs) {
     const std::string_view name = aovs.substr(0, end);
     aovs.remove_prefix(std::min(end + 1, aovs.size()));
     const auto* row =
-        std::find_if(std::begin(kRows), std::end(kRows), [&](const auto& r) { return r.ours == name; });
-    out += fmt::format("{}{}:{}", out.empty() ? "" : ",", name, row == std::end(kRows) ? name : row->theirs);
+        std::find_if(std::begin(kChannels), std::end(kChannels), [&](const auto& r) { return r.ours == name; });
+    out += fmt::format("{}{}:{}", out.empty() ? "" : ",", name, row == std::end(kChannels) ? name : row->theirs);
   }
   return out;
 }

@@ -9,7 +9,7 @@
 namespace ls::scene {
 namespace {
 
-constexpr IntegratorRow kRows[] = {
+constexpr IntegratorRow kIntegrators[] = {
     {"volpath", "volpath", {}},
     {"volpathmis", "volpath", {}},
     {kDistantMis, kDistantMis, {}},
@@ -46,8 +46,8 @@ auto* row_of(const Rows& rows, std::string_view name) {
 
 }  // namespace
 
-std::span<const IntegratorRow> integrators() { return kRows; }
-const IntegratorRow* integrator_row(std::string_view name) { return row_of(kRows, name); }
+std::span<const IntegratorRow> integrators() { return kIntegrators; }
+const IntegratorRow* integrator_row(std::string_view name) { return row_of(kIntegrators, name); }
 
 bool sees_media(std::string_view name) {
   if (const IntegratorRow* row = integrator_row(name)) return row->ours != "path";

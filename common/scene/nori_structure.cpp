@@ -57,9 +57,9 @@ std::string_view instead(std::string_view tag) {
   return {};
 }
 
-class Checker {
+class NoriChecker {
  public:
-  explicit Checker(Report& report) : report_(report) {}
+  explicit NoriChecker(Report& report) : report_(report) {}
 
   // Depth is bounded by kMaxNesting.
   void check(const Element& e, const TagRow* parent) {
@@ -140,7 +140,7 @@ Kind kind_of(const Element& e) {
 }
 
 bool check_structure(const Element& root, Report& report) {
-  Checker(report).check(root, nullptr);
+  NoriChecker(report).check(root, nullptr);
   return !report.has_errors();
 }
 

@@ -49,9 +49,9 @@ const TagRow* row_of(const Element& e) {
   return nullptr;
 }
 
-class Checker {
+class StructureChecker {
  public:
-  explicit Checker(Report& report) : report_(report) {}
+  explicit StructureChecker(Report& report) : report_(report) {}
 
   // Depth is bounded by kMaxNesting.
   void check(const Element& e, const Element* parent) {
@@ -152,7 +152,7 @@ TagKind kind_of(const Element& e) {
 }
 
 Ids check_structure(const Element& root, Report& report) {
-  Checker checker(report);
+  StructureChecker checker(report);
   checker.check(root, nullptr);
   return std::move(checker.ids);
 }

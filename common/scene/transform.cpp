@@ -9,14 +9,16 @@
 #include "common/scene/values.h"
 
 namespace ls::scene {
-namespace {
-
-constexpr double kUnitSlack = 1e-3;  // of an axis written with three digits
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
+
+namespace {
+
+constexpr double kUnitSlack = 1e-3;  // of an axis written with three digits
+
 Vec3 normalized(const Vec3& v) {
   // Scaled first, so that neither tiny nor huge vectors are lost in the squares.
   const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});

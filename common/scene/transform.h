@@ -6,6 +6,9 @@
 
 namespace ls::scene {
 
+double dot(const Vec3& a, const Vec3& b);
+Vec3 cross(const Vec3& a, const Vec3& b);
+
 Transform multiply(const Transform& a, const Transform& b);
 Vec3 transform_point(const Transform& t, const Vec3& p);  // affine part
 Vec3 transform_vector(const Transform& t, const Vec3& v);

@@ -20,10 +20,6 @@ Box with_margin(const Box& b, const Box& beside) {
 
 Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
 Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 bool glows(const Medium& medium) {
   return std::visit(overloaded{[](const HomogeneousMedium& m) {

@@ -87,9 +87,9 @@ class IndexWalker {
   F on_index_;
 };
 
-class Checker {
+class ValueChecker {
  public:
-  explicit Checker(const Scene& s) : s_(s) {}
+  explicit ValueChecker(const Scene& s) : s_(s) {}
 
   std::string run() {
     check_list("textures", s_.textures);
@@ -254,7 +254,7 @@ class Compactor {
 
 }  // namespace
 
-std::string find_inconsistency(const Scene& s) { return Checker(s).run(); }
+std::string find_inconsistency(const Scene& s) { return ValueChecker(s).run(); }
 
 Scene compacted(const Scene& s) { return Compactor(s).run(); }
 

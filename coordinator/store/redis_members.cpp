@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <condition_variable>
 #include <nlohmann/json.hpp>
 
@@ -12,7 +11,6 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::size_t kAskedAtOnce = 256;
 constexpr const char* kHeirMilliseconds = "15000";  // longer than taking a portion of jobs takes
 
 // ARGV: node, addresses, lease in ms, start, lost jobs dealt with. -> {lost jobs, node, alive, node, alive,
@@ -65,12 +63,6 @@ redis.call('HSET', 'lightshaft:counters', 'shared-starts', start)
 return start
 )";
 
-std::uint64_t number_of(const std::string& text) {
-  std::uint64_t value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
-
 // Jobs that have to stay together.
 JobId group_of(const JobId& job) {
   const auto frame = frame_of(job);
@@ -111,7 +103,7 @@ Result<std::uint64_t> RedisMembers::unique_start(std::uint64_t least) {
   if (!link) return tl::unexpected(link.error());
   auto number = (*link)->run({"EVAL", kStart, "0", std::to_string(least)});
   if (!number) return tl::unexpected(number.error());
-  start_ = number_of(number->text);
+  start_ = counter_of(number->text);
   return start_;
 }
 
@@ -132,7 +124,7 @@ Result<std::map<std::string, bool>> RedisMembers::say_alive() {
   for (const RedisReply& item : answer->items.front().items) {
     const std::size_t gap = std::min(item.text.find(' '), item.text.size());
     if (const std::string id = item.text.substr(0, gap); is_job_id(id))
-      lost.push_back({{id}, number_of(item.text.substr(std::min(gap + 1, item.text.size())))});
+      lost.push_back({{id}, counter_of(item.text.substr(std::min(gap + 1, item.text.size())))});
   }
   std::map<std::string, bool> known;
   for (std::size_t i = 1; i + 1 < answer->items.size(); i += 2)

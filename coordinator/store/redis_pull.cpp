@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 
 #include "common/base/log.h"
@@ -12,17 +11,10 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::size_t kAskedAtOnce = 256;
 
 // What Redis may have lost of a counter with its last writes: ids taken from far fewer than a million
 // reservations a second never come twice.
 constexpr std::uint64_t kCountsLost = 1'000'000;
-
-std::uint64_t number_of(const std::string& text) {
-  std::uint64_t value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
 
 // Several commands, in portions; an error of any of them is the call's.
 Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::Command> commands) {
@@ -47,7 +39,7 @@ Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const
     auto replies = link.run_all(portion);
     if (!replies) return tl::unexpected(replies.error());
     // What cannot be read is no revision, and keeps nobody from asking for the others.
-    for (const auto& reply : *replies) revisions.push_back(reply ? number_of(reply->text) : 0);
+    for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
   }
   return revisions;
 }
@@ -57,7 +49,7 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   if (!all) return tl::unexpected(all.error());
   for (std::size_t i = 0; i + 1 < all->items.size(); i += 2) {
     const std::string& name = all->items[i].text;
-    const std::uint64_t there = number_of(all->items[i + 1].text);
+    const std::uint64_t there = counter_of(all->items[i + 1].text);
     auto here = local.reserve(name, 0);
     if (!here) return tl::unexpected(here.error());
     if (*here >= there) continue;

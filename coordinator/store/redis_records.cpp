@@ -97,6 +97,12 @@ std::vector<BarredWorker> barred_workers(const RedisReply& fields) {
   return all;
 }
 
+std::uint64_t counter_of(const std::string& text) {
+  std::uint64_t value = 0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
+}
+
 std::string redis_job_key(const JobId& id) { return "lightshaft:job:" + id.value; }
 
 RedisLink::Command put_command(const RedisUpdate& update) {

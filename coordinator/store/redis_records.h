@@ -13,7 +13,9 @@ inline constexpr const char* kRedisJobs = "lightshaft:jobs";
 inline constexpr const char* kRedisMemory = "lightshaft:memory";
 inline constexpr const char* kRedisCounters = "lightshaft:counters";
 inline constexpr const char* kRedisBarred = "lightshaft:barred";  // hash: worker -> evidence
+inline constexpr std::size_t kAskedAtOnce = 256;  // commands that are sent without waiting for an answer
 std::string redis_job_key(const JobId& id);
+std::uint64_t counter_of(const std::string& text);  // 0: no number
 // An id becomes the name of a folder: what else stands in Redis under our keys is none.
 bool is_job_id(std::string_view id);
 std::vector<BarredWorker> barred_workers(const RedisReply& fields);  // of the answer to HGETALL

@@ -35,7 +35,7 @@ Scene parsed(const CoverageScene& scene) {
 }
 
 template <class T>
-T checked(Result<T> result) {
+T checked_job(Result<T> result) {
   if (!result) throw std::runtime_error(result.error().message);
   return std::move(*result);
 }
@@ -99,7 +99,7 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
   settings.integrator = scene.integrator.name;
   settings.max_depth = scene.integrator.max_depth;
   settings.rr_depth = scene.integrator.rr_depth;
-  const auto world = checked(render::build_world(scene, settings, {}, 1));
+  const auto world = checked_job(render::build_world(scene, settings, {}, 1));
   Film film(kGrid);
   CoverageJob job;
   std::vector<ErrorPoint> points;
@@ -107,7 +107,7 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
     const SampleRange range = cut_range(k, spp);
     Partial partial{{{}, {}, {}, kGrid.rect(0), range}, {}};
     partial.sums = render::render_tile(*world, kGrid.rect(0), range, nullptr, nullptr).sums;
-    job.error = image_error(checked(film.fold(0, k, partial)));
+    job.error = image_error(checked_job(film.fold(0, k, partial)));
     points.push_back(
         {job.error.spp, job.error.spp, job.error.relmse, job.error.relmse_lo, job.error.relmse_hi});
   }

@@ -12,9 +12,9 @@
 namespace ls::test {
 namespace {
 
-constexpr int kSide = 32, kReach = 2;
-constexpr std::size_t kPixels = kSide * kSide;
-constexpr double kDark = 0.01;
+constexpr int kDarkSide = 32, kReach = 2;
+constexpr std::size_t kPixels = kDarkSide * kDarkSide;
+constexpr double kDarkMean = 0.01;
 
 using Value = std::function<double(int x, int y)>;
 
@@ -28,20 +28,20 @@ const Picture kPictures[] = {
     {"dark, .02", [](int, int) { return .02; }},
     {"dark, .1", [](int, int) { return .1; }},
     {"grey, .5", [](int, int) { return .5; }},
-    {"dark ramp, 0 to .2", [](int x, int) { return .2 * x / kSide; }},
-    {"edge of 1 and 0", [](int x, int) { return x < kSide / 2 ? 1. : 0.; }},
+    {"dark ramp, 0 to .2", [](int x, int) { return .2 * x / kDarkSide; }},
+    {"edge of 1 and 0", [](int x, int) { return x < kDarkSide / 2 ? 1. : 0.; }},
     {"checks of .8 and .05", [](int x, int y) { return (x / 4 + y / 4) % 2 ? .8 : .05; }},
     {"dots of 5 on .1", [](int x, int y) { return x % 8 == 3 && y % 8 == 3 ? 5. : .1; }},
 };
 
-double weight(double m) { return 1 / (m * m + kDark); }
+double weight(double m) { return 1 / (m * m + kDarkMean); }
 
 double neighbours(const std::vector<double>& s, int x, int y) {
   double sum = 0;
   int count = 0;
-  for (int j = std::max(0, y - kReach); j <= std::min(kSide - 1, y + kReach); ++j)
-    for (int i = std::max(0, x - kReach); i <= std::min(kSide - 1, x + kReach); ++i)
-      if (i != x || j != y) sum += s[static_cast<std::size_t>(j * kSide + i)], ++count;
+  for (int j = std::max(0, y - kReach); j <= std::min(kDarkSide - 1, y + kReach); ++j)
+    for (int i = std::max(0, x - kReach); i <= std::min(kDarkSide - 1, x + kReach); ++i)
+      if (i != x || j != y) sum += s[static_cast<std::size_t>(j * kDarkSide + i)], ++count;
   return sum / count;
 }
 
@@ -54,23 +54,23 @@ Sums trial(const Picture& picture, double strength, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   std::vector<double> a(3 * kPixels), b(3 * kPixels), s(kPixels);
   Sums out;
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x) {
-      const auto p = static_cast<std::size_t>(y * kSide + x);
+  for (int y = 0; y < kDarkSide; ++y)
+    for (int x = 0; x < kDarkSide; ++x) {
+      const auto p = static_cast<std::size_t>(y * kDarkSide + x);
       const double m = picture.value(x, y), sigma = strength * (m + .03);
       const double ea = sigma * normal(random), eb = sigma * normal(random);
       for (std::size_t c = 0; c < 3; ++c) a[c * kPixels + p] = m + ea, b[c * kPixels + p] = m + eb;
       s[p] = m + (ea + eb) / 2;
       out.real += (ea + eb) * (ea + eb) / 4 * weight(m) / kPixels;
     }
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x) {
-      const auto p = static_cast<std::size_t>(y * kSide + x);
+  for (int y = 0; y < kDarkSide; ++y)
+    for (int x = 0; x < kDarkSide; ++x) {
+      const auto p = static_cast<std::size_t>(y * kDarkSide + x);
       const double d = (a[p] - b[p]) * (a[p] - b[p]) / 4 / kPixels;
       out.own += d * weight(s[p]);
       out.neighbours += d * weight(neighbours(s, x, y));
     }
-  out.ours = image_error(estimate_error({kSide, kSide, a, b}, 64)).relmse;
+  out.ours = image_error(estimate_error({kDarkSide, kDarkSide, a, b}, 64)).relmse;
   return out;
 }
 

@@ -10,7 +10,7 @@ namespace ls::fuzz {
 using namespace ls::http;
 
 namespace {
-constexpr std::int64_t kMostPixels = 1 << 16;  // of an image that is made whole
+constexpr std::int64_t kMostJobPixels = 1 << 16;  // of an image that is made whole
 }
 
 HttpDoor::HttpDoor() {
@@ -34,7 +34,7 @@ std::string HttpDoor::with_job(std::string_view part) const {
 
 bool HttpDoor::small() const {
   for (const auto& job : coordinator_->jobs())
-    if (std::int64_t{job.size.width} * job.size.height > kMostPixels) return false;
+    if (std::int64_t{job.size.width} * job.size.height > kMostJobPixels) return false;
   return true;
 }
 

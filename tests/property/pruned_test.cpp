@@ -15,7 +15,7 @@
 namespace ls::test {
 namespace {
 
-constexpr std::uint64_t kScenes = 240;  // of a usual run
+constexpr std::uint64_t kPrunedScenes = 240;  // of a usual run
 
 SceneKit kit_of(const RandomScene& s, const Scene& scene) {
   SceneKit kit;
@@ -26,7 +26,7 @@ SceneKit kit_of(const RandomScene& s, const Scene& scene) {
 }
 
 TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
-  const auto [first, count] = scenes_to_try(kScenes);
+  const auto [first, count] = scenes_to_try(kPrunedScenes);
   const double level = level_of(3. * static_cast<double>(count));
   std::uint64_t pruned_ones = 0, by_bits = 0, undecided = 0;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {

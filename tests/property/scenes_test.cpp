@@ -18,7 +18,7 @@
 namespace ls::test {
 namespace {
 
-constexpr std::uint64_t kScenes = 200;  // of a usual run
+constexpr std::uint64_t kRandomScenes = 200;  // of a usual run
 constexpr SampleRange kSamples{0, 4};
 
 struct Tally {
@@ -149,7 +149,7 @@ std::string wrong_with(RandomScene& s, Tally& tally) {
 }
 
 TEST(RandomScenes, AreRefusedWithAPlaceOrRenderCleanAndAlikeInEveryVariant) {
-  const auto [first, count] = scenes_to_try(kScenes);
+  const auto [first, count] = scenes_to_try(kRandomScenes);
   constexpr int kEnough = 12;  // failures
   Tally tally;
   double slowest = 0;

@@ -30,7 +30,7 @@ SkyImage gradient(const Rgb& top) {
   return s;
 }
 
-constexpr int kWidth = 64, kHeight = 33, kSunX = 21, kSunY = 7;
+constexpr int kWidth = 64, kMapHeight = 33, kSunX = 21, kSunY = 7;
 
 std::array<double, 3> reflected(const Rgb& light, double irradiance) {
   std::array<double, 3> out;
@@ -39,7 +39,7 @@ std::array<double, 3> reflected(const Rgb& light, double irradiance) {
 }
 
 void on_a_floor(std::vector<Case>& cases) {
-  const double of_gradient = kPi / 2, of_sun = one_texel_irradiance(kWidth, kHeight, kSunX, kSunY)[1];
+  const double of_gradient = kPi / 2, of_sun = one_texel_irradiance(kWidth, kMapHeight, kSunX, kSunY)[1];
   {
     SceneKit kit = floor();
     add_sky(kit, SkyImage(8, 5, 1));
@@ -52,7 +52,7 @@ void on_a_floor(std::vector<Case>& cases) {
   }
   {
     SceneKit kit = floor();
-    SkyImage s(kWidth, kHeight);
+    SkyImage s(kWidth, kMapHeight);
     s.set(kSunX, kSunY, {34000, 30000, 20000});
     add_sky(kit, s, upright());
     cases.push_back({"sky_sun_of_one_texel", kit, reflected({34000, 30000, 20000}, of_sun), 256});
@@ -61,7 +61,7 @@ void on_a_floor(std::vector<Case>& cases) {
     // Of another colour than the sun: densities follow the luminance, not the channels. The rows of the image
     // above the horizon are those of gradient(), 16 of 32.
     SceneKit kit = floor();
-    SkyImage s(kWidth, kHeight);
+    SkyImage s(kWidth, kMapHeight);
     const Rgb top{.5, 1, 4}, sun{340, 300, 200};
     for (int y = 0; y < 16; ++y) {
       const double k = 1 - y / 16.;
@@ -94,10 +94,10 @@ void through_media(std::vector<Case>& cases) {
     kit.container(SphereShape{}, {}, kit.null(), dark);
     kit.scene.sensor.medium = dark;
     kit.look({-2e-3, 1e-3, 6e-4}, {0, 0, 0}, 1e-3);
-    SkyImage s(kWidth, kHeight);
+    SkyImage s(kWidth, kMapHeight);
     s.set(kSunX, kSunY, rgb(1000));
     add_sky(kit, s, upright());
-    auto expected = reflected(rgb(1000), one_texel_irradiance(kWidth, kHeight, kSunX, kSunY)[1]);
+    auto expected = reflected(rgb(1000), one_texel_irradiance(kWidth, kMapHeight, kSunX, kSunY)[1]);
     for (std::size_t c = 0; c < 3; ++c)
       expected[c] *= std::exp(-sigma[c] * (1 + std::sqrt(4e-6 + 1e-6 + 3.6e-7)));
     cases.push_back({"sky_sun_through_an_absorbing_ball", kit, expected, 1024});

@@ -6,7 +6,7 @@
 namespace ls::test {
 namespace {
 
-constexpr double kReflectance = .5;
+constexpr double kGreyReflectance = .5;
 constexpr double kSheet = 2 * .04 / 1.04;  // a sheet of n = 1.5 seen from above reflects
 
 BsdfIndex two_sided(SceneKit& kit, double reflectance) {
@@ -24,7 +24,7 @@ BsdfIndex sheet(SceneKit& kit, double ior) {
 // The point of the floor at the origin seen from the side, below a sheet of something.
 SceneKit floor_below(auto material) {
   SceneKit kit;
-  const BsdfIndex grey = kit.diffuse(kReflectance), above = material(kit);
+  const BsdfIndex grey = kit.diffuse(kGreyReflectance), above = material(kit);
   kit.shape(RectangleShape{}, scale(3), grey);
   kit.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), above);
   kit.scene.integrator.max_depth = 2;
@@ -44,7 +44,7 @@ void veils(std::vector<Case>& cases) {
   const auto third = [](SceneKit& k) { return mask(k, .3, two_sided(k, 0)); };
   const auto glass = [](SceneKit& k) { return sheet(k, 1.5); };
   const auto direct = [&](const char* name, SceneKit kit, double irradiance) {
-    cases.push_back({name, std::move(kit), grey(irradiance * kReflectance / kPi), 2048, .01});
+    cases.push_back({name, std::move(kit), grey(irradiance * kGreyReflectance / kPi), 2048, .01});
   };
   cases.push_back({"mask_before_the_sky", through(third), grey(.7), 4096});
   {
@@ -79,7 +79,7 @@ void veils(std::vector<Case>& cases) {
     const BsdfIndex b = mask(shadow, .5, two_sided(shadow, 0));
     shadow.container(CubeShape{}, translate({0, 0, 2.5}), b, shadow.homogeneous({1, .5, .25}, rgb(0)));
     shadow.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
-    const double f = kReflectance / kPi;
+    const double f = kGreyReflectance / kPi;
     cases.push_back({"mask_around_a_medium_shadow", shadow, {f * t(1), f * t(.5), f * t(.25)}, 64});
   }
 }
@@ -183,20 +183,20 @@ void normal_map(std::vector<Case>& cases) {
   // A grey floor whose normal leans to the light by 36.87 degrees, lit from above: the cosine is .8. Bumps
   // cast no shadows on each other.
   SceneKit kit;
-  const BsdfIndex grey_floor = kit.diffuse(kReflectance);
+  const BsdfIndex grey_floor = kit.diffuse(kGreyReflectance);
   const BsdfIndex b = kit.bsdf(NormalMapBsdf{kit.texture({.8, .5, .9}), grey_floor, true, false});
   kit.shape(RectangleShape{}, scale(3), b);
   kit.scene.integrator.max_depth = 2;
   kit.look({2, 1, 1}, {0, 0, 0}, 1e-3);
   SceneKit sun = kit;
   sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
-  cases.push_back({"normal_map_by_the_sun", sun, grey(.8 * kReflectance / kPi), 16});
+  cases.push_back({"normal_map_by_the_sun", sun, grey(.8 * kGreyReflectance / kPi), 16});
   // A sphere in the normal's direction, whole above the surface and above the leaning plane: E = pi r^2 /
   // d^2.
   const TextureIndex one = kit.texture(rgb(1));
   const BsdfIndex black = kit.diffuse(0);
   kit.shape(SphereShape{}, translate({1.8, 0, 2.4}) * scale(1), black).emitter = AreaEmitter{one};
-  cases.push_back({"normal_map_by_a_sphere", kit, grey(kReflectance / 9), 1024});
+  cases.push_back({"normal_map_by_a_sphere", kit, grey(kGreyReflectance / 9), 1024});
 }
 
 }  // namespace

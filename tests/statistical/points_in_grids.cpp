@@ -14,16 +14,16 @@ using cases::integrate;
 // q from its way back to the origin. The density is linear, so that its integral over a way is the length
 // times the mean of both ends' values; of one scattering: a / (4 pi) int s r(t) e^(-s ((t + 3) (r(-3) + r(t))
 // / 2 + d (1 + r(t)) / 2)) f / d^2 dt.
-constexpr double kHeight = .5;
+constexpr double kPointHeight = .5;
 
 template <class F>
 std::array<double, 3> beside_a_ray(double sigma, const Rgb& albedo, F intensity) {
   const auto density = [](double z) { return 1 + z / 6; };
   const double at_albedo_1 = integrate(
       [&](double t) {
-        const double d = std::hypot(kHeight, t), r = density(t);
+        const double d = std::hypot(kPointHeight, t), r = density(t);
         const double depth = sigma * ((t + 3) * (density(-3) + r) / 2 + d * (1 + r) / 2);
-        return sigma * r * std::exp(-depth) / (4 * kPi * d * d) * intensity(std::atan2(t, kHeight));
+        return sigma * r * std::exp(-depth) / (4 * kPi * d * d) * intensity(std::atan2(t, kPointHeight));
       },
       -3, 3, 20000);
   return {albedo[0] * at_albedo_1, albedo[1] * at_albedo_1, albedo[2] * at_albedo_1};
@@ -46,7 +46,7 @@ void add_points_in_grids(std::vector<Case>& cases) {
   const Rgb albedo{1, .8, .3};
   for (const double sigma : {.05, 1.}) {
     cases.push_back({sigma < 1 ? "point_in_thin_grid" : "point_in_grid",
-                     along_a_slope(sigma, albedo, PointEmitter{{kHeight, 0, 0}, rgb(1)}),
+                     along_a_slope(sigma, albedo, PointEmitter{{kPointHeight, 0, 0}, rgb(1)}),
                      beside_a_ray(sigma, albedo, [](double) { return 1.; }), 4096});
   }
   // Full within 30 degrees, falling linearly in the angle to 60.
@@ -57,7 +57,7 @@ void add_points_in_grids(std::vector<Case>& cases) {
   cases.push_back(
       {"spot_in_grid",
        along_a_slope(.7, albedo,
-                     SpotEmitter{look_at({kHeight, 0, 0}, {0, 0, 0}, {0, 1, 0}), rgb(1), 60, 30, {}}),
+                     SpotEmitter{look_at({kPointHeight, 0, 0}, {0, 0, 0}, {0, 1, 0}), rgb(1), 60, 30, {}}),
        beside_a_ray(.7, albedo, beam), 4096});
 }
 

@@ -21,7 +21,7 @@ const std::string kQuadObj =
     "1\nvn 0 0 1\n"
     "usemtl m\ns off\nf 1/1/1 2/2/1 3/3/1 4/4/1\n";
 
-void expect_sound(const MeshData& m) {
+void expect_sound_mesh(const MeshData& m) {
   const std::size_t n = m.vertex_count();
   EXPECT_EQ(m.positions.size() % 3, 0u);
   EXPECT_EQ(m.indices.size() % 3, 0u);
@@ -104,7 +104,7 @@ TEST(Obj, ErrorsNameFileAndLine) {
 
 TEST(Obj, SurvivesTruncationsAndMutations) {
   test::accepted_truncations(kQuadObj, decode_obj);
-  test::survive_mutations(kQuadObj, decode_obj, expect_sound);
+  test::survive_mutations(kQuadObj, decode_obj, expect_sound_mesh);
 }
 
 std::string ply_header(const std::string& format) {
@@ -191,7 +191,7 @@ TEST(Ply, NeverAcceptsATruncatedFile) {
 
 TEST(Ply, SurvivesMutations) {
   for (const std::string& file : {kPlyAscii, ply_binary(false), ply_binary(true)})
-    test::survive_mutations(file, decode_ply, expect_sound);
+    test::survive_mutations(file, decode_ply, expect_sound_mesh);
 }
 
 }  // namespace

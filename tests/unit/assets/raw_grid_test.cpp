@@ -27,18 +27,18 @@ struct RawFile {
     return s;
   }
 };
-Result<GridData> decode(std::string_view name, std::span<const std::byte> file) {
+Result<GridData> decode_raw(std::string_view name, std::span<const std::byte> file) {
   return decode_raw_grid(name, file, GridOrder::x_fastest);
 }
 std::string error(const RawFile& f) {
-  const auto g = decode("g.bin", bytes_of(f.text()));
+  const auto g = decode_raw("g.bin", bytes_of(f.text()));
   return g ? "" : g.error().message;
 }
 
 TEST(RawGrid, IsReadInEitherOrder) {
   const RawFile f;
 
-  const auto x = decode("g.bin", bytes_of(f.text())),
+  const auto x = decode_raw("g.bin", bytes_of(f.text())),
              z = decode_raw_grid("g.bin", bytes_of(f.text()), GridOrder::z_fastest);
 
   ASSERT_TRUE(x && z);
@@ -56,7 +56,7 @@ TEST(RawGrid, IsReadInEitherOrder) {
 TEST(RawGrid, MakesNegativesZeroAndRefusesWhatIsNoNumberWithItsNode) {
   RawFile f;
   f.values[7] = -2;
-  const auto g = decode("g.bin", bytes_of(f.text()));
+  const auto g = decode_raw("g.bin", bytes_of(f.text()));
   ASSERT_TRUE(g);
   EXPECT_EQ(g->negatives, 1u);
   EXPECT_EQ(g->values[7], 0);
@@ -88,8 +88,8 @@ TEST(RawGrid, RefusesHeadersThatTheFileDoesNotBear) {
 TEST(RawGrid, NeverAcceptsATruncatedFileAndSurvivesMutations) {
   const std::string file = RawFile{}.text();
 
-  EXPECT_EQ(test::accepted_truncations(file, decode), 0);
-  test::survive_mutations(file, decode, [](const GridData& g) {
+  EXPECT_EQ(test::accepted_truncations(file, decode_raw), 0);
+  test::survive_mutations(file, decode_raw, [](const GridData& g) {
     EXPECT_EQ(g.values.size(), std::size_t{g.nx} * g.ny * g.nz);
     for (const float v : g.values) EXPECT_TRUE(v >= 0 && v <= std::numeric_limits<float>::max());
   });

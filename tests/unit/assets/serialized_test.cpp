@@ -69,18 +69,18 @@ std::string file_of(const std::vector<std::string>& meshes, int version = 4) {
   append(table, static_cast<std::uint32_t>(meshes.size()));
   return file + table;
 }
-Result<MeshData> decode(const std::string& file, int index = 0) {
+Result<MeshData> decode_mesh(const std::string& file, int index = 0) {
   return decode_serialized("m.serialized", bytes_of(file), index);
 }
 std::string error_of(const std::string& file, int index = 0) {
-  const auto m = decode(file, index);
+  const auto m = decode_mesh(file, index);
   return m ? "" : m.error().message;
 }
 
 TEST(Serialized, ReadsBothVersionsInBothPrecisions) {
   for (const std::uint16_t version : {3, 4}) {
     for (const bool wide : {false, true}) {
-      const auto m = decode(file_of({mesh({.version = version, .wide = wide})}, version));
+      const auto m = decode_mesh(file_of({mesh({.version = version, .wide = wide})}, version));
 
       ASSERT_TRUE(m) << m.error().message;
       EXPECT_THAT(m->positions, ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
@@ -93,7 +93,7 @@ TEST(Serialized, ReadsBothVersionsInBothPrecisions) {
 }
 
 TEST(Serialized, ReadsOnlyWhatIsThere) {
-  const auto m = decode(mesh({.flags = 0x10}));
+  const auto m = decode_mesh(mesh({.flags = 0x10}));
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_TRUE(m->normals.empty());
@@ -108,7 +108,7 @@ TEST(Serialized, FindsEachOfSeveralMeshes) {
                  mesh({.version = version, .wide = true, .x = -3})},
                 version);
     for (int i = 0; i < 3; ++i) {
-      const auto m = decode(file, i);
+      const auto m = decode_mesh(file, i);
       ASSERT_TRUE(m) << m.error().message;
       EXPECT_EQ(m->positions[0], -1 - i);
     }
@@ -151,7 +151,7 @@ TEST(Serialized, RefusesCountsThatCannotBe) {
 }
 
 TEST(Serialized, DropsTrianglesWithoutArea) {
-  const auto m = decode(mesh({.triangles = 3, .indices = {0, 1, 2, 0, 0, 1, 2, 1, 0}}));
+  const auto m = decode_mesh(mesh({.triangles = 3, .indices = {0, 1, 2, 0, 0, 1, 2, 1, 0}}));
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_EQ(m->triangle_count(), 2u);

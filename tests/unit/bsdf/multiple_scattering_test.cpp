@@ -29,7 +29,7 @@ Scene compensated(Scene s) {
 struct Mean {
   double value, error;
 };
-Mean albedo(const Bench& b, const V3& wo) {
+Mean albedo_along(const Bench& b, const V3& wo) {
   constexpr int kSamples = 40000;
   std::mt19937 rng(3);
   const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
@@ -47,7 +47,7 @@ Mean albedo(const Bench& b, const V3& wo) {
 // 5 standard errors: once in 1.7 million; the errors are such that a loss of 2 % (single scattering loses up
 // to 70) shows.
 void expect_white(const Bench& b, const V3& wo, double tolerance, const std::string& what) {
-  const Mean e = albedo(b, wo);
+  const Mean e = albedo_along(b, wo);
   EXPECT_NEAR(e.value, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
   EXPECT_LT(e.error, .006) << what << " at " << wo.z;
 }
@@ -55,7 +55,7 @@ void expect_white(const Bench& b, const V3& wo, double tolerance, const std::str
 // STABILITY N38: seen from above, single scattering off GGX of roughness 1 keeps 1 - ln 2 of the light.
 TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
-  const Mean e = albedo(*b, {0, 0, 1});
+  const Mean e = albedo_along(*b, {0, 0, 1});
   EXPECT_NEAR(e.value, 1 - std::log(2.), 5 * e.error);
   static const Quadrature q = gauss_legendre(256);
   EXPECT_NEAR(rough_share(Way::mirrored, Microfacet::ggx, 1, 1, 1, q), 1 - std::log(2.), 1e-5);

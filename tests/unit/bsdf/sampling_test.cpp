@@ -23,7 +23,7 @@ struct Named {
   bool both_sides = false;
 };
 // A material with its microfacets' light to each other (Bsdf::multiple_scattering).
-Scene compensated(Scene s) {
+Scene with_compensation(Scene s) {
   std::visit(
       [](auto& b) {
         if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
@@ -38,10 +38,10 @@ void add_more(std::vector<Named>& all) {
   const auto wide = [&](std::string name, Scene s) {
     all.push_back({std::move(name), bench(std::move(s)), true});
   };
-  one_sided("gold that scatters often", compensated(rough_metal(Microfacet::ggx, .6, .6, kGoldEta, kGoldK)));
+  one_sided("gold that scatters often", with_compensation(rough_metal(Microfacet::ggx, .6, .6, kGoldEta, kGoldK)));
   one_sided("plastic that scatters often",
-            compensated(rough_plastic(Microfacet::beckmann, .4, 1.5, 1, true, {.5, .4, .3})));
-  wide("glass that scatters often", compensated(rough_glass(Microfacet::ggx, .5, .5, 1.5, 1)));
+            with_compensation(rough_plastic(Microfacet::beckmann, .4, 1.5, 1, true, {.5, .4, .3})));
+  wide("glass that scatters often", with_compensation(rough_glass(Microfacet::ggx, .5, .5, 1.5, 1)));
   wide("thin glass and rough gold",
        blend(thin_glass(1.5), rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .6));
   // Nori's: a base, and a coat whose share is what the base leaves (as it is read; see nori_microfacet_test).

@@ -14,14 +14,14 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr FrameSize kSize{64, 48};
+constexpr FrameSize kRaceSize{64, 48};
 constexpr double kGrey = .5;
 
 // The right picture with independent normal noise of this variance in every value; nearly: values are floats.
 Pixels noisy(double variance, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(kGrey, std::sqrt(variance));
-  Pixels pixels(3 * static_cast<std::size_t>(kSize.width * kSize.height));
+  Pixels pixels(3 * static_cast<std::size_t>(kRaceSize.width * kRaceSize.height));
   for (float& value : pixels) value = static_cast<float>(noise(random));
   return pixels;
 }
@@ -72,7 +72,7 @@ struct Ran {
 Ran ran(const Scratch& scratch, const std::vector<double>& speeds, std::size_t seeds, double time,
         const std::string& second_fails = "") {
   Ran out;
-  out.race.conditions.size = kSize;
+  out.race.conditions.size = kRaceSize;
   for (std::size_t e = 0; e < speeds.size(); ++e)
     out.race.entrants.push_back({"speed " + std::to_string(speeds[e]), true, true});
   const std::atomic<bool> stop{false};

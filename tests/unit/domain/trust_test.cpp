@@ -4,7 +4,7 @@
 namespace ls::coordinator {
 namespace {
 
-Farm::Options audited(double rate) {
+Farm::Options audited_farm(double rate) {
   return {.lease_prefix = "t", .limits = {}, .audit_rate = rate, .audit_seed = 7};
 }
 
@@ -25,7 +25,7 @@ auto liars(std::set<std::string> who) {
 }
 
 TEST(Audit, EveryResultCanBeRenderedAgainByAnotherBeforeTheJobEnds) {
-  Clockwork work(audited(1));
+  Clockwork work(audited_farm(1));
   for (const char* name : {"a", "b", "c"}) work.join(name, 1);
   const JobPlan plan = plan_of("j", 20, 4);
   work.rig.submit(plan);
@@ -42,7 +42,7 @@ TEST(Audit, EveryResultCanBeRenderedAgainByAnotherBeforeTheJobEnds) {
 }
 
 TEST(Audit, TakesTheShareAskedFor) {
-  Clockwork work(audited(.01));
+  Clockwork work(audited_farm(.01));
   for (const char* name : {"a", "b", "c"}) work.join(name, 4);
   work.rig.submit(plan_of("j", 5000, 4));
 
@@ -54,7 +54,7 @@ TEST(Audit, TakesTheShareAskedFor) {
 }
 
 TEST(Audit, ALoneWorkerIsNotAudited) {
-  Clockwork work(audited(1));
+  Clockwork work(audited_farm(1));
   work.join("a", 2);
   work.rig.submit(plan_of("j", 20, 4));
 
@@ -65,7 +65,7 @@ TEST(Audit, ALoneWorkerIsNotAudited) {
 }
 
 TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
-  Clockwork work(audited(1));
+  Clockwork work(audited_farm(1));
   work.join("a", 1);
   work.join("b", 1);
   work.rig.submit(plan_of("j", 20, 4));
@@ -91,7 +91,7 @@ JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
 const Digest kRight = honest({{"j"}, 0, 0}, {0, 2}), kWrong = digest_number(5);
 
 TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
-  Rig rig(audited(1));
+  Rig rig(audited_farm(1));
   rig.join("a", 1);
   rig.join("b", 1);
   rig.submit(plan_of("j", 6, 2));
@@ -109,7 +109,7 @@ TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
 }
 
 TEST(Audit, IsGoneOnWithAfterARestart) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));
   rig.pass(1s);  // no worker is back yet
   rig.join("a", 1);
@@ -122,7 +122,7 @@ TEST(Audit, IsGoneOnWithAfterARestart) {
 }
 
 TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.send(restored(kWrong, {0, 0, std::nullopt}));
   for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
 
@@ -134,7 +134,7 @@ TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
 }
 
 TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
   for (const char* name : {"a", "b"}) rig.join(name, 1);
   rig.render_all();
@@ -149,7 +149,7 @@ TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
 }
 
 TEST(Audit, OfBeforeTheRestartIsDroppedWhenNobodyComesBackForIt) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}, 1));
   rig.pass(kAuditAfterRestart - 1s);
   EXPECT_EQ(rig.job().state, JobState::running);
@@ -161,7 +161,7 @@ TEST(Audit, OfBeforeTheRestartIsDroppedWhenNobodyComesBackForIt) {
 }
 
 TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   JobRestored event = restored(kRight, {0, 0, std::nullopt});
   event.audits = {{1, 0, std::nullopt}, {7, 0, std::nullopt}, {0, 9, std::nullopt}};
   rig.send(event);
@@ -171,7 +171,7 @@ TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
 }
 
 TEST(Liar, IsFoundByAThirdWorkerBarredAndItsTilesAreRenderedAgain) {
-  Clockwork work(audited(.01));
+  Clockwork work(audited_farm(.01));
   for (int i = 0; i < 8; ++i) work.join("w" + std::to_string(i), 2);
   work.pixels = liars({"w3"});
   const JobPlan plan = plan_of("j", 400, 64);
@@ -209,7 +209,7 @@ std::vector<Effect> says(Rig& rig, const Rig::Held& unit, const std::string& wor
 
 TEST(Liar, WhoFoundItFirstDoesNotMatter) {
   for (const bool lies_first : {false, true}) {
-    Rig rig(audited(1));
+    Rig rig(audited_farm(1));
     for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
     rig.submit(plan_of("j", 6, 2));
     const Rig::Held unit = rig.take("a");
@@ -232,7 +232,7 @@ TEST(Liar, WhoFoundItFirstDoesNotMatter) {
 }
 
 TEST(Liar, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   for (const char* name : {"h", "c", "d", "x1", "x2"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
   const Rig::Held unit = rig.take("h");
@@ -255,7 +255,7 @@ TEST(Liar, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
 }
 
 TEST(Liar, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   for (const char* name : {"h", "x"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
   const Rig::Held unit = rig.take("h");
@@ -269,7 +269,7 @@ TEST(Liar, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
 }
 
 TEST(Liar, ALateResultCountsSinceItsWorkerWasAsked) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   for (const char* name : {"h", "x", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 3, 2));
   const Rig::Held unit = rig.take("x");
@@ -287,7 +287,7 @@ TEST(Liar, ALateResultCountsSinceItsWorkerWasAsked) {
 }
 
 TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   for (const char* name : {"a", "b"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
   const Rig::Held unit = rig.take("a");
@@ -306,7 +306,7 @@ TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
 }
 
 TEST(Liar, OneThatContradictsItselfNeedsNoThirdWorker) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.join("a", 1);
   rig.join("b", 1);
   rig.submit(plan_of("j", 6, 2));
@@ -321,7 +321,7 @@ TEST(Liar, OneThatContradictsItselfNeedsNoThirdWorker) {
 }
 
 TEST(Liar, ThreeDifferentAnswersFailTheJob) {
-  Rig rig(audited(1));
+  Rig rig(audited_farm(1));
   for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
   const Rig::Held unit = rig.take("a");
@@ -337,7 +337,7 @@ TEST(Liar, ThreeDifferentAnswersFailTheJob) {
 
 // With a job that another coordinator had, and knew the liar by.
 TEST(Liar, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.join("a", 1);
   rig.join("b", 1);
   rig.submit(plan_of("j", 6, 2));
@@ -355,7 +355,7 @@ TEST(Liar, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
 }
 
 TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
-  Rig rig(audited(0));
+  Rig rig(audited_farm(0));
   rig.send(WorkerBarred{{"a"}, "it rendered wrong pixels of job x"});
   rig.join("a", 1);
   rig.submit(plan_of("j", 6, 2));
@@ -372,7 +372,7 @@ TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
 // Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin again.
 TEST(Liar, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
   const auto ends = [](bool with_liar) {
-    Clockwork work(audited(with_liar ? .05 : 0));
+    Clockwork work(audited_farm(with_liar ? .05 : 0));
     for (int i = 0; i < 5; ++i) work.join("w" + std::to_string(i), 2);
     if (with_liar) work.pixels = liars({"w2"});
     JobPlan plan = plan_of("j", 4, 4096);

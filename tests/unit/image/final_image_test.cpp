@@ -19,7 +19,7 @@ using test::make_film;
 using test::make_partial;
 using ::testing::HasSubstr;
 
-const TileGrid kGrid{{20, 13}, 8};
+const TileGrid kFinalGrid{{20, 13}, 8};
 
 // Both halves of every pixel of a tile have this sum.
 Partial flat(const TileGrid& grid, TileIndex tile, std::array<float, 3> half_sum) {
@@ -34,9 +34,9 @@ std::string as_text(const std::vector<std::byte>& bytes) {
 }
 
 TEST(PixelsDigest, IsOverFloatsOfTheMeansRowByRow) {
-  const Film film = make_film(kGrid, 6);
+  const Film film = make_film(kFinalGrid, 6);
   std::vector<float> pixels(20 * 13 * 3);
-  for (TileIndex t = 0; t < kGrid.count(); ++t) {
+  for (TileIndex t = 0; t < kFinalGrid.count(); ++t) {
     const TilePixels tile = film.pixels(t);
     for (int i = 0; i < tile.rect.pixels(); ++i)
       for (int c = 0; c < 3; ++c) {
@@ -67,14 +67,14 @@ Provenance some_provenance() {
 }
 
 TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
-  const Film film = make_film(kGrid, 6);
+  const Film film = make_film(kFinalGrid, 6);
 
   const auto image = final_exr(film, some_provenance(), true);
   ASSERT_TRUE(image) << image.error().message;
   const auto back = read_exr_rgb(image->exr, "final");
 
   ASSERT_TRUE(back) << back.error().message;
-  EXPECT_EQ(back->size, kGrid.frame);
+  EXPECT_EQ(back->size, kFinalGrid.frame);
   EXPECT_EQ(sha256(std::as_bytes(std::span(back->rgb))), pixels_sha256(film));
   const std::string text = as_text(image->exr);
   for (const char* name :
@@ -87,12 +87,12 @@ TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
   EXPECT_EQ(header.at("lightshaft:core_seconds"), "98.765");
   EXPECT_EQ(header.at("lightshaft:stopped"), "time; so and so");
   EXPECT_EQ(header.at("lightshaft:verdict"), "trusted");
-  for (TileIndex t = 0; t < kGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
+  for (TileIndex t = 0; t < kFinalGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
 }
 
 TEST(FinalExr, IsAFunctionOfFilmAndProvenance) {
-  EXPECT_EQ(final_exr(make_film(kGrid, 6), some_provenance(), false)->exr,
-            final_exr(make_film(kGrid, 6), some_provenance(), false)->exr);
+  EXPECT_EQ(final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr,
+            final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr);
 }
 
 TEST(FinalExr, ClampsToTheLargestHalfAndCounts) {
@@ -123,7 +123,7 @@ TEST(FinalExr, RoundsToTheNearestHalf) {
 }
 
 TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
-  Film film = make_film(kGrid, 4);
+  Film film = make_film(kFinalGrid, 4);
   film.discard(0);
 
   const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), true)->exr, "part")->rgb;
@@ -136,24 +136,24 @@ TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
   const auto strings = [](const Film& film) {
     return read_final_exr(final_exr(film, some_provenance(), true)->exr, "part").value().strings;
   };
-  Film film = make_film(kGrid, 4);
+  Film film = make_film(kFinalGrid, 4);
   const std::string whole = strings(film).at("lightshaft:relmse");
   EXPECT_FALSE(strings(film).contains("lightshaft:pixels_without_samples"));
   film.discard(0);
 
-  const auto part = strings(film), none = strings(Film(kGrid));
+  const auto part = strings(film), none = strings(Film(kFinalGrid));
 
-  EXPECT_EQ(part.at("lightshaft:pixels_without_samples"), std::to_string(kGrid.rect(0).pixels()));
+  EXPECT_EQ(part.at("lightshaft:pixels_without_samples"), std::to_string(kFinalGrid.rect(0).pixels()));
   // That of the pixels that are there, rather than thinned by those that are not.
   TileError rest;
-  for (TileIndex t = 1; t < kGrid.count(); ++t) rest.add(film.error(t));
+  for (TileIndex t = 1; t < kFinalGrid.count(); ++t) rest.add(film.error(t));
   EXPECT_EQ(part.at("lightshaft:relmse"), fmt::format("{:.9g}", image_error(rest).relmse));
   for (const char* key : {"relmse", "relmse_ci95", "rmse", "rmse_ci95", "verdict", "few_hits"})
     EXPECT_FALSE(none.contains(std::string("lightshaft:") + key)) << key;
 }
 
 TEST(FinalExr, IsTrustedNoMoreThanItsCurve) {
-  const Film film = make_film(kGrid, 4);
+  const Film film = make_film(kFinalGrid, 4);
   Provenance from = some_provenance();
   from.judgement = Judgement{Judgement::Kind::heavy_tail, "don't trust yet: it falls too slowly", false};
   from.figures = {{"slope", -.5}};
@@ -188,13 +188,13 @@ Decoded decode(const std::vector<std::byte>& png) {
 }
 
 TEST(Preview, IsSrgbWithExposureInStops) {
-  Film film(kGrid);
-  ASSERT_TRUE(film.fold(0, 0, flat(kGrid, 0, {0.5f, 0.001f, 2.0f})));
-  ASSERT_TRUE(film.fold(1, 0, flat(kGrid, 1, {-1.0f, 0.0f, 1.0f})));
+  Film film(kFinalGrid);
+  ASSERT_TRUE(film.fold(0, 0, flat(kFinalGrid, 0, {0.5f, 0.001f, 2.0f})));
+  ASSERT_TRUE(film.fold(1, 0, flat(kFinalGrid, 1, {-1.0f, 0.0f, 1.0f})));
 
   const Decoded normal = decode(preview_png(film, 0).value()), darker = decode(preview_png(film, -1).value());
 
-  EXPECT_EQ(normal.size, kGrid.frame);
+  EXPECT_EQ(normal.size, kFinalGrid.frame);
   // sRGB of 0.5 is 0.735357 (188), of 0.001 the linear piece 0.01292 (3), of 0.25 0.537099 (137), of 0.0005
   // 0.00646 (2).
   EXPECT_EQ(normal.at(3, 3), (std::array{188, 3, 255}));
@@ -212,7 +212,7 @@ TEST(Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds) {
 }
 
 TEST(Preview, ShowsADarkCheckerWhereNothingIsRendered) {
-  const Decoded image = decode(preview_png(Film(kGrid), 0).value());
+  const Decoded image = decode(preview_png(Film(kFinalGrid), 0).value());
 
   EXPECT_NE(image.at(0, 0), image.at(8, 0));
   EXPECT_EQ(image.at(0, 0), image.at(8, 8));
@@ -222,7 +222,7 @@ TEST(Preview, ShowsADarkCheckerWhereNothingIsRendered) {
 TEST(Preview, RefusesAnAbsurdExposure) {
   for (const double stops :
        {1e9, -61.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
-    EXPECT_THAT(preview_png(Film(kGrid), stops).error().message, HasSubstr("exposure")) << stops;
+    EXPECT_THAT(preview_png(Film(kFinalGrid), stops).error().message, HasSubstr("exposure")) << stops;
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ using test::make_partial;
 using ::testing::HasSubstr;
 
 constexpr FrameSize kFrame{20, 13};
-const TileGrid kGrid{kFrame, 8};
+const TileGrid kPartialGrid{kFrame, 8};
 
 std::vector<std::byte> encoded(const Partial& partial, FrameSize frame = kFrame) {
   auto bytes = encode_partial(partial, frame);
@@ -45,13 +45,13 @@ TEST(UnitHeader, CanonicalJsonIsSortedAndWithoutSpaces) {
 }
 
 TEST(UnitHeader, ParsesWhatItWrites) {
-  const UnitHeader header = make_partial(kGrid, 4, {64, 128}).header;
+  const UnitHeader header = make_partial(kPartialGrid, 4, {64, 128}).header;
 
   EXPECT_EQ(parse_unit_header(canonical_json(header)).value(), header);
 }
 
 TEST(UnitHeader, RefusesOtherSpellingsAndWrongValuesByName) {
-  const std::string good = canonical_json(make_partial(kGrid, 4, {64, 128}).header);
+  const std::string good = canonical_json(make_partial(kPartialGrid, 4, {64, 128}).header);
   const auto with = [&](std::string_view from, std::string_view to) {
     std::string text = good;
     text.replace(text.find(from), from.size(), to);
@@ -74,8 +74,8 @@ TEST(UnitHeader, RefusesOtherSpellingsAndWrongValuesByName) {
 }
 
 TEST(Partial, SurvivesEncodingBitForBit) {
-  for (TileIndex tile = 0; tile < kGrid.count(); ++tile) {
-    Partial partial = make_partial(kGrid, tile, {2, 4});
+  for (TileIndex tile = 0; tile < kPartialGrid.count(); ++tile) {
+    Partial partial = make_partial(kPartialGrid, tile, {2, 4});
     partial.sums[0] = -0.0f;
     partial.sums[1] = std::numeric_limits<float>::denorm_min();
     partial.sums[2] = std::numeric_limits<float>::max();
@@ -90,7 +90,7 @@ TEST(Partial, SurvivesEncodingBitForBit) {
 }
 
 TEST(Partial, FileTellsItsOwnHeaderAndFrame) {
-  const Partial partial = make_partial(kGrid, 5, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 5, {0, 2});
 
   const auto file = decode_partial_file(encoded(partial));
 
@@ -100,7 +100,7 @@ TEST(Partial, FileTellsItsOwnHeaderAndFrame) {
 }
 
 TEST(Partial, DigestDependsOnHeaderAndOnEveryPlane) {
-  const Partial partial = make_partial(kGrid, 0, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 0, {0, 2});
   const Digest digest = unit_digest(partial);
 
   for (std::size_t plane = 0; plane < 6; ++plane) {
@@ -114,19 +114,19 @@ TEST(Partial, DigestDependsOnHeaderAndOnEveryPlane) {
 }
 
 TEST(Partial, IsNotWrittenWithWrongSizeOrValues) {
-  Partial partial = make_partial(kGrid, 0, {0, 2});
+  Partial partial = make_partial(kPartialGrid, 0, {0, 2});
   partial.sums.pop_back();
   EXPECT_FALSE(encode_partial(partial, kFrame));
 
-  partial = make_partial(kGrid, 0, {0, 2});
+  partial = make_partial(kPartialGrid, 0, {0, 2});
   partial.sums[64 * 4 + 8 * 3 + 2] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(encode_partial(partial, kFrame).error().message, HasSubstr("B.G of pixel (2, 3) is nan"));
 
-  EXPECT_FALSE(encode_partial(make_partial(kGrid, 5, {0, 2}), {8, 8}));
+  EXPECT_FALSE(encode_partial(make_partial(kPartialGrid, 5, {0, 2}), {8, 8}));
 }
 
 TEST(PartialGate, RefusesEveryTruncation) {
-  const Partial partial = make_partial(kGrid, 2, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 2, {0, 2});
   const auto exr = encoded(partial);
 
   for (std::size_t n = 0; n < exr.size(); ++n)
@@ -134,7 +134,7 @@ TEST(PartialGate, RefusesEveryTruncation) {
 }
 
 TEST(PartialGate, RefusesTrailingBytes) {
-  const Partial partial = make_partial(kGrid, 2, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 2, {0, 2});
   auto exr = encoded(partial);
   exr.push_back(std::byte{0});
 
@@ -144,7 +144,7 @@ TEST(PartialGate, RefusesTrailingBytes) {
 // Whatever bit flips: the file is refused, or it decodes to other sums and so to another digest, or the byte
 // means nothing to us (aspect ratio, screen window, a channel's "linear" hint).
 TEST(PartialGate, NoFlippedBitGoesUnnoticed) {
-  const Partial partial = make_partial(kGrid, 5, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 5, {0, 2});
   const auto good = encoded(partial);
   const Digest digest = unit_digest(partial);
   std::size_t harmless = 0;
@@ -163,7 +163,7 @@ TEST(PartialGate, NoFlippedBitGoesUnnoticed) {
 }
 
 TEST(PartialGate, NamesWhatIsWrong) {
-  const Partial partial = make_partial(kGrid, 4, {2, 4});
+  const Partial partial = make_partial(kPartialGrid, 4, {2, 4});
   const auto good = encoded(partial);
   const auto with = [&](std::size_t at, int value) {
     auto exr = good;
@@ -186,7 +186,7 @@ TEST(PartialGate, NamesWhatIsWrong) {
 }
 
 TEST(PartialGate, RefusesAnotherUnitNamingTheDifference) {
-  const Partial partial = make_partial(kGrid, 4, {2, 4});
+  const Partial partial = make_partial(kPartialGrid, 4, {2, 4});
   const auto exr = encoded(partial);
   const auto expecting = [&](auto change) {
     UnitHeader header = partial.header;
@@ -209,7 +209,7 @@ TEST(PartialGate, RefusesAnotherUnitNamingTheDifference) {
 }
 
 TEST(PartialGate, RefusesNonFiniteSumsNamingThePixel) {
-  const Partial partial = make_partial(kGrid, 4, {2, 4});
+  const Partial partial = make_partial(kPartialGrid, 4, {2, 4});
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::infinity()}) {
     auto exr = encoded(partial);
     std::memcpy(exr.data() + exr.size() - sizeof bad, &bad,
@@ -220,7 +220,7 @@ TEST(PartialGate, RefusesNonFiniteSumsNamingThePixel) {
 }
 
 TEST(PartialGate, DoesNotAllocateForAHugeTile) {
-  const Partial partial = make_partial(kGrid, 0, {0, 2});
+  const Partial partial = make_partial(kPartialGrid, 0, {0, 2});
   auto exr = encoded(partial);
   std::string json = canonical_json(partial.header);
   const std::size_t at = find(exr, json);

@@ -17,18 +17,18 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr FrameSize kSize{16, 12};
-constexpr double kRounding = 576 * 0x1p-53;  // of a sum of kValues values below 1
-constexpr std::size_t kValues = std::size_t{3} * 16 * 12;
+constexpr double kRounding = 576 * 0x1p-53;  // of a sum of kReferenceValues values below 1
+constexpr std::size_t kReferenceValues = std::size_t{3} * 16 * 12;
 
 ExrPicture picture(float level) {
   ExrPicture p{kSize, {}, {}};
-  for (const char* c : {"R", "G", "B"}) p.channels[c] = ExrFloat{std::vector<float>(kValues / 3, level)};
+  for (const char* c : {"R", "G", "B"}) p.channels[c] = ExrFloat{std::vector<float>(kReferenceValues / 3, level)};
   return p;
 }
 
 ExrPicture with_error(ExrPicture p, float error) {
   for (const char* c : {"stderr.R", "stderr.G", "stderr.B"})
-    p.channels[c] = ExrFloat{std::vector<float>(kValues / 3, error)};
+    p.channels[c] = ExrFloat{std::vector<float>(kReferenceValues / 3, error)};
   return p;
 }
 
@@ -40,7 +40,7 @@ TEST(Reference, WithoutItsOwnErrorGivesThePlainDifference) {
   const auto reference = read(picture(2));
   ASSERT_TRUE(reference) << reference.error().message;
 
-  const TrueError e = true_error(*reference, std::vector<float>(kValues, 2.5F));
+  const TrueError e = true_error(*reference, std::vector<float>(kReferenceValues, 2.5F));
 
   EXPECT_TRUE(reference->error.empty());
   EXPECT_DOUBLE_EQ(e.rmse, .5);
@@ -52,7 +52,7 @@ TEST(Reference, TakesItsOwnErrorAway) {
   const auto reference = read(with_error(picture(2), .25F));
   ASSERT_TRUE(reference);
 
-  const TrueError e = true_error(*reference, std::vector<float>(kValues, 2.5F));
+  const TrueError e = true_error(*reference, std::vector<float>(kReferenceValues, 2.5F));
 
   EXPECT_DOUBLE_EQ(e.rmse, std::sqrt(.25 - .0625));
   // Halves of 2.25 and 1.75, each with the variance 2 s^2.
@@ -60,7 +60,7 @@ TEST(Reference, TakesItsOwnErrorAway) {
   EXPECT_NEAR(e.relmse, (.25 - .0625) * h, kRounding);
   EXPECT_DOUBLE_EQ(noise_of(*reference).mse, .0625);
   EXPECT_NEAR(noise_of(*reference).relmse, .0625 * h, kRounding);
-  EXPECT_EQ(true_error(*reference, std::vector<float>(kValues, 2.1F)).rmse, 0);  // .01 - .0625
+  EXPECT_EQ(true_error(*reference, std::vector<float>(kReferenceValues, 2.1F)).rmse, 0);  // .01 - .0625
 }
 
 // A reference of four times the samples of the image has a fifth of the squared difference. With its layers
@@ -75,7 +75,7 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
   for (int i = 0; i < kTrials; ++i) {
     Reference reference{kSize, {}, {}};
     std::vector<float> image;
-    for (std::size_t v = 0; v < kValues; ++v) {
+    for (std::size_t v = 0; v < kReferenceValues; ++v) {
       const float a = 1 + .1F * normal(random), b = 1 + .1F * normal(random);  // halves: their mean has .005
       reference.rgb.push_back((a + b) / 2);
       reference.error.push_back(std::abs(a - b) / 2);
@@ -109,7 +109,7 @@ TEST(Reference, ReadsOurOwnFinalImageWithItsError) {
   const auto reference = read_reference(exr->exr, "ours", kSize);
 
   ASSERT_TRUE(reference) << reference.error().message;
-  ASSERT_EQ(reference->error.size(), kValues);
+  ASSERT_EQ(reference->error.size(), kReferenceValues);
   const TilePixels tile = film.pixels(0);
   EXPECT_EQ(reference->error[3], static_cast<float>(tile.standard_error[3]));
   EXPECT_EQ(reference->rgb[4], static_cast<float>(tile.mean[4]));

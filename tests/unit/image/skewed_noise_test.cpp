@@ -14,7 +14,7 @@ namespace ls {
 namespace {
 
 constexpr int kSide = 32;
-constexpr std::size_t kPixels = kSide * kSide;
+constexpr std::size_t kNoisyPixels = kSide * kSide;
 constexpr double kDark = 0.01;
 
 using Halves = std::array<std::vector<double>, 2>;
@@ -28,10 +28,10 @@ double truth(std::size_t p) { return p % 2 ? .5 : .9; }
 Halves skewed(double samples, std::mt19937_64& random) {
   Halves out;
   for (auto& half : out) {
-    half.resize(3 * kPixels);
-    for (std::size_t p = 0; p < kPixels; ++p) {
+    half.resize(3 * kNoisyPixels);
+    for (std::size_t p = 0; p < kNoisyPixels; ++p) {
       const double v = samples * (truth(p) - kNoise) + std::gamma_distribution(samples, kNoise)(random);
-      for (std::size_t c = 0; c < 3; ++c) half[c * kPixels + p] = v;
+      for (std::size_t c = 0; c < 3; ++c) half[c * kNoisyPixels + p] = v;
     }
   }
   return out;
@@ -46,7 +46,7 @@ Sums trial(std::mt19937_64& random) {
   Halves before = skewed(16, random), now = skewed(16, random);
   Sums out;
   for (std::size_t h = 0; h < 2; ++h)
-    for (std::size_t i = 0; i < 3 * kPixels; ++i) {
+    for (std::size_t i = 0; i < 3 * kNoisyPixels; ++i) {
       now[h][i] = (now[h][i] + before[h][i]) / 32;
       before[h][i] /= 16;
     }
@@ -56,8 +56,8 @@ Sums trial(std::mt19937_64& random) {
   const TileError told = estimate_error(halves, 64, &earlier);
   EXPECT_DOUBLE_EQ(told.relative.squares + told.skew, out.plain);
   out.corrected = told.relative.squares;
-  for (std::size_t i = 0; i < 3 * kPixels; ++i) {
-    const double right = truth(i % kPixels), e = (now[0][i] + now[1][i]) / 2 - right;
+  for (std::size_t i = 0; i < 3 * kNoisyPixels; ++i) {
+    const double right = truth(i % kNoisyPixels), e = (now[0][i] + now[1][i]) / 2 - right;
     out.realised += e * e / (right * right + kDark);
   }
   return out;
@@ -80,7 +80,7 @@ TEST(SkewedNoise, TheLastRoundTellsWhatItTakesOffTheRelativeError) {
 }
 
 TEST(SkewedNoise, ThereIsNothingToCorrectWhereItIsDark) {
-  std::vector<double> a(3 * kPixels), b = a, a0 = a, b0 = a;
+  std::vector<double> a(3 * kNoisyPixels), b = a, a0 = a, b0 = a;
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal(0, 1e-3);
   for (auto* half : {&a, &b, &a0, &b0})

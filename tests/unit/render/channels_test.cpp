@@ -17,7 +17,7 @@ namespace {
 
 // Means within 5 standard errors (6e-7 a check, 105 checks: 6e-5)
 constexpr int kFlights = 40000;
-const Size kSize{9, 9, 9};
+const Size kChannelsSize{9, 9, 9};
 const V3 kFrom(-1, .3f, 1.1f), kAlong = normalize(V3(9, 7.1f, 6.2f));
 
 struct Coloured {
@@ -55,19 +55,19 @@ std::vector<float> scaled(std::vector<float> v, float by) {
 std::vector<Coloured> media() {
   std::vector<Coloured> all;
   const auto values = [](int c, bool sparse = false) {
-    return random_values(kSize, static_cast<unsigned>(21 + c), sparse);
+    return random_values(kChannelsSize, static_cast<unsigned>(21 + c), sparse);
   };
-  all.push_back(coloured("dense", .3f, [&](int c) { return unit_grid(kSize, values(c)); }));
+  all.push_back(coloured("dense", .3f, [&](int c) { return unit_grid(kChannelsSize, values(c)); }));
   all.push_back(coloured("sparse, where others are not", 1.5f,
-                         [&](int c) { return unit_grid(kSize, values(c, true)); }));
+                         [&](int c) { return unit_grid(kChannelsSize, values(c, true)); }));
   // One channel sees nothing; of the others some cells are tracked and some followed exactly.
   all.push_back(coloured("apart", .6f, [&](int c) {
-    return unit_grid(kSize, scaled(values(c, c == 2), c == 0 ? 0.f : c == 1 ? .5f : 20.f));
+    return unit_grid(kChannelsSize, scaled(values(c, c == 2), c == 0 ? 0.f : c == 1 ? .5f : 20.f));
   }));
   all.push_back(
-      coloured("nearest", .3f, [&](int c) { return voxel_grid(kSize, values(c), kNearest, Wrap::clamp); }));
+      coloured("nearest", .3f, [&](int c) { return voxel_grid(kChannelsSize, values(c), kNearest, Wrap::clamp); }));
   all.push_back(coloured("repeated", .3f,
-                         [&](int c) { return voxel_grid(kSize, values(c), kTrilinear, Wrap::repeat); }));
+                         [&](int c) { return voxel_grid(kChannelsSize, values(c), kTrilinear, Wrap::repeat); }));
   return all;
 }
 

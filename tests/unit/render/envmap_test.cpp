@@ -20,7 +20,7 @@ using test::SkyImage;
 using ::testing::HasSubstr;
 using test::operator*;
 
-constexpr double kPiD = 3.14159265358979323846;
+constexpr double kPiExact = 3.14159265358979323846;
 
 std::string refusal(const SkyImage& s, const Transform& t = {}, double scale = 1) {
   const auto m = try_map(s, t, scale);
@@ -58,7 +58,7 @@ TEST(EnvironmentMap, IsBilinearBetweenTexelsAndRepeatsAround) {
   EXPECT_NEAR(value(m, {0, 0, 1}), 12.5, kEps) << "the middle of the image";
   EXPECT_NEAR(value(m, {0, 0, -1}), 12.5, kEps) << "its left and right edge: of 14 and 11";
   // A quarter turn further by 22.5 degrees: a quarter of the way from 14 to 11.
-  const auto s = static_cast<float>(std::sin(kPiD / 8)), c = static_cast<float>(std::cos(kPiD / 8));
+  const auto s = static_cast<float>(std::sin(kPiExact / 8)), c = static_cast<float>(std::cos(kPiExact / 8));
   EXPECT_NEAR(value(m, {-s, 0, -c}), 14 + (11 - 14) * .25, kEps);
   // 45 degrees above the horizon: half of the pole's.
   const auto r = static_cast<float>(std::sqrt(.5));
@@ -180,10 +180,10 @@ TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
   const auto world = test::world_of(kit);
   const LightChoice c = world->lights.choose({0, 0, 0});
   const auto l = world->lights.sample(c, V3(0));
-  const double r = world->geometry.radius / world->geometry.scale, power = 4 * kPiD * kPiD * r * r;
-  const double expected = .25 + .5 * power / (power + 4 * kPiD);
+  const double r = world->geometry.radius / world->geometry.scale, power = 4 * kPiExact * kPiExact * r * r;
+  const double expected = .25 + .5 * power / (power + 4 * kPiExact);
   ASSERT_TRUE(l);
-  EXPECT_NEAR(l->pdf * 4 * kPiD, expected, 1e-4);
+  EXPECT_NEAR(l->pdf * 4 * kPiExact, expected, 1e-4);
   // As a path that leaves finds it: one whose direction had the same density shares it in halves.
   EXPECT_FLOAT_EQ(world->lights.environment(l->direction, l->pdf).x, .5f);
   EXPECT_FLOAT_EQ(world->lights.environment(l->direction, kInfinity).x, 1);

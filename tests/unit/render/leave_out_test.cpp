@@ -18,7 +18,7 @@ using test::operator*;
 const PixelRect kAll{0, 0, 12, 8};
 TileResult render(const World& w) { return render_tile(w, kAll, {0, 16}, nullptr, nullptr); }
 
-SceneKit room() {
+SceneKit plain_room() {
   SceneKit kit({12, 8});
   const BsdfIndex white = kit.diffuse(.6);
   kit.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(3), white);
@@ -30,12 +30,12 @@ SceneKit room() {
   return kit;
 }
 SceneKit foggy() {
-  SceneKit kit = room();
+  SceneKit kit = plain_room();
   kit.container(CubeShape{}, test::scale(.9), kit.null(), kit.homogeneous({.8, .8, .8}, {.9, .5, .2}));
   return kit;
 }
 SceneKit cloudy() {
-  SceneKit kit = room();
+  SceneKit kit = plain_room();
   const VolumeIndex v =
       kit.grid({2, 2, 2}, {0, 1, 2, 3, 4, 5, 6, 7}, translate({-1, -1, -1}) * test::scale(2));
   kit.container(CubeShape{}, test::scale(.9), kit.null(), kit.heterogeneous(v, {.9, .9, .9}));
@@ -49,7 +49,7 @@ SceneKit with(SceneKit kit, auto change) {
 // Scenes with something dead in them that no ray stops at and that next-event estimation does not choose.
 std::vector<SceneKit> scenes_with_dead_parts() {
   std::vector<SceneKit> all;
-  for (SceneKit (*base)() : {room, foggy, cloudy}) {
+  for (SceneKit (*base)() : {plain_room, foggy, cloudy}) {
     const auto blended = [](double weight, bool of_glass) {
       return [=](SceneKit& k) {
         const BsdfIndex other = of_glass ? k.glass(1.5) : k.mirror();
@@ -107,7 +107,7 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
     for (const auto& s : describe(*test::world_of(kit)).structures) b[s.name] = s.bytes;
     return b;
   };
-  auto vacuum = bytes(room());
+  auto vacuum = bytes(plain_room());
   for (const char* name : {"textures", "environment map", "grid values", "majorant cells", "light tree"})
     EXPECT_EQ(vacuum.at(name), 0u) << name;
   for (const char* name : {"geometry", "bvh", "materials", "light table"})
@@ -115,7 +115,7 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
   EXPECT_EQ(bytes(foggy()).at("grid values"), 0u);
   EXPECT_GE(bytes(cloudy()).at("grid values"), 8 * sizeof(float));
   EXPECT_GT(bytes(cloudy()).at("majorant cells"), 0u);
-  const auto many = bytes(with(room(), [](SceneKit& k) {
+  const auto many = bytes(with(plain_room(), [](SceneKit& k) {
     for (int i = 0; i < 40; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
   }));
   EXPECT_GT(many.at("light tree"), 0u);
@@ -123,13 +123,13 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
 
 TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
   const auto variant = [](const SceneKit& kit) { return describe(*test::world_of(kit)).variant; };
-  EXPECT_EQ(variant(room()), "surfaces");
-  EXPECT_EQ(variant(with(room(),
+  EXPECT_EQ(variant(plain_room()), "surfaces");
+  EXPECT_EQ(variant(with(plain_room(),
                          [](SceneKit& k) {
                            k.shape(SphereShape{}, translate({.2, -.6, .4}), k.null());
                          })),
             "surfaces that light passes");
-  EXPECT_EQ(variant(with(room(),
+  EXPECT_EQ(variant(with(plain_room(),
                          [](SceneKit& k) {
                            k.shape(SphereShape{}, translate({.2, -.6, .4}),
                                    k.bsdf(MaskBsdf{k.texture({.5, .5, .5}), k.diffuse(.4)}));
@@ -148,7 +148,7 @@ TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
 }
 
 TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {
-  SceneKit kit = room();
+  SceneKit kit = plain_room();
   kit.scene.emitters.clear();
   const auto world = test::world_of(kit);
   EXPECT_EQ(world->lights.count(), 1u);
@@ -171,7 +171,7 @@ WorkCounters counted(const SceneKit& kit) {
 }
 
 TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
-  const WorkCounters vacuum = counted(room());
+  const WorkCounters vacuum = counted(plain_room());
   EXPECT_GT(vacuum.shadow_rays, 0u);
   EXPECT_EQ(vacuum.density + vacuum.macro_cells + vacuum.phase + vacuum.transmittance + vacuum.glow, 0u);
   EXPECT_EQ(vacuum.equiangular + vacuum.boundary_rays + vacuum.veils, 0u);
@@ -191,13 +191,13 @@ TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
 }
 
 TEST(LeaveOutCounters, CountWhatIsUsed) {
-  const WorkCounters lens = counted(with(room(), [](SceneKit& k) { k.scene.sensor.aperture_radius = .1; }));
+  const WorkCounters lens = counted(with(plain_room(), [](SceneKit& k) { k.scene.sensor.aperture_radius = .1; }));
   EXPECT_EQ(lens.lens, 12u * 8 * 16);
-  const WorkCounters lights = counted(with(room(), [](SceneKit& k) {
+  const WorkCounters lights = counted(with(plain_room(), [](SceneKit& k) {
     for (int i = 0; i < 40; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
   }));
   EXPECT_GT(lights.light_tree, 0u);
-  const WorkCounters ball = counted(with(room(), [](SceneKit& k) {
+  const WorkCounters ball = counted(with(plain_room(), [](SceneKit& k) {
     k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
             k.bsdf(MaskBsdf{k.texture({.5, .5, .5}), k.diffuse(.4)}));
   }));

@@ -26,7 +26,7 @@ pugi::xml_document parsed(const std::string& svg) {
   return document;
 }
 
-std::size_t count(const pugi::xml_document& svg, const char* path) { return svg.select_nodes(path).size(); }
+std::size_t count_of(const pugi::xml_document& svg, const char* path) { return svg.select_nodes(path).size(); }
 
 // Where the marks of a curve are.
 std::vector<std::pair<double, double>> marks(const pugi::xml_document& svg) {
@@ -72,8 +72,8 @@ TEST(LogPlot, NamesOfStrangersAreText) {
   plot.curves.push_back(plot.curves[0]);  // so that names are shown
   const auto svg = parsed(svg_of(plot));
 
-  EXPECT_EQ(count(svg, "//script"), 0u);
-  EXPECT_EQ(count(svg, "//*[@onload]"), 0u);
+  EXPECT_EQ(count_of(svg, "//script"), 0u);
+  EXPECT_EQ(count_of(svg, "//*[@onload]"), 0u);
   EXPECT_STREQ(svg.child("svg").child("title").text().get(), plot.title.c_str());
   EXPECT_STREQ(svg.select_node("//text[@class='name']").node().text().get(), plot.title.c_str());
 }
@@ -98,8 +98,8 @@ TEST(LogPlot, WithoutAPointSaysWhenThereWillBeOne) {
   plot.ahead = Ahead{10, 9, 11};
   const auto svg = parsed(svg_of(plot));
 
-  EXPECT_EQ(count(svg, "//path"), 0u);
-  EXPECT_EQ(count(svg, "//text"), 1u);
+  EXPECT_EQ(count_of(svg, "//path"), 0u);
+  EXPECT_EQ(count_of(svg, "//text"), 1u);
 }
 
 TEST(LogPlot, TargetAndForecastMeetWhereTheErrorWillBe) {
@@ -117,17 +117,17 @@ TEST(LogPlot, TargetAndForecastMeetWhereTheErrorWillBe) {
   EXPECT_NEAR(y + 5, across, 0.11);  // the mark is 10 high
   EXPECT_NEAR(span_y + 5, across, 0.11);
   EXPECT_LT(span_x, x);
-  EXPECT_EQ(count(svg, "//path[@class='more c0']"), 1u);
+  EXPECT_EQ(count_of(svg, "//path[@class='more c0']"), 1u);
 }
 
 TEST(LogPlot, AForecastWithoutATargetOrTooFarAwayIsNotDrawn) {
   LogPlot plot = falling();
   plot.ahead = Ahead{5000, 4000, 7000, 2000};
-  EXPECT_EQ(count(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
+  EXPECT_EQ(count_of(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
 
   plot.target = 1e-9;
   plot.ahead = Ahead{1e9, 1e8, 1e10};
-  EXPECT_EQ(count(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
+  EXPECT_EQ(count_of(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
 }
 
 TEST(LogPlot, SeveralCurvesHaveALegendAndTheirOwnMarks) {
@@ -135,9 +135,9 @@ TEST(LogPlot, SeveralCurvesHaveALegendAndTheirOwnMarks) {
   for (int i = 1; i < 6; ++i) plot.curves.push_back(plot.curves[0]);
   const auto svg = parsed(svg_of(plot));
 
-  EXPECT_EQ(count(svg, "//text[@class='name']"), 6u);
-  EXPECT_EQ(count(svg, "//polygon[starts-with(@class,'band')]"), 6u);
-  EXPECT_EQ(count(parsed(svg_of(falling())), "//text[@class='name']"), 0u);
+  EXPECT_EQ(count_of(svg, "//text[@class='name']"), 6u);
+  EXPECT_EQ(count_of(svg, "//polygon[starts-with(@class,'band')]"), 6u);
+  EXPECT_EQ(count_of(parsed(svg_of(falling())), "//text[@class='name']"), 0u);
 }
 
 TEST(LogPlot, LongCurvesAreThinnedToTheirEnds) {
@@ -152,8 +152,8 @@ TEST(LogPlot, LongCurvesAreThinnedToTheirEnds) {
 TEST(LogPlot, AFileOfItsOwnHasItsStyle) {
   const auto svg = parsed(standalone_svg(falling()));
 
-  EXPECT_EQ(count(svg, "/svg/style"), 1u);
-  EXPECT_EQ(count(parsed(svg_of(falling())), "/svg/style"), 0u);
+  EXPECT_EQ(count_of(svg, "/svg/style"), 1u);
+  EXPECT_EQ(count_of(parsed(svg_of(falling())), "/svg/style"), 0u);
 }
 
 }  // namespace

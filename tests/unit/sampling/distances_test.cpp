@@ -16,7 +16,7 @@
 namespace ls::render {
 namespace {
 
-constexpr int kCells = 64, kSamples = 100000;
+constexpr int kCells = 64, kDistanceSamples = 100000;
 
 // Samples by cells between these edges, and a last one for what lies in none; `mass(a, b)` is the density's
 // integral.
@@ -26,13 +26,13 @@ void compare(test::ChiSquareBook& book, const std::string& name, const std::vect
   std::vector<double> expected, got(edges.size(), 0);
   double inside = 0;
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-    expected.push_back(mass(edges[i], edges[i + 1]) * kSamples);
+    expected.push_back(mass(edges[i], edges[i + 1]) * kDistanceSamples);
     inside += expected.back();
   }
-  expected.push_back(std::max(0., kSamples - inside));
-  EXPECT_LE(inside, kSamples * (1 + 1e-5)) << name;
+  expected.push_back(std::max(0., kDistanceSamples - inside));
+  EXPECT_LE(inside, kDistanceSamples * (1 + 1e-5)) << name;
   RandomStream r(41);
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kDistanceSamples; ++i) {
     const double x = sample(r);
     const auto it = std::upper_bound(edges.begin(), edges.end(), x);
     const bool in = it != edges.begin() && it != edges.end();

@@ -12,7 +12,7 @@
 namespace ls::render {
 namespace {
 
-constexpr int kSamples = 100000;
+constexpr int kFilmSamples = 100000;
 
 struct Filter {
   std::string name;
@@ -65,10 +65,10 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
     std::vector<double> expected, got(kCells, 0);
     const double all = integral(f, -f.radius, f.radius), width = 2 * f.radius / kCells;
     for (int i = 0; i < kCells; ++i)
-      expected.push_back(kSamples * integral(f, -f.radius + i * width, -f.radius + (i + 1) * width) / all);
+      expected.push_back(kFilmSamples * integral(f, -f.radius + i * width, -f.radius + (i + 1) * width) / all);
     RandomStream r(51);
     const PixelFilter sampled(f.filter);
-    for (int i = 0; i < kSamples; ++i) {
+    for (int i = 0; i < kFilmSamples; ++i) {
       const double x = sampled.offset(r.uniform());
       ++got[static_cast<std::size_t>(std::clamp(static_cast<int>((x + f.radius) / width), 0, kCells - 1))];
     }
@@ -76,11 +76,11 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
   }
   // Cells of equal area: rings by the square of the radius, and sectors.
   constexpr int kRings = 10, kSectors = 16;
-  std::vector<double> expected(kRings * kSectors, double{kSamples} / (kRings * kSectors)),
+  std::vector<double> expected(kRings * kSectors, double{kFilmSamples} / (kRings * kSectors)),
       got(expected.size(), 0);
   const Camera camera = lens();
   RandomStream r(52);
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kFilmSamples; ++i) {
     const float u = r.uniform(), v = r.uniform();
     const V3d p = lens_point(camera, {u, v});
     const double turn = std::atan2(p.y, p.x) / (2 * M_PI);

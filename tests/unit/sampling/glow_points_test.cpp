@@ -12,7 +12,7 @@
 namespace ls::render {
 namespace {
 
-constexpr int kCells = 48, kSamples = 100000;
+constexpr int kGlowCells = 48, kGlowSamples = 100000;
 constexpr double kDepths[] = {0, 1e-16, 1e-6, .5, 4, 40};
 constexpr float kSigmas[] = {1e-3f, .7f, 9.f};
 
@@ -20,24 +20,24 @@ constexpr float kSigmas[] = {1e-3f, .7f, 9.f};
 template <class Pdf, class Sample>
 void compare(test::ChiSquareBook& book, const std::string& name, double length, double slack, Pdf pdf,
              Sample sample) {
-  std::vector<double> expected(kCells), got(kCells, 0);
-  const double width = length / kCells, h = width / 64;
+  std::vector<double> expected(kGlowCells), got(kGlowCells, 0);
+  const double width = length / kGlowCells, h = width / 64;
   double inside = 0;
-  for (int i = 0; i < kCells; ++i) {
+  for (int i = 0; i < kGlowCells; ++i) {
     double sum = 0;
     for (int k = 0; k < 64; ++k) {
       const double a = i * width + k * h;
       sum += pdf(a) + 4 * pdf(a + h / 2) + pdf(a + h);
     }
-    expected[static_cast<std::size_t>(i)] = sum * h / 6 * kSamples;
+    expected[static_cast<std::size_t>(i)] = sum * h / 6 * kGlowSamples;
     inside += sum * h / 6;
   }
   EXPECT_NEAR(inside, 1, slack) << name << ": the density's integral";
   RandomStream r(43);
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kGlowSamples; ++i) {
     const double t = sample(double{r.uniform()});
     ASSERT_TRUE(t >= 0 && t <= length * (1 + 1e-6)) << name;
-    ++got[static_cast<std::size_t>(std::min(kCells - 1, static_cast<int>(t / width)))];
+    ++got[static_cast<std::size_t>(std::min(kGlowCells - 1, static_cast<int>(t / width)))];
   }
   book.expect(name, expected, got);
 }
@@ -70,7 +70,7 @@ TEST(GlowPoints, FallAsTheirDensitySays) {
       compare(
           book, fmt::format("where {} absorbs", s), kLength,
           // Simpson's rule misses a sixth of a step at each of about 16 jumps of at most s / absorbed.
-          g.filter() == kNearest ? 16 * kLength / kCells / 64 / 6 * s / absorbed : 1e-4,
+          g.filter() == kNearest ? 16 * kLength / kGlowCells / 64 / 6 * s / absorbed : 1e-4,
           [&](double t) {
             const V3 p = kFrom + kAlong * static_cast<float>(t);
             return absorption_pdf(s, value_at(g, p), std::exp(-depth(t)), absorbed);

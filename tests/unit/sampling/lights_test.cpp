@@ -17,7 +17,7 @@ using test::SceneKit;
 using test::translate;
 using test::operator*;
 
-constexpr int kSamples = 100000;
+constexpr int kLightSamples = 100000;
 
 struct Case {
   std::string name;
@@ -128,12 +128,12 @@ TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
     EXPECT_LE(cells.total(), 1 + 3e-3) << c.name;
     std::vector<double> got(cells.size(), 0);
     RandomStream r(31);
-    for (int i = 0; i < kSamples; ++i) {
+    for (int i = 0; i < kLightSamples; ++i) {
       const float l = r.uniform(), u = r.uniform(), v = r.uniform();
       const auto s = b.world->lights.sample(b.world->lights.choose(numbers(l, u, v)), x);
       ++got[s ? cells.of(s->direction) : cells.size() - 1];
     }
-    book.expect(c.name, test::counts(p, kSamples), got);
+    book.expect(c.name, test::counts(p, kLightSamples), got);
   }
   book.close();
 }

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 std::string sphere(const std::string& bsdf) {
   return with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>");
 }
-Scene with_bsdf(const std::string& bsdf) { return must_read(sphere(bsdf)); }
+Scene scene_with_bsdf(const std::string& bsdf) { return must_read(sphere(bsdf)); }
 std::string error_of(const std::string& bsdf) {
   const ReadResult r = read(sphere(bsdf));
   return r.scene ? "" : messages(r);
@@ -30,40 +30,40 @@ template <class T>
 const T& at(const Scene& s, BsdfIndex i) {
   return std::get<T>(s.bsdfs.at(i.value));
 }
-Rgb colour(const Scene& s, TextureIndex i) { return std::get<ConstantTexture>(s.textures.at(i.value)).value; }
+Rgb texture_colour(const Scene& s, TextureIndex i) { return std::get<ConstantTexture>(s.textures.at(i.value)).value; }
 
 constexpr char kDiffuse[] = "<bsdf type=\"diffuse\"/>", kGlass[] = "<bsdf type=\"thindielectric\"/>";
 
 // Mitsuba 3.9.1's, as its plugins print them.
 TEST(Surfaces, WhatIsNotGivenIsMitsubasDefault) {
-  const Scene plastic = with_bsdf("<bsdf type=\"plastic\"/>");
+  const Scene plastic = scene_with_bsdf("<bsdf type=\"plastic\"/>");
   const auto& p = bsdf_of<PlasticBsdf>(plastic);
   EXPECT_EQ(p.int_ior, 1.49);
   EXPECT_EQ(p.ext_ior, 1.000277);
   EXPECT_FALSE(p.nonlinear);
-  EXPECT_EQ(colour(plastic, p.diffuse_reflectance), (Rgb{.5, .5, .5}));
-  EXPECT_EQ(colour(plastic, p.specular_reflectance), (Rgb{1, 1, 1}));
+  EXPECT_EQ(texture_colour(plastic, p.diffuse_reflectance), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(texture_colour(plastic, p.specular_reflectance), (Rgb{1, 1, 1}));
 
-  const Scene rough = with_bsdf("<bsdf type=\"roughdielectric\"/>");
+  const Scene rough = scene_with_bsdf("<bsdf type=\"roughdielectric\"/>");
   const auto& r = bsdf_of<RoughDielectricBsdf>(rough);
   EXPECT_EQ(r.distribution, Microfacet::beckmann);
   EXPECT_EQ(r.int_ior, 1.5046);
-  EXPECT_EQ(colour(rough, r.alpha_u), (Rgb{.1, .1, .1}));
-  EXPECT_EQ(colour(rough, r.alpha_v), (Rgb{.1, .1, .1}));
-  EXPECT_EQ(colour(rough, r.specular_transmittance), (Rgb{1, 1, 1}));
+  EXPECT_EQ(texture_colour(rough, r.alpha_u), (Rgb{.1, .1, .1}));
+  EXPECT_EQ(texture_colour(rough, r.alpha_v), (Rgb{.1, .1, .1}));
+  EXPECT_EQ(texture_colour(rough, r.specular_transmittance), (Rgb{1, 1, 1}));
 
-  EXPECT_EQ(bsdf_of<ThinDielectricBsdf>(with_bsdf(kGlass)).int_ior, 1.5046);
-  const Scene mask = with_bsdf(fmt::format("<bsdf type=\"mask\">{}</bsdf>", kDiffuse));
-  EXPECT_EQ(colour(mask, bsdf_of<MaskBsdf>(mask).opacity), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(bsdf_of<ThinDielectricBsdf>(scene_with_bsdf(kGlass)).int_ior, 1.5046);
+  const Scene mask = scene_with_bsdf(fmt::format("<bsdf type=\"mask\">{}</bsdf>", kDiffuse));
+  EXPECT_EQ(texture_colour(mask, bsdf_of<MaskBsdf>(mask).opacity), (Rgb{.5, .5, .5}));
 }
 
 TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
-  const Scene one = with_bsdf(
+  const Scene one = scene_with_bsdf(
       "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\".3\"/><string name=\"int_ior\" "
       "value=\"water\"/><string name=\"distribution\" value=\"ggx\"/></bsdf>");
   const auto& b = bsdf_of<RoughDielectricBsdf>(one);
   EXPECT_EQ(b.alpha_u, b.alpha_v);
-  EXPECT_EQ(colour(one, b.alpha_u), (Rgb{.3, .3, .3}));
+  EXPECT_EQ(texture_colour(one, b.alpha_u), (Rgb{.3, .3, .3}));
   EXPECT_EQ(b.int_ior, 1.333);
   EXPECT_EQ(b.distribution, Microfacet::ggx);
   EXPECT_THAT(error_of("<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\".3\"/><float "
@@ -72,7 +72,7 @@ TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
 }
 
 TEST(Surfaces, AnOpacityTakesAlphaFromItsImageAndOthersStillItsColour) {
-  const Scene s = with_bsdf(
+  const Scene s = scene_with_bsdf(
       "<bsdf type=\"mask\"><texture type=\"bitmap\" name=\"opacity\" id=\"leaf\"><string name=\"filename\" "
       "value=\"wood.png\"/></texture><bsdf type=\"diffuse\"><ref name=\"reflectance\" "
       "id=\"leaf\"/></bsdf></bsdf>");
@@ -84,13 +84,13 @@ TEST(Surfaces, AnOpacityTakesAlphaFromItsImageAndOthersStillItsColour) {
 
 TEST(Surfaces, BlendsAreOrderedByNameOrElseByPlace) {
   const std::string weight = "<float name=\"weight\" value=\".2\"/>";
-  const Scene placed = with_bsdf(
+  const Scene placed = scene_with_bsdf(
       fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\"/>{}</bsdf>", weight, kDiffuse));
-  EXPECT_EQ(colour(placed, bsdf_of<BlendBsdf>(placed).weight), (Rgb{.2, .2, .2}));
+  EXPECT_EQ(texture_colour(placed, bsdf_of<BlendBsdf>(placed).weight), (Rgb{.2, .2, .2}));
   at<PlasticBsdf>(placed, bsdf_of<BlendBsdf>(placed).first);
   at<DiffuseBsdf>(placed, bsdf_of<BlendBsdf>(placed).second);
   const Scene named =
-      with_bsdf(fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\" name=\"b\"/><bsdf "
+      scene_with_bsdf(fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\" name=\"b\"/><bsdf "
                             "type=\"diffuse\" name=\"a\"/></bsdf>",
                             weight));
   at<DiffuseBsdf>(named, bsdf_of<BlendBsdf>(named).first);
@@ -117,7 +117,7 @@ TEST(Surfaces, WhatCannotBeNestedIsRefusedWithItsPlace) {
 }
 
 TEST(Surfaces, ANormalMapHoldsImageAndBsdf) {
-  const Scene s = with_bsdf(
+  const Scene s = scene_with_bsdf(
       "<bsdf type=\"twosided\"><bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\"><boolean "
       "name=\"raw\" value=\"true\"/><string name=\"filename\" value=\"wood.png\"/></texture><bsdf "
       "type=\"plastic\"/></bsdf></bsdf>");
@@ -125,7 +125,7 @@ TEST(Surfaces, ANormalMapHoldsImageAndBsdf) {
   EXPECT_TRUE(std::get<BitmapTexture>(s.textures.at(n.normalmap.value)).raw);
   at<PlasticBsdf>(s, n.bsdf);
   EXPECT_TRUE(n.flip_invalid_normals && n.use_shadowing_function);
-  const Scene plain = with_bsdf(
+  const Scene plain = scene_with_bsdf(
       "<bsdf type=\"normalmap\"><rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf type=\"diffuse\"/>"
       "<boolean name=\"flip_invalid_normals\" value=\"false\"/><boolean name=\"use_shadowing_function\" "
       "value=\"false\"/></bsdf>");
@@ -145,7 +145,7 @@ TEST(Surfaces, NestOnlySoDeep) {
   EXPECT_EQ(error_of(masks(scene::kMaxBsdfNesting - 1)), "");
   EXPECT_THAT(error_of(masks(scene::kMaxBsdfNesting)), HasSubstr("bsdfs are nested more than 8 deep"));
   // The same in the form that travels.
-  Scene s = with_bsdf(masks(scene::kMaxBsdfNesting - 1));
+  Scene s = scene_with_bsdf(masks(scene::kMaxBsdfNesting - 1));
   s.bsdfs.push_back(MaskBsdf{{0}, s.shapes[0].bsdf});
   EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("more than 8 deep"));
   s.bsdfs = {BlendBsdf{{0}, {1}, {1}}, MaskBsdf{{0}, {0}}};
@@ -170,21 +170,21 @@ TEST(Surfaces, TraitsFollowFromWhatIsContained) {
 
 // Mitsuba 3's defaults, and its relation of specular and eta.
 TEST(Surfaces, PrincipledHasMitsubasDefaults) {
-  const Scene plain = with_bsdf("<bsdf type=\"principled\"/>");
+  const Scene plain = scene_with_bsdf("<bsdf type=\"principled\"/>");
   const auto& p = bsdf_of<PrincipledBsdf>(plain);
   EXPECT_EQ(p.eta, 1.5);
-  EXPECT_EQ(colour(plain, p.base_color), (Rgb{.5, .5, .5}));
-  EXPECT_EQ(colour(plain, p.roughness), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(texture_colour(plain, p.base_color), (Rgb{.5, .5, .5}));
+  EXPECT_EQ(texture_colour(plain, p.roughness), (Rgb{.5, .5, .5}));
   for (const TextureIndex none : {p.anisotropic, p.metallic, p.spec_tint, p.sheen, p.sheen_tint, p.flatness,
                                   p.clearcoat, p.clearcoat_gloss})
-    EXPECT_EQ(colour(plain, none), (Rgb{0, 0, 0}));
+    EXPECT_EQ(texture_colour(plain, none), (Rgb{0, 0, 0}));
   EXPECT_FALSE(p.spec_trans);
-  const Scene given = with_bsdf(
+  const Scene given = scene_with_bsdf(
       "<bsdf type=\"principled\"><float name=\"specular\" value=\".8\"/><float name=\"spec_trans\" "
       "value=\".25\"/><float name=\"main_specular_sampling_rate\" value=\"2\"/></bsdf>");
   const auto& g = bsdf_of<PrincipledBsdf>(given);
   EXPECT_DOUBLE_EQ(g.eta, 2 / (1 - std::sqrt(.08 * .8)) - 1);
-  EXPECT_EQ(colour(given, g.spec_trans.value()), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(texture_colour(given, g.spec_trans.value()), (Rgb{.25, .25, .25}));
   EXPECT_EQ(deserialize_scene(serialize(given)).value(), given);
   EXPECT_THAT(error_of("<bsdf type=\"principled\"><float name=\"eta\" value=\"1.3\"/><float "
                        "name=\"specular\" value=\".5\"/></bsdf>"),
@@ -204,7 +204,7 @@ TEST(Surfaces, ABumpMapTakesItsTextureUnderAnyName) {
   const std::string image =
       "<string name=\"filename\" value=\"wood.png\"/><boolean name=\"raw\" value=\"true\"/></texture>";
   for (const char* name : {"", " name=\"texture\"", " name=\"arbitrary\""}) {
-    const Scene s = with_bsdf(fmt::format(
+    const Scene s = scene_with_bsdf(fmt::format(
         "<bsdf type=\"bumpmap\"><texture type=\"bitmap\"{}>{}<float name=\"scale\" value=\"3\"/>{}</bsdf>",
         name, image, kDiffuse));
     const auto& b = bsdf_of<BumpMapBsdf>(s);

@@ -26,7 +26,7 @@ class FarBlobs final : public MemoryBlobs {
 };
 
 // Moved while the service's threads look at it.
-class SharedClock final : public Clock {
+class CommonClock final : public Clock {
  public:
   TimePoint now() const override { return TimePoint{} + Duration{now_.load()}; }
   void advance(Duration d) { now_ += d.count(); }
@@ -37,7 +37,7 @@ class SharedClock final : public Clock {
 
 struct Shared : ::testing::Test {
   TempFolder folder;
-  std::shared_ptr<SharedClock> clock = std::make_shared<SharedClock>();
+  std::shared_ptr<CommonClock> clock = std::make_shared<CommonClock>();
   std::shared_ptr<FarBlobs> blobs = std::make_shared<FarBlobs>();
   std::shared_ptr<MovingStore> store = std::make_shared<MovingStore>();
   std::unique_ptr<Coordinator> coordinator = open();

@@ -8,7 +8,7 @@
 namespace ls::coordinator {
 namespace {
 
-std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> collected_bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 struct Collection : ::testing::Test {
   TempFolder dir;
@@ -17,7 +17,7 @@ struct Collection : ::testing::Test {
   CollectedBlobs blobs{disk, clock, std::chrono::hours(24)};
 
   Digest put(std::string_view text) {
-    EXPECT_TRUE(blobs.put(sha256(text), bytes(text)));
+    EXPECT_TRUE(blobs.put(sha256(text), collected_bytes(text)));
     return sha256(text);
   }
   CollectedBlobs::Swept sweep(const std::set<Digest>& needed = {}) { return blobs.sweep(needed).value(); }
@@ -73,7 +73,7 @@ TEST_F(Collection, RemovesNothingWhileASubmissionIsUnderWay) {
 TEST_F(Collection, RemovesUnfinishedUploadsAfterADayAlsoWhereBlobsStayForGood) {
   CollectedBlobs for_good{disk, clock, std::nullopt};
   const Digest stray = put("stray"), part = sha256("abc");
-  ASSERT_TRUE(for_good.resume_upload(part, 0).value()->append(bytes("a")));
+  ASSERT_TRUE(for_good.resume_upload(part, 0).value()->append(collected_bytes("a")));
   EXPECT_EQ(for_good.sweep({}).value().unfinished, 0u);
 
   clock->advance(std::chrono::hours(24));
@@ -87,10 +87,10 @@ TEST_F(Collection, RemovesUnfinishedUploadsAfterADayAlsoWhereBlobsStayForGood) {
 
 TEST_F(Collection, RemovesAnUnfinishedUploadThatDoesNotGrow) {
   const Digest name = sha256("abc");
-  ASSERT_TRUE(blobs.resume_upload(name, 0).value()->append(bytes("a")));
+  ASSERT_TRUE(blobs.resume_upload(name, 0).value()->append(collected_bytes("a")));
   sweep();
   clock->advance(std::chrono::hours(23));
-  ASSERT_TRUE(blobs.resume_upload(name, 1).value()->append(bytes("b")));
+  ASSERT_TRUE(blobs.resume_upload(name, 1).value()->append(collected_bytes("b")));
   EXPECT_EQ(sweep().unfinished, 0u);
   clock->advance(std::chrono::hours(23));
   EXPECT_EQ(sweep().unfinished, 0u) << "it grew an hour before";

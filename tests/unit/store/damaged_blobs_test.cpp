@@ -1,4 +1,4 @@
-// Blobs whose files no longer have their digest: never read, out of the way, and repaired by the right bytes.
+// Blobs whose files no longer have their digest: never read, out of the way, and repaired by the right damaged_bytes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,13 +16,13 @@ using ::testing::HasSubstr;
 constexpr std::string_view kText = "sunlight through steam";
 const Digest kName = sha256(kText);
 
-std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> damaged_bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 struct DamagedBlobs : ::testing::Test {
   TempFolder dir;
   std::unique_ptr<DiskBlobs> blobs = DiskBlobs::open(dir.path()).value();
 
-  void SetUp() override { ASSERT_TRUE(blobs->put(kName, bytes(kText))); }
+  void SetUp() override { ASSERT_TRUE(blobs->put(kName, damaged_bytes(kText))); }
   // A byte that is another one; size and name are as before.
   void damage() const {
     std::fstream file(blobs->path(kName), std::ios::in | std::ios::out | std::ios::binary);
@@ -83,7 +83,7 @@ TEST_F(DamagedBlobs, CountAsMissingAndAreMovedAside) {
 TEST_F(DamagedBlobs, AreRepairedByTheRightBytesAlsoBeforeAnybodyHasFoundThem) {
   damage();
 
-  ASSERT_TRUE(blobs->put(kName, bytes(kText)));
+  ASSERT_TRUE(blobs->put(kName, damaged_bytes(kText)));
 
   EXPECT_EQ(read_back(), kText);
   EXPECT_FALSE(std::filesystem::exists(aside())) << "nobody needs it any more";
@@ -94,7 +94,7 @@ TEST_F(DamagedBlobs, AreRepairedByAnUploadInParts) {
   ASSERT_FALSE(blobs->prove(kName));
 
   auto part = blobs->resume_upload(kName, 0).value();
-  ASSERT_TRUE(part->append(bytes(kText)));
+  ASSERT_TRUE(part->append(damaged_bytes(kText)));
   ASSERT_TRUE(part->finish());
 
   EXPECT_EQ(read_back(), kText);
