@@ -19,7 +19,7 @@ endif()
 add_library(ls_hot_flags INTERFACE)
 target_compile_options(ls_hot_flags INTERFACE -fno-semantic-interposition -fvisibility=hidden)
 
-# Where CMAKE_UNITY_BUILD is on (the presets but dev), several files of a target are compiled as one: most of a build's time is
+# Where CMAKE_UNITY_BUILD is on (the presets but dev and fuzz), several files of a target are compiled as one: most of a build's time is
 # reading the same headers again. The price: names in unnamed namespaces of one target may not clash. The renderer's loops
 # stay by themselves, so that what is inlined into one file does not depend on its neighbours.
 function(ls_each_file_by_itself target)

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kDarkSide = 32, kReach = 2;
 constexpr std::size_t kPixels = kDarkSide * kDarkSide;
-constexpr double kDarkMean = 0.01;
+constexpr double kWeightFloor = 0.01;
 
 using Value = std::function<double(int x, int y)>;
 
@@ -34,7 +34,7 @@ const Picture kPictures[] = {
     {"dots of 5 on .1", [](int x, int y) { return x % 8 == 3 && y % 8 == 3 ? 5. : .1; }},
 };
 
-double weight(double m) { return 1 / (m * m + kDarkMean); }
+double weight(double m) { return 1 / (m * m + kWeightFloor); }
 
 double neighbours(const std::vector<double>& s, int x, int y) {
   double sum = 0;

@@ -1,4 +1,4 @@
-// Blobs whose files no longer have their digest: never read, out of the way, and repaired by the right damaged_bytes.
+// Blobs whose files no longer have their digest: never read, out of the way, and repaired by the right bytes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
