@@ -42,7 +42,7 @@ function(ls_library name)
 endfunction()
 
 # ls_test(NAME [LOOPS] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files right under this folder.
-# LOOPS: the tests' own loops take most of their time.
+# LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label.
 function(ls_test name)
   cmake_parse_arguments(ARG "LOOPS" "" "LINK;LABELS;SOURCES" ${ARGN})
   if(NOT ARG_SOURCES)
@@ -60,5 +60,11 @@ function(ls_test name)
     endif()
     add_test(NAME ${name} COMMAND ${name})
     set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 1200)
+    foreach(label ${ARG_LABELS})
+      if(NOT TARGET tests-${label})
+        add_custom_target(tests-${label})
+      endif()
+      add_dependencies(tests-${label} ${name})
+    endforeach()
   endif()
 endfunction()

@@ -82,11 +82,11 @@ else
   say "browser tests"
   run_pytest web tests/web
   say "AddressSanitizer and UndefinedBehaviorSanitizer"
-  build asan
+  build asan tests-unit lightshaft lightshaft-coordinator lightshaft-worker
   run_ctest asan unit unit-asan
   LIGHTSHAFT_BIN="$PWD/build/asan/bin" run_pytest farm-asan tests/system -m sanitized
   say "ThreadSanitizer"
-  build tsan agent_test domain_test service_test store_test
+  build tsan tests-tsan
   run_ctest tsan tsan threads-tsan
 fi
 
