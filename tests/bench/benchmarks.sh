@@ -3,7 +3,8 @@
 #
 # usage: benchmarks.sh SCENES [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
 # SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references.
-# Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba and bpy; what is missing is said.
+# Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba (and there is an LLVM library for it)
+# and bpy; what is missing is said.
 # The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
 # seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu.
 set -euo pipefail
@@ -11,7 +12,7 @@ cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
 ADAPTERS=tests/bench/adapters
 clock=wall time=4 seeds=3 seed=0 only= out=docs/benchmarks
-[ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
+[ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,9s/^# \?//p' "$0" >&2; exit 2; }
 scenes=$1; shift
 while [ $# -ge 2 ]; do
   case $1 in
@@ -31,7 +32,7 @@ add_programs() {  # PACKAGE ADAPTER...
 }
 
 if [ "$only" != curves ]; then
-  add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
+  if /usr/bin/python3 "$ADAPTERS/llvm_library.py"; then add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis; fi
   add_programs bpy cycles
   "$BIN/lightshaft" compare "$scenes"/*.xml --references "$scenes/refs" --integrators volpath "${programs[@]}" \
     --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/races" || status=$?

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import pathlib
 import re
 import shutil
 import subprocess
@@ -13,6 +14,8 @@ import time
 import pytest
 
 from cli_kit import bin_dir, lightshaft, write_fog
+
+ADAPTERS = pathlib.Path(__file__).resolve().parents[1] / "bench" / "adapters"
 
 # A program that "renders" by running ours: what an adapter calls.
 OTHER = """import json, subprocess, sys
@@ -121,6 +124,26 @@ def test_a_faulty_program_is_out_and_the_race_goes_on(tmp_path, kind):
     assert said in done.stderr and "Other" in done.stderr
     assert [row["entrant"] for row in rows(tmp_path / "out" / "summary.csv")] == ["Lightshaft volpath"]
     assert "Other failed:" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_mitsuba_gets_an_llvm_library_that_it_can_work_with(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ADAPTERS)
+    import llvm_library
+
+    def newest_of(*names):
+        folder = tmp_path / "_".join(names)
+        folder.mkdir()
+        for name in names:
+            (folder / name).touch()
+        path = llvm_library.newest([str(folder)])
+        return path and path.removeprefix(f"{folder}/")
+
+    debian = ["libLLVM-14.0.6.so.1", "libLLVM-14.so.1", "libLLVM-15.so", "libLLVM-15.so.1"]
+    assert newest_of(*debian) is None
+    assert newest_of(*debian, "libLLVM.so.19.1") == "libLLVM.so.19.1"
+    assert newest_of("libLLVM-9.so.1", "libLLVM-17.so.1") == "libLLVM-17.so.1"
+    assert newest_of("libLLVM.so.22.1", "libLLVM.so.19.1", "libLLVMSPIRVLib.so.99") == "libLLVM.so.22.1"
+    assert newest_of("libLLVM.so") is None
 
 
 def test_a_picture_of_another_size_is_refused(tmp_path):

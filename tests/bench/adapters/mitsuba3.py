@@ -2,36 +2,33 @@
 """Adapter of `lightshaft compare` for Mitsuba 3: one process per seed, whose picture is noted as its samples double.
 
 usage: mitsuba3.py SCENE FOLDER --time S [--clock wall|cpu] --seed N --threads N --size W H --integrator volpath|volpathmis
+       [--variant llvm_ad_rgb]
 The scene must be one that Mitsuba 3 loads. Its integrator is replaced by the one asked for, with the scene's max_depth and
 rr_depth; without media it is `path`. Passes of equally many samples, each with a seed of its own, are averaged: for the
 `independent` sampler, which every scene here has, that is the same as one render of all the samples. Loading, compilation and
-warm-up are not counted. Needs the packages mitsuba and numpy, and for its fast variant an LLVM library (Debian: libllvm19),
-which DRJIT_LIBLLVM_PATH may name; without one the scalar variant is used.
+warm-up are not counted. Needs the packages mitsuba and numpy, and an LLVM library (llvm_library.py), which DRJIT_LIBLLVM_PATH
+may name; with --variant scalar_rgb, which is slower, none.
 """
-import glob
-import os
 import re
 
 import numpy as np
 
+import llvm_library
 import stopwatch
 
 MOST_WAVE = 1 << 23  # samples of one pass: what memory holds
 PASSES = 8           # at least so many in the time, so that it is used up to its end
 
 
-def open_mitsuba(threads):
-    if "DRJIT_LIBLLVM_PATH" not in os.environ:
-        found = sorted(glob.glob("/usr/lib/*/libLLVM.so.*") + glob.glob("/usr/lib/*/libLLVM-*.so*"))
-        if found:
-            os.environ["DRJIT_LIBLLVM_PATH"] = found[-1]
+def open_mitsuba(variant, threads):
+    compiled = variant.startswith("llvm")
+    if compiled:
+        llvm_library.name_it()
     import drjit
     import mitsuba
-    try:
-        mitsuba.set_variant("llvm_ad_rgb")
+    mitsuba.set_variant(variant)
+    if compiled:
         drjit.set_thread_count(threads)
-    except (ImportError, RuntimeError):
-        mitsuba.set_variant("scalar_rgb")
     return mitsuba
 
 
@@ -51,8 +48,9 @@ def load(mitsuba, options):
 def main():
     args = stopwatch.arguments(__doc__)
     args.add_argument("--integrator", default="volpath")
+    args.add_argument("--variant", default="llvm_ad_rgb")
     options = args.parse_args()
-    mitsuba = open_mitsuba(options.threads)
+    mitsuba = open_mitsuba(options.variant, options.threads)
     scene, integrator = load(mitsuba, options)
 
     def render(spp, seed):
