@@ -48,6 +48,7 @@ def test_tiles_that_need_more_get_more(alone):
     assert sum(spp) == report["samples"] and abs(sum(spp) / len(spp) - report["spp"]) < 1e-9 * report["spp"]
     points = report["convergence"]
     assert all(a["spp"] < b["spp"] and a["core_seconds"] <= b["core_seconds"] for a, b in zip(points, points[1:]))
+    assert points[0]["spp"] == 2 and all(b["spp"] <= 2 * a["spp"] for a, b in zip(points, points[1:])), "a doubling without a checkpoint"
     assert points[-1]["spp"] == report["spp"] and points[-1]["relmse"] == report["relmse"]
 
 
