@@ -161,7 +161,6 @@ Result<void> Service::wake_locked(JobEntry& entry) {
   restoring_ = true;  // where the film is lost it is folded again, which is no news
   run_locked(std::move(*restored));
   restoring_ = false;
-  entry.replay.clear();
   entry.replay_at.clear();
   return {};
 }

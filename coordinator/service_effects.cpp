@@ -209,12 +209,7 @@ void Service::on(const Checkpoint& e, Todo&) {
   }
   // A tile is rendered again, and of the others it is not known any more what they said so early.
   if (!exact) return;
-  double core = entry->stored.totals.core_seconds;
-  const auto until =
-      std::upper_bound(entry->replay.begin(), entry->replay.end(),
-                       std::pair(entry->fold_seconds, std::numeric_limits<double>::infinity()));
-  if (!entry->replay.empty()) core = until == entry->replay.begin() ? 0 : std::prev(until)->second;
-  add_point_locked(entry, {entry->fold_seconds, core, error.spp, figures_of(error)});
+  add_point_locked(entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
   compare_locked(entry, e.rounds, error.spp);
 }
 

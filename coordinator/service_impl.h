@@ -70,8 +70,7 @@ struct JobEntry {
   double fold_seconds = 0;                 // job seconds at the last fold
   std::string trouble;                     // why it waits
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;  // for people
-  // While a restart folds again: (job seconds, core seconds until then) of each durable result, ascending.
-  std::vector<std::pair<double, double>> replay;
+  // While a restart folds again: job seconds of each durable result.
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
 };
 

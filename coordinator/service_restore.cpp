@@ -82,7 +82,6 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Resu
   }
   if (state == JobState::paused) entry.still_since = now();
   run_locked(std::move(*event));
-  entry.replay.clear();
   entry.replay_at.clear();
   return {};
 }
@@ -217,12 +216,9 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
     event.elapsed_seconds = std::max(event.elapsed_seconds, record.at_seconds);
     const double cpu = believed_seconds(record.cpu_seconds);
     totals.core_seconds += cpu;
-    entry.replay.emplace_back(record.at_seconds, cpu);
+    entry.assembly->costs().add(record.tile, record.round, cpu);
     if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
   }
-  std::sort(entry.replay.begin(), entry.replay.end());
-  double sum = 0;
-  for (auto& [at, core] : entry.replay) core = sum += core;
   entry.log->forget_found();
 }
 

@@ -152,10 +152,12 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
     entry.stored.totals.core_seconds += r.cpu_seconds;
     entry.stored.totals.time.add(
         {r.times.load, r.times.build, 0, r.times.transfer, item.seconds, r.times.idle});
-    if (entry.assembly)
+    if (entry.assembly) {
+      entry.assembly->costs().add(r.unit.tile, r.unit.round, r.cpu_seconds);
       entry.assembly->hold(
           r.unit.tile, r.unit.round,
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
+    }
   }
   // A duplicate by the farm's book is compared there; a race that made one unstored is told as nothing: the
   // copy that was stored stands, and this one is equal or evidence the next time.

@@ -1,5 +1,5 @@
 // One job's image in the making: the film, the accepted partials that wait for an earlier round, the error
-// figures. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
+// figures, the costs. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
 #pragma once
 
 #include <atomic>
@@ -13,6 +13,7 @@
 #include "common/image/film.h"
 #include "coordinator/assemble/health_book.h"
 #include "coordinator/assemble/round_errors.h"
+#include "coordinator/assemble/unit_costs.h"
 #include "coordinator/store/partial_log.h"
 
 namespace ls::coordinator {
@@ -49,9 +50,9 @@ class WaitingBytes {
 class Assembly {
  public:
   Assembly(TileGrid grid, bool keep_relative, AovSet aovs = {})
-      : film_(grid, aovs), errors_(grid.count(), keep_relative) {}
+      : film_(grid, aovs), errors_(grid.count(), keep_relative), costs_(grid.count()) {}
   Assembly(Film film, RoundErrors errors, HealthBook health)
-      : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)) {}
+      : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)), costs_(film_.grid().count()) {}
 
   // Keeps a partial until take(). Its pixels are dropped, if it has a place, when those of all jobs that wait
   // take kMaxPendingPartials; then they are read from the log again.
@@ -68,6 +69,7 @@ class Assembly {
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
   const HealthBook& health() const { return health_; }
+  UnitCosts& costs() { return costs_; }  // of accepted units, folded or not
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
   // Rounds folded of each tile for a job of `spp` samples; a tail that was cut for fewer samples does not
   // count.
@@ -78,6 +80,7 @@ class Assembly {
   Film film_;
   RoundErrors errors_;
   HealthBook health_;
+  UnitCosts costs_;
   std::map<std::pair<TileIndex, RoundIndex>, WaitingPartial> waiting_;
   WaitingBytes waiting_bytes_;
 };

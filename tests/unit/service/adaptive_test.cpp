@@ -48,6 +48,42 @@ std::vector<std::uint64_t> spp_of_tiles(const Coordinator& coordinator, const Jo
   return spp;
 }
 
+// Some tiles are rounds, and levels, ahead of others. A sample costs the same everywhere, and a restart
+// does not change what is known of it.
+TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
+  constexpr double kCost = 1. / 1024;  // of a pixel's sample
+  for (const bool killed : {false, true}) {
+    TempFolder dir;
+    auto coordinator = open_at(dir.path());
+    const JobId job = submit(*coordinator, spec_with(kTarget));
+    const auto work = [&](int stop_after) {
+      FakeFarm farm(*coordinator, 2);
+      farm.stop_after = stop_after;
+      farm.tamper = [&](UnitResult r) {
+        const SampleRange range = round_range(r.unit.round);
+        const PixelRect rect = TileGrid{{160, 109}}.rect(r.unit.tile);
+        r.cpu_seconds = kCost * static_cast<double>(range.count() * rect.pixels());
+        return std::vector{std::move(r)};
+      };
+      farm.reorder = [](auto& units) { std::reverse(units.begin(), units.end()); };
+      return farm.finish(job);
+    };
+    if (killed) {
+      EXPECT_FALSE(work(70));
+      coordinator.reset();
+      coordinator = open_at(dir.path());
+    }
+    ASSERT_TRUE(work(-1));
+
+    const auto points = report(*coordinator, job)["convergence"];
+    ASSERT_GT(points.size(), 7u);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_NEAR(points[i]["core_seconds"].get<double>(), kCost * 160 * 109 * points[i]["spp"].get<double>(),
+                  1e-6 * points[i]["core_seconds"].get<double>())  // floats of single units
+          << i << " of " << points.size() << (killed ? ", killed" : "");
+  }
+}
+
 TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec_with(kTarget));

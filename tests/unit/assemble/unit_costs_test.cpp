@@ -1,0 +1,48 @@
+#include "coordinator/assemble/unit_costs.h"
+
+#include <gtest/gtest.h>
+
+namespace ls::coordinator {
+namespace {
+
+using Rounds = std::vector<RoundIndex>;
+
+TEST(UnitCosts, OfACheckpointAreThoseOfItsUnitsAlone) {
+  UnitCosts costs(2);
+  costs.add(0, 0, 1);
+  costs.add(0, 1, 2);
+  costs.add(0, 2, 4);  // ahead
+  costs.add(1, 1, 16);
+  costs.add(1, 0, 8);
+
+  EXPECT_EQ(costs.until(Rounds{1, 1}), 1 + 8);
+  EXPECT_EQ(costs.until(Rounds{2, 2}), 1 + 8 + 2 + 16);
+  costs.add(1, 2, 32);
+  EXPECT_EQ(costs.until(Rounds{3, 2}), 1 + 8 + 2 + 16 + 4);
+  EXPECT_EQ(costs.until(Rounds{3, 3}), 1 + 8 + 2 + 16 + 4 + 32);
+}
+
+TEST(UnitCosts, OfAUnitRenderedAgainCountTwice) {
+  UnitCosts costs(1);
+  costs.add(0, 0, 1);
+  costs.add(0, 0, 2);
+  EXPECT_EQ(costs.until(Rounds{1}), 3);
+
+  costs.add(0, 0, 4);
+  EXPECT_EQ(costs.until(Rounds{1}), 7);
+}
+
+// A tile that stopped early, and a cut last round: rounds are asked for that nothing has been said of.
+TEST(UnitCosts, OfWhatIsNotThereAreNothing) {
+  UnitCosts costs(2);
+  costs.add(0, 0, 1);
+  EXPECT_EQ(costs.until(Rounds{4, 0}), 1);
+  EXPECT_EQ(costs.until(Rounds{2, 0}), 1);  // fewer than before
+  costs.add(0, 5, 8);
+  costs.add(0, 3, 2);
+  EXPECT_EQ(costs.until(Rounds{4, 0}), 3);
+  EXPECT_EQ(costs.until(Rounds{6, 0}), 11);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
