@@ -5,6 +5,7 @@
 #include <set>
 
 #include "cli/compare/program_racer.h"
+#include "cli/compare/references.h"
 #include "cli/compare/render_racer.h"
 #include "cli/local_scene.h"
 #include "cli/local_world.h"
@@ -66,6 +67,7 @@ class SceneRace {
       auto world = build_local_world(scene_, ours.spec, options_.conditions.threads);
       if (!world) return tl::unexpected(std::move(world.error()));
       if (first) race_.conditions.size = world->job.settings.size;
+      scenes_.push_back(world->job.scene);
       if (ours.name.empty()) ours.name = world->job.settings.integrator;
       const bool whole = scene_.scene.media.empty() || scene::sees_media(world->job.settings.integrator);
       race_.entrants.push_back({"Lightshaft " + ours.name, true, whole});
@@ -84,19 +86,31 @@ class SceneRace {
   Result<std::optional<race::Reference>> read_reference() {
     std::vector<std::filesystem::path> files = options_.reference;
     if (!options_.references.empty()) files = references_in(options_.references, race_.scene);
-    if (files.empty()) return std::optional<race::Reference>();
-    race::Reference reference;
-    for (std::size_t i = 0; i < files.size(); ++i) {
-      auto pixels = race::read_picture(files[i], race_.conditions.size);
-      if (!pixels) return fail(Errc::invalid_argument, "--reference: " + pixels.error().message);
-      (i == 0 ? reference.first : reference.second) = std::move(*pixels);
+    if (files.empty()) {
+      if (auto possible = race::judges_itself(race_, options_.seeds); !possible) return tl::unexpected(possible.error());
+      return std::optional<race::Reference>();
     }
-    race_.reference =
-        files.size() == 1
-            ? fmt::format("{}, whose own noise counts as everybody's error", files[0].filename().string())
-            : fmt::format("{} and {}, two independent references", files[0].filename().string(),
-                          files[1].filename().string());
-    return std::optional(std::move(reference));
+    std::vector<race::ReferenceFile> read;
+    for (const auto& file : files) {
+      auto picture = race::read_reference(file, race_.conditions.size);
+      if (!picture) return fail(Errc::invalid_argument, "--reference: " + picture.error().message);
+      if (auto own = refuse_own_noise(*picture); !own) return tl::unexpected(own.error());
+      read.push_back(std::move(*picture));
+    }
+    race_.reference = race::describe(read);
+    return std::optional(race::combine(read));
+  }
+
+  // An image shares its noise with one of the same scene and seed: it would seem much better than it is.
+  Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
+    for (const Digest& scene : scenes_)
+      for (std::size_t i = 0; i < options_.seeds; ++i)
+        if (const std::uint64_t seed = options_.first_seed + i; same_noise(file.picture.origin, scene, seed))
+          return fail(Errc::invalid_argument,
+                      fmt::format("--reference: {} was rendered from this scene with seed {}, which races, too: its noise is "
+                                  "the same noise; race other seeds (--seed {})",
+                                  file.name, seed, seed + 1));
+    return {};
   }
 
   Result<std::unique_ptr<race::Racer>> racer(std::size_t entrant, std::size_t seed) {
@@ -124,6 +138,7 @@ class SceneRace {
   const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
+  std::vector<Digest> scenes_;  // as the images of ours name them
   std::vector<const race::Adapter*> programs_;
   std::filesystem::path folder_;
 };

@@ -125,6 +125,12 @@ void take_notes(Race& race, const Lanes& lanes) {
     }
 }
 
+tl::unexpected<Error> no_judge() {
+  return fail(Errc::invalid_argument,
+              "without --reference the pictures are measured against those of the other seeds by an integrator of ours that "
+              "sees all of the scene: there must be one, and two seeds at least");
+}
+
 }  // namespace
 
 Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer& make,
@@ -140,18 +146,21 @@ Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer
   return out;
 }
 
+Result<void> judges_itself(const Race& race, std::size_t seeds) {
+  const bool sees_all =
+      std::any_of(race.entrants.begin(), race.entrants.end(), [](const Entrant& e) { return e.ours && e.whole; });
+  return seeds >= 2 && sees_all ? Result<void>() : no_judge();
+}
+
 Result<void> judge(Race& race, const Lanes& lanes, std::size_t seeds,
                    const std::optional<Reference>& reference) {
   race.failures = lanes.failures;
   take_notes(race, lanes);
   std::optional<std::size_t> best;
   if (!reference) {
+    if (auto possible = judges_itself(race, seeds); !possible) return possible;
     best = best_of_ours(race, lanes, seeds);
-    if (!best || seeds < 2)
-      return fail(Errc::invalid_argument,
-                  "without --reference the pictures are measured against those of the other seeds by an "
-                  "integrator of "
-                  "ours that sees all of the scene: there must be one, and two seeds at least");
+    if (!best) return no_judge();
     race.reference = fmt::format(
         "the final pictures of all other seeds by {}: the means of their halves are two references, "
         "independent of "

@@ -66,6 +66,9 @@ struct Race {
   std::vector<std::string> notes;
 };
 
+// Whether there is such an entrant of ours, and seeds enough, that judge() needs no reference: invalid_argument otherwise.
+Result<void> judges_itself(const Race& race, std::size_t seeds);
+
 // Measures all pictures against `reference`; without one against the other seeds' pictures by the best of our
 // own entrants: of seed s against the means of the halves A and of the halves B of its final pictures of all
 // seeds but s, which are independent of the picture and of each other. invalid_argument: there is no such

@@ -137,7 +137,7 @@ Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const
   return read_colour(bytes, name, limits, true);
 }
 
-Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits) {
+Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path, const ExrLimits& limits) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in) return fail(Errc::not_found, fmt::format("{}: cannot be opened", path.string()));
   const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
@@ -148,7 +148,13 @@ Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits
   in.seekg(0);
   if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
     return fail(Errc::unavailable, fmt::format("{}: cannot be read", path.string()));
-  return read_exr_rgb(bytes, path.string(), limits);
+  return bytes;
+}
+
+Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits) {
+  const auto bytes = read_exr_bytes(path, limits);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return read_exr_rgb(*bytes, path.string(), limits);
 }
 
 }  // namespace ls

@@ -34,6 +34,8 @@ struct ExrLimits {
 // are refused. `name` is for the messages. Sizes are checked before anything is allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
+// A file whole: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
+Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path, const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
 // The same with the standard error of each value, where the part has layers stderr.R, stderr.G and stderr.B at

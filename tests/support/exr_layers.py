@@ -60,3 +60,23 @@ def read(path):
                 place += struct.calcsize("<" + kind) * width
     strings = {name: value.decode() for name, (kind, value) in header.items() if kind == "string"}
     return rows, strings, dict(channels)
+
+
+def _attribute(name, kind, value):
+    return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+
+def write_rgb(path, layers):
+    """A plain picture of the layers R, G and B (rows of floats), with nothing said about itself."""
+    names, height, width = "BGR", len(layers["R"]), len(layers["R"][0])
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    channels = b"".join(name.encode() + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in names) + b"\0"
+    header = struct.pack("<2i", 20000630, 2) + b"".join(_attribute(*a) for a in (
+        ("channels", "chlist", channels), ("compression", "compression", b"\0"), ("dataWindow", "box2i", window),
+        ("displayWindow", "box2i", window), ("lineOrder", "lineOrder", b"\0"), ("pixelAspectRatio", "float", struct.pack("<f", 1)),
+        ("screenWindowCenter", "v2f", bytes(8)), ("screenWindowWidth", "float", struct.pack("<f", 1)))) + b"\0"
+    lines = [struct.pack("<2i", y, 12 * width) + b"".join(struct.pack(f"<{width}f", *layers[name][y]) for name in names)
+             for y in range(height)]
+    first = len(header) + 8 * height
+    offsets = struct.pack(f"<{height}Q", *(first + y * len(lines[0]) for y in range(height)))
+    path.write_bytes(header + offsets + b"".join(lines))

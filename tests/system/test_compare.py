@@ -14,6 +14,7 @@ import time
 import pytest
 
 from cli_kit import bin_dir, lightshaft, write_fog
+from exr_layers import read, write_rgb
 
 ADAPTERS = pathlib.Path(__file__).resolve().parents[1] / "bench" / "adapters"
 
@@ -82,10 +83,11 @@ def test_time_ends_a_race(tmp_path):
 
 
 def test_the_pictures_are_those_of_render(tmp_path):
-    """Measured against its own picture, a race of the same seed has no error but that of the file's halves."""
+    """Measured against its own picture, which does not say whose it is, a race of the same seed has no error."""
     scene = write_fog(tmp_path)
     lightshaft("render", scene, "-o", tmp_path / "r.exr", "--float", "--quiet", "--spp", "16", "--size", "48x32", "--seed", "5")
-    compare(tmp_path, "--time", "60", "--spp", "16", "--seeds", "1", "--seed", "5", "--reference", tmp_path / "r.exr")
+    write_rgb(tmp_path / "plain.exr", read(tmp_path / "r.exr")[0])
+    compare(tmp_path, "--time", "60", "--spp", "16", "--seeds", "1", "--seed", "5", "--reference", tmp_path / "plain.exr")
 
     last = [p for p in rows(tmp_path / "out" / "points.csv") if p["last"] == "1"][0]
     assert float(last["relmse"]) == 0
@@ -106,7 +108,7 @@ def test_another_program_races(tmp_path):
 BAD = {
     "exits": (["sh", "-c", "echo no licence; exit 7", "{scene}", "{spp}", "{image}"], "exit code 7; its last words: no licence"),
     "dies": (["sh", "-c", "kill -ABRT $$", "{scene}", "{spp}", "{image}"], "signal 6"),
-    "hangs": (["tail", "-f", "/dev/null", "{scene}", "--pid={spp}", "--retry", "{image}"], "ran for more than"),
+    "hangs": (["sh", "-c", "tail -f /dev/null", "{scene}", "{spp}", "{image}"], "ran for more than"),
     "writes nothing": (["true", "{scene}", "{spp}", "{image}"], "exr"),
     "writes nonsense": (["sh", "-c", "echo hello > $0", "{image}", "{scene}", "{spp}"], "exr"),
     "has no program": (["no-such-program-here", "{scene}", "{spp}", "{image}"], "cannot be started"),
@@ -152,6 +154,29 @@ def test_a_picture_of_another_size_is_refused(tmp_path):
     done = compare(tmp_path, "--program", path, "--time", "0.1", "--seeds", "2", code=1)
 
     assert "is 40 x 32 pixels, and the race is one of 48 x 32" in done.stderr, done.stderr
+
+
+def test_a_reference_with_the_noise_of_a_racer_is_refused(tmp_path):
+    lightshaft("render", write_fog(tmp_path), "-o", tmp_path / "ref.exr", "--quiet", "--spp", "8", "--size", "48x32", "--seed", "8")
+    race = ("--reference", tmp_path / "ref.exr", "--time", "60", "--spp", "4", "--seeds", "2")
+
+    told = compare(tmp_path, *race, "--seed", "7", code=2)
+    assert "ref.exr was rendered from this scene with seed 8" in told.stderr and "--seed 9" in told.stderr
+
+    compare(tmp_path, *race, "--seed", "9")
+    assert "ref.exr, less its own noise by its layers of errors" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_a_race_that_nobody_could_judge_is_not_run(tmp_path):
+    """References are given, but none is of this scene."""
+    (tmp_path / "refs").mkdir()
+    began = time.monotonic()
+    told = compare(tmp_path, "--references", tmp_path / "refs", "--time", "600", "--seeds", "1", code=2)
+
+    assert "two seeds at least" in told.stderr
+    blind = compare(tmp_path, "--integrators", "path", "--time", "600", "--seeds", "2", code=2)
+    assert "sees all of the scene" in blind.stderr
+    assert time.monotonic() - began < 500, "a seed of it takes 600 s"
 
 
 def test_wrong_use_is_told_before_anything_is_rendered(tmp_path):

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "cli/compare/references.h"
 #include "common/image/exr_file.h"
 
 namespace ls::race {
@@ -36,6 +37,30 @@ TEST(HandedIn, PicturesAreReadAndKept) {
   ASSERT_TRUE(keep(scratch->folder() / "kept", *pixels));
   EXPECT_EQ(*kept(scratch->folder() / "kept", kSize), *pixels);
   EXPECT_EQ(pixels->size(), 36u);
+}
+
+// (x - ref)^2 - s^2, with the reference's standard errors s.
+TEST(HandedIn, AReferencesOwnErrorsAreSubtracted) {
+  const auto scratch = Scratch::make();
+  ExrPicture picture{kSize, {}, {}};
+  for (const std::string channel : {"R", "G", "B"}) {
+    picture.channels[channel] = ExrFloat{std::vector<float>(12, 2)};
+    picture.channels["stderr." + channel] = ExrFloat{std::vector<float>(12, .25f)};
+  }
+  const auto bytes = write_exr(picture);
+  std::ofstream(scratch->folder() / "ref.exr", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
+  const auto known = read_reference(scratch->folder() / "ref.exr", kSize),
+             unknown = read_reference(write_picture(*scratch, kSize, 2), kSize);
+  ASSERT_TRUE(known && unknown);
+
+  const Pixels x(36, 2.5f);
+  EXPECT_DOUBLE_EQ(wrong(x, combine({*unknown})).mse, .25);
+  EXPECT_DOUBLE_EQ(wrong(x, combine({*known})).mse, .25 - .0625);
+  EXPECT_NEAR(wrong(x, combine({*known})).relmse, (.25 - .0625) / (4 + .01), 1e-15);  // a sum of 36
+  EXPECT_DOUBLE_EQ(noise_of(combine({*known})), .0625 / (4 + .01));
+  EXPECT_EQ(describe({*known}), "ref.exr, less its own noise by its layers of errors");
+  EXPECT_EQ(describe({*unknown}), "picture.exr, whose own noise counts as everybody's error");
 }
 
 TEST(HandedIn, OtherSizesAreNamed) {
