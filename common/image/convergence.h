@@ -18,7 +18,7 @@ namespace ls {
 
 struct ErrorPoint {
   double spp = 0;
-  double core_seconds = 0;  // spent on rendering up to here
+  double core_seconds = 0;  // that rendering its samples took
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   std::optional<double> true_relmse = {};  // against a reference
   // Of true_relmse, by what is left of the reference's own noise (reference.h); nothing: it is not known.

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "common/base/check.h"
+#include "common/image/relative_weights.h"
 
 namespace ls {
 namespace {
 
-constexpr double kDark = 0.01;             // of relMSE's denominator
 constexpr int kReach = 2;                  // of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
 // Fewer pixels than this carry the error: their own scatter (sqrt(4/3/100) = 12 % of the sum) says more than
@@ -21,162 +22,30 @@ constexpr double kLargeShare = 0.1;  // of one pixel, where there are many
 // Where the picture is smooth, fourth powers are this much above what pairs of neighbours say of the
 // variance: a Gaussian has 1, the low-discrepancy points of a smooth image up to 6 (tests/coverage).
 constexpr double kHeavy = 10;
+constexpr double kOneSided = 19;  // light of one half over that of the other: few hits
 
-// Sums over 5 x 5 windows, clipped to the tile. Rows first, then columns, both along rows of memory.
-std::vector<double> window_sums(const std::vector<double>& values, std::size_t width, std::size_t height) {
-  constexpr std::size_t kPad = kReach;
-  std::vector<double> padded(width + 2 * kPad), rows(width * (height + 2 * kPad)), sums(width * height);
-  for (std::size_t y = 0; y < height; ++y) {
-    std::copy_n(&values[y * width], width, &padded[kPad]);
-    double* out = &rows[(y + kPad) * width];
-    for (std::size_t x = 0; x < width; ++x)
-      out[x] = padded[x] + padded[x + 1] + padded[x + 2] + padded[x + 3] + padded[x + 4];
-  }
-  for (std::size_t i = 0; i < width * height; ++i)
-    sums[i] = rows[i] + rows[i + width] + rows[i + 2 * width] + rows[i + 3 * width] + rows[i + 4 * width];
-  return sums;
-}
-
-int span_of(int i, int count) { return std::min(count - 1, i + kReach) - std::max(0, i - kReach) + 1; }
-
-// What is known of one channel of a pixel: its own values, and sums over its window without it.
-struct Surroundings {
-  double own, own_noise;       // S, D^2
-  double others;               // how many
-  double sum, squares, noise;  // of S, S^2 and D^2
-};
-
-// 1 / (m^2 + c), the share g of the pixel's own value in m, and how the weight changes with that value.
-struct Weight {
-  double weight, gain, lean;
-};
-
-double lean_of(double m, double g) {
-  const double f = 1 / (m * m + kDark);
-  return -2 * m * f * f * g;
-}
-
-Weight weight_of(const Surroundings& s) {
-  if (s.others == 0) return {relative_weight(s.own, 0), 1, lean_of(s.own, 1)};
-  constexpr double kSignificant = 9;
-  const double mean = s.sum / s.others, u = s.noise / s.others, apart = (s.own - mean) * (s.own - mean);
-  double structure = std::max(0.0, s.squares / s.others - mean * mean - u * (1 - 1 / s.others));
-  if (apart > kSignificant * std::max(u, s.own_noise)) structure = std::max(structure, apart);
-  const double v = s.own_noise > structure + u ? s.own_noise : u;
-  const double g = structure > 0 ? structure / (structure + v) : 0;
-  const double m = mean + g * (s.own - mean);
-  return {relative_weight(m, u * (g * g + (1 - g) * (1 - g) / s.others)), g, lean_of(m, g)};
-}
-
-// Of each pixel: the square root of the weight in each channel and how it leans, planar, and the square of
-// the mean of g over channels.
-struct Weights {
-  std::vector<double> roots, leans, edges;
-};
-
-void add_channel(const HalfMeans& h, std::size_t plane, Weights& to) {
-  const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
-  const double *a = &h.a[plane], *b = &h.b[plane];
-  std::vector<double> own(width * height), square(width * height), noise(width * height);
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    own[i] = 0.5 * (a[i] + b[i]);
-    square[i] = own[i] * own[i];
-    noise[i] = 0.25 * (a[i] - b[i]) * (a[i] - b[i]);
-  }
-  const auto sum = window_sums(own, width, height), squares = window_sums(square, width, height),
-             noises = window_sums(noise, width, height);
-  std::size_t i = 0;
-  for (int y = 0; y < h.height; ++y)
-    for (int x = 0; x < h.width; ++x, ++i) {
-      const int others = span_of(x, h.width) * span_of(y, h.height) - 1;
-      const Weight w = weight_of({own[i], noise[i], static_cast<double>(others), sum[i] - own[i],
-                                  squares[i] - square[i], std::max(0.0, noises[i] - noise[i])});
-      to.roots[plane + i] = std::sqrt(w.weight);
-      to.leans[plane + i] = w.lean;
-      to.edges[i] += w.gain / 3;
-    }
-}
-
-Weights weights(const HalfMeans& h) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
-  Weights out{std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(n)};
-  for (std::size_t c = 0; c < 3; ++c) add_channel(h, c * n, out);
-  for (double& g : out.edges) g *= g;
-  return out;
-}
-
-// What skewed noise takes off the sum of relative squares in the mean (the header has the derivation).
-double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier, const Weights& w) {
+// What skewed noise takes off the sum of relative squares in the mean (the header has the derivation). Summed by
+// columns, so that the loop is one of vectors.
+double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier, const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
-  double sum = 0;
-  for (std::size_t i = 0; i < now.a.size(); ++i) {
-    // Each half's part of the mean: a = last * a_n + before * a_o.
-    const double ao = before * earlier.halves.a[i], bo = before * earlier.halves.b[i];
-    const double an = now.a[i] - ao, bn = now.b[i] - bo;
-    const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
-    const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
-    const double most = 0.5 * w.roots[i] * w.roots[i], change = w.leans[i] * apart;
-    sum += of_last * std::clamp(last * change, -most, most) +
-           of_before * std::clamp(-before * change, -most, most);
-  }
-  return sum;
-}
-
-// Three planes of one tile, and what a pixel and its neighbour have in common.
-struct Differences {
-  std::span<const double> r, g, b;
-  double dot(std::size_t p, std::size_t q) const { return r[p] * r[q] + g[p] * g[q] + b[p] * b[q]; }
-};
-
-// Of (D(p) . D(q))^2 over the neighbours beside, above and below.
-double mean_of_pairs(const Differences& d, int x, int y, int width, int height) {
-  const auto w = static_cast<std::size_t>(width),
-             p = static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x);
-  double sum = 0;
-  int count = 0;
-  const auto add = [&](bool there, std::size_t q) {
-    if (!there) return;
-    const double dot = d.dot(p, q);
-    sum += dot * dot;
-    ++count;
-  };
-  add(x > 0, p - 1);
-  add(x + 1 < width, p + 1);
-  add(y > 0, p - w);
-  add(y + 1 < height, p + w);
-  return count > 0 ? sum / count : 0;
-}
-
-// `values`: three planes of `width` x `height`; `edges`: one.
-NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
-                     int height) {
-  NoiseSums out;
-  const auto n = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const std::span<const double> all(values);
-  const Differences d{all.first(n), all.subspan(n, n), all.last(n)};
-  const auto &r = d.r, &g = d.g, &b = d.b;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const std::size_t p =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-      const double rr = r[p] * r[p], gg = g[p] * g[p], bb = b[p] * b[p], sum = rr + gg + bb;
-      const double fourth = rr * rr + gg * gg + bb * bb;
-      out.squares += sum;
-      out.channel_fourth += fourth;
-      out.pixel_fourth += sum * sum;
-      out.edge_channel_fourth += edges[p] * fourth;
-      out.edge_pixel_fourth += edges[p] * sum * sum;
-      out.flat_pairs += (1 - edges[p]) * mean_of_pairs(d, x, y, width, height);
-      out.largest = std::max(out.largest, sum);
-      if (x == 0) continue;
-      const std::size_t q = p - 1;
-      const double r2 = r[q] * r[q], g2 = g[q] * g[q], b2 = b[q] * b[q];
-      out.pair_covariance +=
-          r[p] * g[p] * r[q] * g[q] + r[p] * b[p] * r[q] * b[q] + g[p] * b[p] * g[q] * b[q];
-      out.pair_variance += 0.5 * (rr * g2 + gg * r2 + rr * b2 + bb * r2 + gg * b2 + bb * g2);
+  const auto width = static_cast<std::size_t>(now.width);
+  std::vector<double> columns(width);
+  double* sums = columns.data();
+  for (std::size_t row = 0; row < now.a.size(); row += width) {
+    const double *a = &now.a[row], *b = &now.b[row], *a1 = &earlier.halves.a[row], *b1 = &earlier.halves.b[row];
+    const double *roots = &w.roots[row], *leans = &w.leans[row];
+    for (std::size_t x = 0; x < width; ++x) {
+      // Each half's part of the mean: a = last * a_n + before * a_o.
+      const double ao = before * a1[x], bo = before * b1[x], an = a[x] - ao, bn = b[x] - bo;
+      const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
+      const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
+      const double most = 0.5 * roots[x] * roots[x], change = leans[x] * apart;
+      const double up = last * change, down = -before * change;
+      sums[x] += of_last * (up < -most ? -most : most < up ? most : up) +
+                 of_before * (down < -most ? -most : most < down ? most : down);
     }
   }
-  return out;
+  return std::accumulate(columns.begin(), columns.end(), 0.0);
 }
 
 // Standard deviation of (estimated - realised) sum of squares over the estimated sum; see the header for the
@@ -235,15 +104,7 @@ double light(std::span<const double> half, std::size_t pixel, std::size_t pixels
 
 }  // namespace
 
-double relative_weight(double m, double s2) {
-  const double q = m * m + kDark, f = 1 / q;
-  const double unbiased =
-      f - s2 * (3 * m * m - kDark) * f * f * f;  // the second derivative is (6 m^2 - 2 c) / q^3
-  return std::clamp(unbiased, f / 2, 2 * f);
-}
-
 bool has_few_hits(const HalfMeans& h, int x, int y) {
-  constexpr double kOneSided = 19;
   const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   const auto at = [&](int i, int j) {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
@@ -286,17 +147,37 @@ void TileError::subtract_skew(double part) {
   skew += part;
 }
 
+namespace {
+
+// Pixels with light in both halves, which are almost all, in one loop of vectors; only black ones look around.
+void count_hits(const HalfMeans& h, TileError& out) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const double *a = h.a.data(), *b = h.b.data();
+  std::uint64_t lit = 0, one_sided = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double of_a = a[i] + a[n + i] + a[2 * n + i], of_b = b[i] + b[n + i] + b[2 * n + i];
+    lit += (of_a != 0) | (of_b != 0);
+    one_sided += (of_a > kOneSided * of_b) | (of_b > kOneSided * of_a);
+  }
+  out.lit = lit;
+  out.few_hits = one_sided;
+  if (lit == n || lit == 0) return;
+  for (std::size_t i = 0; i < n; ++i)
+    if (light(h.a, i, n) == 0 && light(h.b, i, n) == 0)
+      out.few_hits += has_few_hits(h, static_cast<int>(i) % h.width, static_cast<int>(i) / h.width);
+}
+
+}  // namespace
+
 TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
         h.b.size(), h.width, h.height);
   TileError out{.pixels = n, .samples = spp * n};
-  for (int y = 0; y < h.height; ++y)
-    for (int x = 0; x < h.width; ++x) out.few_hits += has_few_hits(h, x, y);
-  for (std::size_t i = 0; i < n; ++i) out.lit += light(h.a, i, n) != 0 || light(h.b, i, n) != 0;
+  count_hits(h, out);
   std::vector<double> d(3 * n);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
-  const Weights w = weights(h);
+  const RelativeWeights w = relative_weights(h);
   out.plain = noise_sums(d, w.edges, h.width, h.height);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);

@@ -118,8 +118,11 @@ std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pix
   auto out = halves(tile, pixels, with_tail);
   const double samples =
       static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);  // of each half: counts are even
-  for (auto& half : out)
-    for (double& v : half) v /= samples;
+  for (auto& half : out) {
+    double* values = half.data();
+    const std::size_t count = half.size();
+    for (std::size_t i = 0; i < count; ++i) values[i] /= samples;
+  }
   return out;
 }
 

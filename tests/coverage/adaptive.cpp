@@ -27,19 +27,11 @@ ImageError error_of(const json& report) {
   return e;
 }
 
-}  // namespace
-
-CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed) {
+CoverageJob run(const CoverageScene& scene, JobSpec spec) {
   const auto farm = checked(cli::LocalFarm::open({1, false}));
   cli::LocalScene local;
   local.name = scene.name;
   local.text = scene.xml;
-  JobSpec spec;
-  spec.size = FrameSize{64, 64};
-  spec.seed = seed;
-  spec.target_error = scene.target;
-  spec.spp = scene.spp;
-  spec.float_output = true;
   const auto id = farm->submit(local, spec);
   if (!id) throw std::runtime_error(id.error().error.message);
   if (const auto started = farm->start({}); !started) throw std::runtime_error(started.error().message);
@@ -49,6 +41,27 @@ CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed) {
   const auto picture = checked(read_exr_rgb(checked(farm->coordinator().image_exr(*id)), scene.name));
   return {
       {picture.rgb.begin(), picture.rgb.end()}, error_of(report), report.at("verdict_kind") == "heavy_tail"};
+}
+
+JobSpec spec_with(std::uint64_t spp, std::uint64_t seed) {
+  JobSpec spec;
+  spec.size = FrameSize{64, 64};
+  spec.seed = seed;
+  spec.spp = spp;
+  spec.float_output = true;
+  return spec;
+}
+
+}  // namespace
+
+CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed) {
+  JobSpec spec = spec_with(scene.spp, seed);
+  spec.target_error = scene.target;
+  return run(scene, spec);
+}
+
+CoverageJob run_uniform_job(const CoverageScene& scene, std::uint64_t spp, std::uint64_t seed) {
+  return run(scene, spec_with(spp, seed));
 }
 
 }  // namespace ls::test

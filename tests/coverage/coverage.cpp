@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -40,14 +41,14 @@ T checked_job(Result<T> result) {
   return std::move(*result);
 }
 
-std::vector<CoverageJob> run_jobs(const CoverageScene& scene, int jobs, int threads, std::uint64_t first) {
-  const Scene description = parsed(scene);
+constexpr std::uint64_t kUniformSpp = 128, kOtherSeeds = 1'000'000;
+
+std::vector<CoverageJob> run_jobs(int jobs, int threads, const std::function<CoverageJob(std::size_t)>& run) {
   std::vector<CoverageJob> out(static_cast<std::size_t>(jobs));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i; (i = next++) < out.size();)
-      out[i] = scene.target > 0 ? run_adaptive_job(scene, first + i)
-                                : run_plain_job(description, scene.spp, first + i);
+      out[i] = run(i);
   };
   std::vector<std::jthread> pool;
   for (int i = 0; i < threads; ++i) pool.emplace_back(work);
@@ -78,11 +79,12 @@ struct Realised {
   double mse = 0, relmse = 0;
 };
 
-Realised realised(const CoverageJob& job, const Truth& truth, std::size_t jobs) {
+// `own`: the job is one of those that the truth was made of.
+Realised realised(const CoverageJob& job, const Truth& truth, std::size_t jobs, bool own) {
   Realised out;
-  const auto others = static_cast<double>(jobs - 1), values = static_cast<double>(job.image.size());
+  const auto others = static_cast<double>(own ? jobs - 1 : jobs), values = static_cast<double>(job.image.size());
   for (std::size_t i = 0; i < job.image.size(); ++i) {
-    const double right = (truth.sum[i] - job.image[i]) / others, d = job.image[i] - right;
+    const double right = (truth.sum[i] - (own ? job.image[i] : 0)) / others, d = job.image[i] - right;
     const double square = d * d - truth.variance[i] / others;
     out.mse += square / values;
     out.relmse += square / (right * right + kDark) / values;
@@ -125,13 +127,19 @@ Ratio Quotient::ratio() const {
 }
 
 Coverage measure_coverage(const CoverageScene& scene, int count, int threads, std::uint64_t first) {
-  const std::vector<CoverageJob> jobs = run_jobs(scene, count, threads, first);
-  const Truth truth = truth_of(jobs);
+  const Scene description = parsed(scene);
+  const bool stops = scene.target > 0;
+  const std::vector<CoverageJob> jobs = run_jobs(count, threads, [&](std::size_t i) {
+    return stops ? run_adaptive_job(scene, first + i) : run_plain_job(description, scene.spp, first + i);
+  });
+  const Truth truth = truth_of(!stops ? jobs : run_jobs(count, threads, [&](std::size_t i) {
+    return run_uniform_job(scene, kUniformSpp, kOtherSeeds + first + i);
+  }));
   Coverage out;
   out.jobs = count;
   Quotient mse, relmse;
   for (const CoverageJob& job : jobs) {
-    const Realised real = realised(job, truth, jobs.size());
+    const Realised real = realised(job, truth, jobs.size(), !stops);
     const ImageError& e = job.error;
     const double rmse = std::sqrt(std::max(0.0, real.mse)), share = 1.0 / count;
     out.rmse += e.rmse_lo <= rmse && rmse <= e.rmse_hi ? share : 0;

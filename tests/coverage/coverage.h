@@ -4,6 +4,8 @@
 // The right answer is the mean of all other jobs' images. It is independent of a job's image x, and its own
 // noise is known: with n others its variance is v / n, v the variance among jobs, and is subtracted:
 //   e^2 = (x - mean of others)^2 - v / n.
+// Of jobs that stop at a target it is the mean of as many uniform images with other seeds: what the stop rule might do to
+// all of its images alike would be part of their mean.
 #pragma once
 
 #include <cstdint>

@@ -22,5 +22,7 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
 // 64 x 64 pixels with a target error: a whole `lightshaft render`, whose tiles stop when they are good
 // enough.
 CoverageJob run_adaptive_job(const CoverageScene& scene, std::uint64_t seed);
+// The same image, every pixel with `spp` samples: no estimate has a say in what is in it.
+CoverageJob run_uniform_job(const CoverageScene& scene, std::uint64_t spp, std::uint64_t seed);
 
 }  // namespace ls::test

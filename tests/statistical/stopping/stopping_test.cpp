@@ -1,6 +1,5 @@
 // What the stop rule promises, on images whose truth is known; the long version is tests/bench/stopping.cpp.
-// Seeds are fixed. With stops from 4 samples and 64 pixels on the fireflies alone miss the target by a
-// factor 3.4 and the promised bias by 1.5.
+// Seeds are fixed.
 #include <gtest/gtest.h>
 
 #include <map>
