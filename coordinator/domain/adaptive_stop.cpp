@@ -196,6 +196,11 @@ RoundIndex AdaptiveStop::foreseen(TileIndex tile) const {
   return std::min(groups_[group_of_[tile]].foreseen, last_) + 1;
 }
 
+double AdaptiveStop::variance(TileIndex tile) const {
+  const Group& g = groups_[group_of_[tile]];
+  return g.sums.empty() ? std::numeric_limits<double>::quiet_NaN() : variance(g, static_cast<RoundIndex>(g.sums.size() - 1));
+}
+
 double AdaptiveStop::samples_lacking(const Group& g, RoundIndex last) const {
   const auto samples_to = [this](std::size_t round) {
     return static_cast<double>(cut_range(static_cast<RoundIndex>(round), spp_).s1);

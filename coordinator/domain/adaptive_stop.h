@@ -84,6 +84,9 @@ class AdaptiveStop {
   void foresee(double target);
   // Rounds of the tile that will probably be wanted; never fewer than those that surely are.
   RoundIndex foreseen(TileIndex tile) const;
+  // Of the tile's group, per sample, as told by its last round: with it, in whole rounds, the rule's order of gains can be
+  // foretold. NaN: not known.
+  double variance(TileIndex tile) const;
   // Samples of all pixels that these still lack; nothing: not foreseen yet.
   std::optional<double> samples_left() const;
   double samples_to_limit() const;  // that all pixels lack to the most there are

@@ -158,7 +158,7 @@ struct Farm::State {
   bool may_pin(const Job& job, const Worker& worker) const;
   bool lease_from(Job& job, Worker& worker);
   // The next unit of the job for this worker, if it may have one now.
-  std::optional<UnitCode> next_for(Job& job, const Worker& worker);
+  std::optional<UnitCode> next_for(Job& job, const Worker& worker, std::size_t taken = 0);  // besides what it holds
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
   // At a job's tail: what lies untouched behind other work is better begun by a worker that has none. True if
   // units wait again because of it.

@@ -19,6 +19,7 @@ void Job::steer() {
   level_seen = 0;
   if (adaptive.has_value() == plan.target_error.has_value()) return;
   adaptive.reset();
+  queue.want_all();
   marks.clear();
   marked_spp = 0;
   if (plan.target_error) adaptive.emplace(plan.grid, spp);
@@ -38,6 +39,7 @@ void Job::move_window(TileIndex tile, int farm_threads) {
   // Small images need more rounds in flight to keep a large farm busy: two units for every thread.
   const RoundIndex busy = static_cast<RoundIndex>(2 * std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->foreseen(tile) + busy));
+  queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));
 }
 
 void Job::cut_off(const std::vector<RoundIndex>& ends, StopReason reason) {
@@ -48,6 +50,7 @@ void Job::cut_off(const std::vector<RoundIndex>& ends, StopReason reason) {
     units.truncate(t, ends[t]);
     stopping = reason;
   }
+  if (stopping) queue.want_all();
 }
 
 void Job::plan_all() {

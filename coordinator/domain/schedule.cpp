@@ -26,7 +26,8 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
-  const std::uint64_t share = std::max<std::uint64_t>(1, (job.queued() * threads + halves - 1) / halves);
+  const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
+  const std::uint64_t share = std::max<std::uint64_t>(1, (waiting * threads + halves - 1) / halves);
   const std::uint64_t most =
       job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
   const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
@@ -172,12 +173,17 @@ bool Farm::State::assign(Worker& worker, bool only_held) {
   return job != nullptr && (!only_held || holds(*job, worker)) && lease_from(*job, worker);
 }
 
-std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
+// What is only probably wanted is for a worker that would have nothing else to do once its threads are done: lent early it
+// would stand before what turns out to be wanted, and it is the more likely to be dropped.
+std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker, std::size_t taken) {
   const auto excluded = [&](UnitCode code) {
     return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
   };
   const auto code = job.queue.front(job.units, excluded);
-  return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
+  if (!code || out_of_time(job, worker, *code, now)) return std::nullopt;
+  return job.queue.wanted(*code) || worker.units_out + taken < kUnitsAThread * static_cast<std::size_t>(worker.threads)
+             ? code
+             : std::nullopt;
 }
 
 bool Farm::State::lease_from(Job& job, Worker& worker) {
@@ -187,7 +193,7 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
   std::vector<UnitCode> units;
   double cost = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
-    const auto code = next_for(job, worker);
+    const auto code = next_for(job, worker, units.size());
     if (!code) break;
     job.queue.pop(*code);
     units.push_back(*code);

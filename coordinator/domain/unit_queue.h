@@ -1,11 +1,14 @@
 // The units of a job that wait for a worker. Each tile has its own end, since tiles of an adaptive job stop
 // after different numbers of rounds. Of a tile wait all rounds from `next` to its end, and those before it
-// that came back. Lower rounds go first, so that a whole picture is there early.
+// that came back. Lower rounds go first, so that a whole picture is there early. Of a job whose tiles stop by
+// their errors some rounds are only probably wanted: they go behind all that surely are, in the order in which the
+// stop rule would come to want them (adaptive_stop.h).
 //
-// Every operation costs O(log tiles) at most, amortised; 20 bytes a tile.
+// Every operation costs O(log tiles) at most, amortised; 20 bytes a tile, 60 where something is only probably wanted.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -23,7 +26,8 @@ class UnitQueue {
       : next_(tiles),
         end_(tiles, rounds),
         window_(tiles, kNoWindow),
-        planned_(std::uint64_t{rounds} * tiles) {
+        planned_(std::uint64_t{rounds} * tiles),
+        surely_(planned_) {
     for (TileIndex t = 0; t < tiles; ++t) offer(t);
   }
 
@@ -37,16 +41,39 @@ class UnitQueue {
     planned_ += rounds;
     planned_ -= end_[tile];
     const bool was_open = open(tile);
-    end_[tile] = rounds;
+    counting(tile, [&] { end_[tile] = rounds; });
     forget_from(tile, rounds);
     if (!was_open) offer(tile);
   }
   // Rounds of the tile from `window` on wait until it is moved.
   void set_window(TileIndex tile, RoundIndex window) {
     const bool was_open = open(tile);
-    window_[tile] = window;
+    counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
+  // Rounds of the tile before `before` are surely wanted, later ones the sooner the more each takes off the error per
+  // sample: `variance` (of the tile's pixels, per sample; NaN: unknown) over the samples before it and with it.
+  void set_wanted(TileIndex tile, RoundIndex before, double variance) {
+    if (wanted_.empty()) wanted_.assign(next_.size(), {});
+    const float weight = std::isnan(variance) ? std::numeric_limits<float>::infinity() : static_cast<float>(variance);
+    if (wanted_[tile].before == before && wanted_[tile].weight == weight) return;
+    const bool was_wanted = wanted(unit_code(next_[tile], tile));
+    counting(tile, [&] { wanted_[tile] = {before, weight}; });
+    if (!was_wanted || !wanted(unit_code(next_[tile], tile))) offer(tile);
+  }
+  void want_all() {
+    if (wanted_.empty()) return;
+    wanted_.clear();
+    perhaps_ = {};
+    surely_ = 0;
+    for (TileIndex t = 0; t < tiles(); ++t) {
+      surely_ += surely(t);
+      offer(t);
+    }
+  }
+  bool wanted(UnitCode code) const { return round_of(code) < wanted_before(tile_of(code)); }
+  // That wait and are surely wanted; one that was accepted out of turn may be counted.
+  std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
 
   // Before it every round of the tile has been handed out at least once, or accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
@@ -54,35 +81,33 @@ class UnitQueue {
   void rewind(TileIndex tile, RoundIndex round) {
     forget_from(tile, round);
     if (round >= next_[tile]) return;
-    next_[tile] = round;
+    counting(tile, [&] { next_[tile] = round; });
     offer(tile);
   }
 
-  // The first waiting unit for which `excluded` is false; exclusion applies to units that came back only.
+  // The first waiting unit for which `excluded` is false; exclusion applies to units that came back only. Those go first
+  // among the surely wanted, and among the others.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
+    std::optional<UnitCode> perhaps;
     for (const UnitCode code : returned_) {
-      if (!excluded(code)) return code;
+      if ((perhaps && !wanted(code)) || excluded(code)) continue;
+      if (wanted(code)) return code;
+      perhaps = code;
     }
-    while (!heads_.empty()) {
-      const UnitCode code = heads_.top();
-      if (!waits(code)) {
-        heads_.pop();
-      } else if (units.accepted(code)) {
-        step();
-      } else {
-        return code;
-      }
+    while (const auto code = head()) {
+      if (!units.accepted(*code)) return perhaps && !wanted(*code) ? perhaps : code;
+      step(tile_of(*code));
     }
-    return std::nullopt;
+    return perhaps;
   }
   bool empty(const UnitTable& units) {
     return !front(units, [](UnitCode) { return false; });
   }
   // Takes out what front() gave.
   void pop(UnitCode code) {
-    if (!heads_.empty() && code == heads_.top() && waits(code))
-      step();
+    if (head() == code)
+      step(tile_of(code));
     else
       returned_.erase(code);
   }
@@ -93,20 +118,67 @@ class UnitQueue {
   // A late result came for a unit that may be waiting.
   void forget(UnitCode code) { returned_.erase(code); }
   const std::set<UnitCode>& returned() const { return returned_; }
+  std::size_t entries() const { return heads_.size() + perhaps_.size(); }  // memory, in its unit
 
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
+  // Most tiles have no such entry: of a job by samples all is wanted.
+  struct Wanted {
+    RoundIndex before = kNoWindow;
+    float weight = 0;
+  };
+  struct Perhaps {
+    float gain;
+    UnitCode code;
+    bool operator<(const Perhaps& o) const { return gain != o.gain ? gain < o.gain : code > o.code; }
+  };
+
   bool open(TileIndex t) const { return next_[t] < std::min(end_[t], window_[t]); }
   bool waits(UnitCode code) const { return open(tile_of(code)) && round_of(code) == next_[tile_of(code)]; }
-  // heads_ holds the next unit of every open tile, and dead ones among them, which front() drops.
-  void offer(TileIndex tile) {
-    if (open(tile)) heads_.push(unit_code(next_[tile], tile));
+  RoundIndex wanted_before(TileIndex t) const { return wanted_.empty() ? kNoWindow : wanted_[t].before; }
+  float gain(UnitCode code) const {
+    const RoundIndex round = round_of(code);
+    if (round == 0) return std::numeric_limits<float>::infinity();
+    return static_cast<float>(static_cast<double>(wanted_[tile_of(code)].weight) /
+                              (static_cast<double>(round_range(round - 1).s1) * static_cast<double>(round_range(round).s1)));
   }
-  void step() {
-    const TileIndex tile = tile_of(heads_.top());
-    heads_.pop();
-    ++next_[tile];
+  std::uint64_t surely(TileIndex t) const {
+    const RoundIndex before = std::min({end_[t], window_[t], wanted_before(t)});
+    return before - std::min(before, next_[t]);
+  }
+  template <class Change>
+  void counting(TileIndex t, Change&& change) {
+    surely_ -= surely(t);
+    change();
+    surely_ += surely(t);
+  }
+  // heads_ and perhaps_ together hold the next unit of every open tile, and dead ones among them, which head() drops.
+  void offer(TileIndex tile) {
+    if (!open(tile)) return;
+    const UnitCode code = unit_code(next_[tile], tile);
+    if (wanted(code)) return heads_.push(code);
+    if (perhaps_.size() > 2 * next_.size()) return offer_all_perhaps();
+    perhaps_.push({gain(code), code});
+  }
+  // Drops the dead ones, so that they are never more than the others.
+  void offer_all_perhaps() {
+    std::vector<Perhaps> all;
+    for (TileIndex t = 0; t < tiles(); ++t) {
+      const UnitCode code = unit_code(next_[t], t);
+      if (open(t) && !wanted(code)) all.push_back({gain(code), code});
+    }
+    perhaps_ = std::priority_queue<Perhaps>({}, std::move(all));
+  }
+  std::optional<UnitCode> head() {
+    while (!heads_.empty() && !(waits(heads_.top()) && wanted(heads_.top()))) heads_.pop();
+    if (!heads_.empty()) return heads_.top();
+    const auto alive = [&](const Perhaps& p) { return waits(p.code) && !wanted(p.code) && p.gain == gain(p.code); };
+    while (!perhaps_.empty() && !alive(perhaps_.top())) perhaps_.pop();
+    return perhaps_.empty() ? std::nullopt : std::optional(perhaps_.top().code);
+  }
+  void step(TileIndex tile) {
+    counting(tile, [&] { ++next_[tile]; });
     offer(tile);
   }
   void forget_from(TileIndex tile, RoundIndex round) {
@@ -115,8 +187,10 @@ class UnitQueue {
   }
 
   std::vector<RoundIndex> next_, end_, window_;
-  std::uint64_t planned_;
+  std::uint64_t planned_, surely_;
   std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads_;
+  std::priority_queue<Perhaps> perhaps_;
+  std::vector<Wanted> wanted_;  // empty: all is
   std::set<UnitCode> returned_;
 };
 

@@ -60,7 +60,7 @@ struct Worker {
   // Two units a thread at least, and three leases or what lasts three leases' time.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
-    if (units_out < 2 * static_cast<std::uint32_t>(threads)) return true;
+    if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
     return leases.size() < kLeasesPerWorker && seconds_until_free() < kLeasesPerWorker * kLeaseSeconds;
   }
   bool available() const {

@@ -1,8 +1,7 @@
 // When jobs stop: by error, by time, by samples.
-#include <random>
-
 #include "tests/unit/domain/rig.h"
 #include "tests/unit/domain/stop_oracle.h"
+#include "tests/unit/domain/uneven_job.h"
 
 namespace ls::coordinator {
 namespace {
@@ -136,116 +135,6 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
   EXPECT_EQ(after.job().state, JobState::done);
   EXPECT_EQ(after.job().stopped, StopReason::error);
   EXPECT_EQ(after.farm.tile({"j"}, 0)->spp, before.farm.tile({"j"}, 0)->spp);
-}
-
-// Tiles of 32 x 32 pixels with variances of 1/8 to 16, each round with a scatter of its own.
-double uneven_error(const UnitKey& unit) {
-  std::mt19937_64 random(99 + 1000003 * unit.tile + unit.round);
-  const double scatter = std::uniform_real_distribution(.7, 1.4)(random);
-  return scatter * std::exp2(static_cast<double>(unit.tile % 8) - 3) * 3 * 32 * 32 /
-         static_cast<double>(round_range(unit.round).s1);
-}
-double uneven_error_of(TileIndex t, RoundIndex k) { return uneven_error({{"j"}, t, k}); }
-
-JobPlan uneven_plan(double target) {
-  JobPlan plan;
-  plan.brief.job = {"j"};
-  plan.grid = {{32 * 9, 32 * 2}, 32};
-  plan.target_error = target;
-  return plan;
-}
-
-std::vector<RoundIndex> ends_in(const Rig& rig) {
-  std::vector<RoundIndex> ends;
-  for (TileIndex t = 0; t < 18; ++t) ends.push_back(rig.farm.tile({"j"}, t)->rounds_folded);
-  return ends;
-}
-
-TEST(Adaptive, TilesEndWhereTheirErrorsSayWhoeverRendersThem) {
-  const auto expected = stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of);
-  ASSERT_TRUE(expected.by_error);
-  ASSERT_NE(*std::min_element(expected.ends.begin(), expected.ends.end()),
-            *std::max_element(expected.ends.begin(), expected.ends.end()));
-  for (const int workers : {1, 3, 8}) {
-    Rig rig;
-    rig.rel_error = uneven_error;
-    for (int w = 0; w < workers; ++w) rig.join("w" + std::to_string(w), 1 + 3 * w);
-    rig.submit(uneven_plan(.01));
-
-    rig.render_all();
-
-    EXPECT_EQ(rig.job().stopped, StopReason::error);
-    EXPECT_EQ(ends_in(rig), expected.ends) << workers;
-  }
-}
-
-TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesWhatItGivesAtOnce) {
-  Rig rig;
-  rig.rel_error = uneven_error;
-  rig.join("w", 4);
-  rig.submit(uneven_plan(.02));
-  rig.render_all();
-  ASSERT_EQ(rig.job().state, JobState::done);
-
-  rig.send(JobRetargeted{{"j"}, .01});
-  EXPECT_EQ(rig.job().state, JobState::running);
-  rig.render_all();
-
-  EXPECT_EQ(rig.job().stopped, StopReason::error);
-  EXPECT_EQ(ends_in(rig),
-            stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
-}
-
-TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
-  Rig rig;
-  rig.rel_error = uneven_error;
-  rig.join("w", 4);
-  rig.submit(uneven_plan(.02));
-  rig.render_all();
-  const auto ends = ends_in(rig);
-  const std::uint64_t most = round_range(*std::max_element(ends.begin(), ends.end()) - 1).s1;
-  EXPECT_FALSE(rig.farm.may_extend({"j"}, most - 2));
-
-  rig.send(JobExtended{{"j"}, most + 10});
-  rig.render_all();
-
-  EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_FALSE(rig.farm.plan({"j"})->target_error);
-  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, most + 10);
-}
-
-TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
-  std::vector<std::vector<RoundIndex>> first;
-  for (const int workers : {1, 5}) {
-    Rig rig;
-    rig.rel_error = uneven_error;
-    for (int w = 0; w < workers; ++w) rig.join("w" + std::to_string(w), 1 + w);
-    std::vector<std::vector<RoundIndex>> seen;
-    std::vector<Effect> effects = rig.submit(uneven_plan(.01));
-    for (Effect& e : rig.render_all()) effects.push_back(std::move(e));
-    double spp = 0;
-    for (const Checkpoint& c : of<Checkpoint>(effects)) {
-      EXPECT_GT(c.spp, spp);
-      spp = c.spp;
-      seen.push_back(c.rounds);
-    }
-    EXPECT_EQ(seen.back(), ends_in(rig)) << "the last one is the image as it is handed out";
-    EXPECT_EQ(seen[4], std::vector<RoundIndex>(18, 5)) << "before any tile may stop, all have as many";
-    EXPECT_GT(seen.size(), 10u);
-    if (first.empty()) first = seen;
-    EXPECT_EQ(seen, first);
-  }
-}
-
-TEST(Adaptive, FewUnitsAreRenderedInVain) {
-  Rig rig;
-  rig.rel_error = uneven_error;
-  rig.join("w", 4);
-  std::vector<Effect> effects = rig.submit(uneven_plan(.01));
-  for (Effect& e : rig.render_all()) effects.push_back(std::move(e));
-
-  const auto rendered = of<RecordUnit>(effects).size();
-  EXPECT_LE(rendered, rig.job().units_folded * 115 / 100) << "the end is foreseen";
 }
 
 // One unit after the other, each in so many seconds of the clock, with a tick behind each.

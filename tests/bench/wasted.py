@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+"""What a farm renders of jobs with a target error that is no part of their images.
+
+usage: wasted.py --scenes DIR [--seeds N] [--workers N]
+DIR holds NAME.xml. Renders each job of JOBS with --workers one-thread workers on this machine. Prints, for each, the core seconds
+of all units over those of the image's own, and the seconds of the clock of all workers over these.
+"""
+import argparse
+import pathlib
+import os
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+from local_farm import LocalFarm, bin_dir  # noqa: E402
+
+JOBS = [("tint", "96x96", .00143), ("surface", "96x96", .000229), ("cloud", "96x96", .0018), ("tint", "256x192", .00328),
+        ("surface", "256x192", .0003), ("surface", "512x384", .001)]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=pathlib.Path, required=True)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    print("| scene | size | target | seed | rendered / wanted | seconds x workers / wanted |\n|---|---|---|---|---|---|")
+    with LocalFarm() as farm:
+        farm.add_workers(options.workers, fake=False)
+        environment = {**os.environ, "LIGHTSHAFT_URL": f"{farm.url()}/", "LIGHTSHAFT_TOKEN": farm.token}
+        for scene, size, target in JOBS:
+            for seed in range(options.seeds):
+                job = subprocess.run([bin_dir() / "lightshaft", "submit", options.scenes / f"{scene}.xml", "--size", size, "--target-error",
+                                      str(target), "--spp", "20000", "--seed", str(seed)], env=environment, check=True, capture_output=True,
+                                     text=True).stdout.split()[0]
+                view = farm.wait_for_job(job, patience=600)
+                wanted = farm.report(job)["convergence"][-1]["core_seconds"]
+                print(f"| {scene} | {size} | {target} | {seed} | {view['core_seconds'] / wanted:.2f} | "
+                      f"{options.workers * view['elapsed_seconds'] / wanted:.2f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

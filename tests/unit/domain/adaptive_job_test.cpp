@@ -1,0 +1,103 @@
+// When the tiles of a job with a target end, each by its errors.
+#include "tests/unit/domain/stop_oracle.h"
+#include "tests/unit/domain/uneven_job.h"
+
+namespace ls::coordinator {
+namespace {
+
+TEST(Adaptive, TilesEndWhereTheirErrorsSayWhoeverRendersThem) {
+  const auto expected = stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of);
+  ASSERT_TRUE(expected.by_error);
+  ASSERT_NE(*std::min_element(expected.ends.begin(), expected.ends.end()),
+            *std::max_element(expected.ends.begin(), expected.ends.end()));
+  for (const int workers : {1, 3, 8}) {
+    Rig rig;
+    rig.rel_error = uneven_error;
+    for (int w = 0; w < workers; ++w) rig.join("w" + std::to_string(w), 1 + 3 * w);
+    rig.submit(uneven_plan(.01));
+
+    rig.render_all();
+
+    EXPECT_EQ(rig.job().stopped, StopReason::error);
+    EXPECT_EQ(ends_in(rig), expected.ends) << workers;
+  }
+}
+
+TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesWhatItGivesAtOnce) {
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.join("w", 4);
+  rig.submit(uneven_plan(.02));
+  rig.render_all();
+  ASSERT_EQ(rig.job().state, JobState::done);
+
+  rig.send(JobRetargeted{{"j"}, .01});
+  EXPECT_EQ(rig.job().state, JobState::running);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().stopped, StopReason::error);
+  EXPECT_EQ(ends_in(rig),
+            stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
+}
+
+TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.join("w", 4);
+  rig.submit(uneven_plan(.02));
+  rig.render_all();
+  const auto ends = ends_in(rig);
+  const std::uint64_t most = round_range(*std::max_element(ends.begin(), ends.end()) - 1).s1;
+  EXPECT_FALSE(rig.farm.may_extend({"j"}, most - 2));
+
+  rig.send(JobExtended{{"j"}, most + 10});
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().stopped, StopReason::spp);
+  EXPECT_FALSE(rig.farm.plan({"j"})->target_error);
+  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, most + 10);
+}
+
+TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
+  std::vector<std::vector<RoundIndex>> first;
+  for (const int workers : {1, 5}) {
+    Rig rig;
+    rig.rel_error = uneven_error;
+    for (int w = 0; w < workers; ++w) rig.join("w" + std::to_string(w), 1 + w);
+    std::vector<std::vector<RoundIndex>> seen;
+    std::vector<Effect> effects = rig.submit(uneven_plan(.01));
+    for (Effect& e : rig.render_all()) effects.push_back(std::move(e));
+    double spp = 0;
+    for (const Checkpoint& c : of<Checkpoint>(effects)) {
+      EXPECT_GT(c.spp, spp);
+      spp = c.spp;
+      seen.push_back(c.rounds);
+    }
+    EXPECT_EQ(seen.back(), ends_in(rig)) << "the last one is the image as it is handed out";
+    EXPECT_EQ(seen[4], std::vector<RoundIndex>(18, 5)) << "before any tile may stop, all have as many";
+    EXPECT_GT(seen.size(), 10u);
+    if (first.empty()) first = seen;
+    EXPECT_EQ(seen, first);
+  }
+}
+
+// What is only probably wanted is lent when a thread would have nothing to do, two units a thread at most, and what the
+// rule would want next goes first: so only that can be in vain which is out when the last level is reached, or came just
+// before. Errors that fall faster than as 1/n, as those of low-discrepancy samples do, make the rule foresee too much.
+TEST(Adaptive, FewUnitsAreRenderedInVain) {
+  for (const auto [workers, threads] : {std::pair(1, 1), {1, 4}, {4, 1}, {3, 4}}) {
+    Rig rig;
+    rig.rel_error = [](const UnitKey& unit) {
+      return 4 * uneven_error(unit) * std::pow(static_cast<double>(round_range(unit.round).s1), -.3);
+    };
+    for (int w = 0; w < workers; ++w) rig.join("w" + std::to_string(w), threads);
+    std::vector<Effect> effects = rig.submit(uneven_plan(.002));
+    for (Effect& e : rig.render_all()) effects.push_back(std::move(e));
+
+    const auto rendered = of<RecordUnit>(effects).size();
+    EXPECT_LE(rendered, rig.job().units_folded + 2 * static_cast<std::uint64_t>(workers * threads));
+  }
+}
+
+}  // namespace
+}  // namespace ls::coordinator

@@ -1,0 +1,178 @@
+// The order in which a job's units are handed out: what is surely wanted, then what probably is.
+#include "coordinator/domain/unit_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace ls::coordinator {
+namespace {
+
+constexpr auto nobody = [](UnitCode) { return false; };
+
+std::vector<UnitCode> all_of(UnitQueue& queue, const UnitTable& units) {
+  std::vector<UnitCode> order;
+  while (const auto code = queue.front(units, nobody)) {
+    queue.pop(*code);
+    order.push_back(*code);
+  }
+  return order;
+}
+
+TEST(UnitQueue, RoundsOfAllTilesOneAfterTheOther) {
+  const UnitTable units(3);
+  UnitQueue queue(3, 2);
+  EXPECT_EQ(queue.surely_waiting(), 6u);
+  EXPECT_EQ(all_of(queue, units), (std::vector<UnitCode>{unit_code(0, 0), unit_code(0, 1), unit_code(0, 2),
+                                                         unit_code(1, 0), unit_code(1, 1), unit_code(1, 2)}));
+  EXPECT_EQ(queue.surely_waiting(), 0u);
+}
+
+TEST(UnitQueue, WhatIsSurelyWantedGoesFirstThenWhatGainsMost) {
+  const UnitTable units(3);
+  UnitQueue queue(3, 10);
+  // 64 samples after round 5, then 64 a round: gains of tile 0 are 90 / (64 * 128), 90 / (128 * 192)...
+  queue.set_wanted(0, 6, 90);
+  queue.set_wanted(1, 8, 0);
+  queue.set_wanted(2, 6, 40);
+  for (const TileIndex t : {0u, 1u, 2u}) queue.set_window(t, 9);
+  EXPECT_EQ(queue.surely_waiting(), 6u + 8u + 6u);
+
+  auto order = all_of(queue, units);
+
+  ASSERT_EQ(order.size(), 27u);
+  order.erase(order.begin(), order.begin() + 18);  // rounds 0 to 5
+  EXPECT_EQ(order, (std::vector<UnitCode>{unit_code(6, 1), unit_code(7, 1),                    // wanted
+                                          unit_code(6, 0), unit_code(6, 2), unit_code(7, 0),   // .0110 .0049 .0037
+                                          unit_code(8, 0), unit_code(7, 2), unit_code(8, 2),   // .0018 .0016 .0008
+                                          unit_code(8, 1)}));                                  // 0
+}
+
+TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
+  const UnitTable units(2);
+  UnitQueue queue(2, 8);
+  for (const TileIndex t : {0u, 1u}) queue.set_wanted(t, 6, 1);
+  while (queue.front(units, nobody) != unit_code(7, 0)) queue.pop(*queue.front(units, nobody));
+  queue.put_back(unit_code(6, 1));  // of those that are probably wanted
+  EXPECT_EQ(queue.front(units, nobody), unit_code(6, 1));
+  queue.rewind(1, 5);  // one that surely is waits again
+  EXPECT_EQ(queue.front(units, nobody), unit_code(5, 1));
+  queue.pop(unit_code(5, 1));
+  queue.put_back(unit_code(5, 1));
+  queue.put_back(unit_code(3, 0));
+  EXPECT_EQ(all_of(queue, units), (std::vector<UnitCode>{unit_code(3, 0), unit_code(5, 1), unit_code(6, 1),
+                                                         unit_code(7, 0), unit_code(7, 1)}));
+}
+
+TEST(UnitQueue, AnErrorThatIsNotKnownStandsForAGreatOne) {
+  const UnitTable units(2);
+  UnitQueue queue(2, 7);
+  queue.set_wanted(0, 6, 1e30);
+  queue.set_wanted(1, 6, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(all_of(queue, units).at(12), unit_code(6, 1));
+}
+
+// The same by looking through all units each time.
+struct Oracle {
+  std::vector<RoundIndex> next, end, window, before;
+  std::vector<double> variance;
+  std::set<UnitCode> returned;
+  bool all = true;
+
+  bool wanted(UnitCode code) const { return all || round_of(code) < before[tile_of(code)]; }
+  double gain(UnitCode code) const {
+    const RoundIndex r = round_of(code);
+    if (wanted(code)) return std::numeric_limits<double>::infinity();
+    return variance[tile_of(code)] / (static_cast<double>(round_range(r - 1).s1) * static_cast<double>(round_range(r).s1));
+  }
+  std::optional<UnitCode> front() const {
+    std::optional<UnitCode> best;
+    for (const bool sure : {true, false}) {
+      for (const UnitCode code : returned)
+        if (wanted(code) == sure) return code;
+      for (TileIndex t = 0; t < next.size(); ++t) {
+        if (next[t] >= std::min(end[t], window[t])) continue;
+        const UnitCode code = unit_code(next[t], t);
+        if (wanted(code) != sure) continue;
+        if (!best || gain(code) > gain(*best) || (gain(code) == gain(*best) && code < *best)) best = code;
+      }
+      if (best) return best;
+    }
+    return best;
+  }
+  std::uint64_t surely() const {
+    std::uint64_t n = returned.size();
+    for (TileIndex t = 0; t < next.size(); ++t) {
+      const RoundIndex last = std::min({end[t], window[t], all ? end[t] : before[t]});
+      n += last - std::min(last, next[t]);
+    }
+    return n;
+  }
+};
+
+TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    std::mt19937 rng(seed);
+    const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(rng() % n); };
+    const TileIndex tiles = 1 + below(7);
+    const RoundIndex rounds = 20;
+    const UnitTable units(tiles);
+    UnitQueue queue(tiles, rounds);
+    const std::vector<RoundIndex> none(tiles), most(tiles, rounds);
+    Oracle oracle{none, most, most, most, std::vector<double>(tiles), {}};
+    for (int step = 0; step < 3000; ++step) {
+      const TileIndex t = below(tiles);
+      const std::uint32_t what = below(40);
+      if (what < 20) {
+        const auto code = oracle.front();
+        ASSERT_EQ(queue.front(units, nobody), code) << "seed " << seed << " step " << step;
+        if (!code) continue;
+        queue.pop(*code);
+        if (oracle.returned.erase(*code) == 0) ++oracle.next[tile_of(*code)];
+      } else if (what < 26) {
+        if (oracle.next[t] == 0) continue;
+        const UnitCode code = unit_code(below(oracle.next[t]), t);
+        queue.put_back(code);
+        if (round_of(code) < oracle.end[t]) oracle.returned.insert(code);
+      } else if (what < 34) {
+        oracle.all = false;
+        oracle.before[t] = below(rounds) + 1;
+        oracle.variance[t] = static_cast<double>(1u << below(10));
+        queue.set_wanted(t, oracle.before[t], oracle.variance[t]);
+      } else if (what < 36) {
+        queue.set_window(t, oracle.window[t] = below(rounds) + 1);
+      } else if (what < 38) {
+        const RoundIndex from = below(rounds);
+        queue.rewind(t, from);
+        for (RoundIndex r = from; r < rounds; ++r) oracle.returned.erase(unit_code(r, t));
+        oracle.next[t] = std::min(oracle.next[t], from);
+      } else if (what == 38) {
+        const RoundIndex end = below(rounds) + 1;
+        queue.set_end(t, end);
+        oracle.end[t] = end;
+        for (RoundIndex r = end; r < rounds; ++r) oracle.returned.erase(unit_code(r, t));
+      } else if (below(10) == 0) {
+        queue.want_all();
+        oracle.all = true;
+        oracle.before = most;
+        std::fill(oracle.variance.begin(), oracle.variance.end(), 0);
+      }
+      ASSERT_EQ(queue.surely_waiting(), oracle.surely()) << "seed " << seed << " step " << step;
+    }
+  }
+}
+
+// A rule that changes its mind a million times leaves no million entries.
+TEST(UnitQueue, WhatIsOutdatedIsNotKept) {
+  const UnitTable units(4);
+  UnitQueue queue(4, 100);
+  for (const RoundIndex before : {RoundIndex{50}, RoundIndex{0}})
+    for (int i = 0; i < 100'000; ++i) queue.set_wanted(static_cast<TileIndex>(i % 4), before, i);
+  EXPECT_LE(queue.entries(), 4u + 3 * 4u);
+  EXPECT_EQ(all_of(queue, units).size(), 400u);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
