@@ -29,11 +29,17 @@ std::optional<CoreSeconds> core_seconds_left(const OutlookFacts& facts, std::spa
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
+// How many units' time threads have nothing to do at a target's end but what will be dropped: between nothing and all of one
+// for the last that is wanted (Graham 1969: what is lent one by one takes no longer than W / P + (1 - 1 / P) u), and as long
+// again until a thread is free for that. Where the samples end it, their number is known and units come out even.
+constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
+
 // A unit is one thread's: no more threads help than units may be under way, and none is done before its time. Of what is
 // less than a unit it is the part of it that is left.
-double seconds_on(double cores, double core, const OutlookFacts& facts) {
+double seconds_on(double cores, double core, double wait, const OutlookFacts& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
-  return std::max(core / busy, std::min(core, facts.unit_seconds));
+  const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);
+  return std::max(std::min(core / busy + waits, std::max(core, core / busy)), std::min(core, facts.unit_seconds));
 }
 
 }  // namespace
@@ -44,14 +50,15 @@ Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points
   const auto core = core_seconds_left(facts, points, out);
   if (facts.cores > 0 && core) {
     const auto on = [&](double cores) {
-      return core->ci95 ? std::optional(std::pair(seconds_on(cores, core->ci95->first, facts),
-                                                  seconds_on(cores, core->ci95->second, facts)))
+      return core->ci95 ? std::optional(std::pair(seconds_on(cores, core->ci95->first, kLeastWait, facts),
+                                                  seconds_on(cores, core->ci95->second, kMostWait, facts)))
                         : std::nullopt;
     };
-    out.seconds = seconds_on(facts.cores, core->to_end, facts);
+    const double wait = core->ci95 ? kMeanWait : kEven;
+    out.seconds = seconds_on(facts.cores, core->to_end, wait, facts);
     out.ci95 = on(facts.cores);
     const double more = std::max(facts.cores, facts.cores_with_more);
-    if (const double sooner = seconds_on(more, core->to_end, facts); sooner < *out.seconds) {
+    if (const double sooner = seconds_on(more, core->to_end, wait, facts); sooner < *out.seconds) {
       out.with_more = sooner;
       out.with_more_ci95 = on(facts.cores_with_more);
     }

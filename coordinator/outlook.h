@@ -32,7 +32,8 @@ struct Outlook {
 
 // Whichever of samples, target and time comes first. The forecast of the target counts from the last point
 // (convergence.h); what has been spent since is taken off. Until there is one a steered job's own foresight stands in,
-// without an interval. A unit is one thread's, so few units keep few threads busy. Where a forecast's interval reaches beyond the end of the samples, it ends there.
+// without an interval. A unit is one thread's, so few units keep few threads busy, and at a target's end threads wait for
+// the last ones. Where a forecast's interval reaches beyond the end of the samples, it ends there.
 Outlook outlook_of(const OutlookFacts& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

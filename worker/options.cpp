@@ -58,6 +58,7 @@ void describe(CLI::App& app, Options& o, Files& files) {
   app.add_flag("--fake", o.fake, "Render no scene: give pixels that are a pure function of the unit");
   app.add_flag("--render-child", o.render_child)->group("");
   app.add_option("--fake-delay", "Milliseconds that a fake unit takes")->group("");
+  app.add_option("--fake-sample-seconds", o.fake_options.sample_seconds)->group("");
   app.add_option("--fake-fault", o.fake_fault_text)->group("");
   app.add_option("--fake-class", o.fake_class)->group("");
   app.set_version_flag("--version", kBuild);
@@ -107,6 +108,7 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
     if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay is a number of milliseconds");
     o.fake_options.delay = from_seconds(ms * 1e-3);
   }
+  if (!(o.fake_options.sample_seconds >= 0 && o.fake_options.sample_seconds <= 1)) return usage("--fake-sample-seconds is 0 to 1");
   if (const auto* format = app.get_option("--log-format"); format->count() > 0)
     o.log_format = *log_format_of(format->as<std::string>());
   const auto fault = parse_fake_fault(o.fake_fault_text);
@@ -137,7 +139,8 @@ std::vector<std::string> child_arguments(const Options& o) {
   if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});  // what it may read
   if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");
-  arguments.insert(arguments.end(), {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3)});
+  arguments.insert(arguments.end(), {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3),
+                                     "--fake-sample-seconds", fmt::format("{}", o.fake_options.sample_seconds)});
   if (!o.fake_fault_text.empty()) arguments.insert(arguments.end(), {"--fake-fault", o.fake_fault_text});
   if (!o.fake_class.empty()) arguments.insert(arguments.end(), {"--fake-class", o.fake_class});
   return arguments;

@@ -14,12 +14,12 @@ std::string audit_job(Job& job, const LeaseBook& leases) {
   const std::string name = "job " + job.plan.brief.job.value + ": ";
   if (job.ended()) return job.out.empty() ? "" : name + "has ended with units leased";
   const UnitQueue& queue = job.queue;
-  std::uint64_t waiting = queue.returned().size(), accepted = 0;
+  std::uint64_t waiting = queue.returned_count(), accepted = 0;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) {
     for (RoundIndex r = 0; r < queue.end(t); ++r) {
       const UnitCode code = unit_code(r, t);
       const bool done = job.units.accepted(code), ahead = r >= queue.next(t);
-      const bool returned = queue.returned().contains(code), out = job.out.contains(code);
+      const bool returned = queue.returned(code), out = job.out.contains(code);
       accepted += done;
       waiting += ahead && !done;
       if (done + returned + out > 1) return name + fmt::format("unit {:#x} is in two places", code);
@@ -119,7 +119,7 @@ std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
     of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() + w->warmed_up.size() +
                   w->failures.size();
   for (const auto& [seq, job] : s.jobs) {
-    of_jobs += job->out.size() + job->audits.size() + job->marks.size() + job->queue.returned().size() +
+    of_jobs += job->out.size() + job->audits.size() + job->marks.size() + job->queue.returned_count() +
                job->load.leases_at.size();
     units += job->units.accepted_count();
   }
@@ -156,7 +156,7 @@ std::string Farm::audit() const {
       return "worker " + worker->id.value + ": its load is counted wrong";
     if (!worker->available() || worker->covered() || !worker->wants_more()) continue;
     for (const auto& [seq, job] : state.jobs) {
-      if (!job->leasable() || !state.takes(*job, *worker)) continue;
+      if (!job->leasable() || state.takes(*job, *worker) != State::Takes::now) continue;
       return "worker " + worker->id.value + " idles while job " + job->plan.brief.job.value +
              " has a unit for it";
     }

@@ -154,11 +154,13 @@ struct Farm::State {
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
   Job* choose(const Worker& worker);  // whose turn it is at this worker
-  bool takes(Job& job, const Worker& worker);
+  enum class Takes { nothing, later, now };
+  Takes takes(Job& job, const Worker& worker);
   bool may_pin(const Job& job, const Worker& worker) const;
   bool lease_from(Job& job, Worker& worker);
-  // The next unit of the job for this worker, if it may have one now.
-  std::optional<UnitCode> next_for(Job& job, const Worker& worker, std::size_t taken = 0);  // besides what it holds
+  std::optional<UnitCode> next_for(Job& job, const Worker& worker);
+  // What is only probably wanted waits until the worker, with so many units besides those it holds, has next to nothing.
+  bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
   // At a job's tail: what lies untouched behind other work is better begun by a worker that has none. True if
   // units wait again because of it.

@@ -22,6 +22,8 @@ inline constexpr double kLeastCoreShare = 1.0 / 64;  // of a core that a worker'
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;     // keeps an assignment well below 1 MiB
 inline constexpr std::uint32_t kLeasesPerWorker = 3;      // one being rendered, two ahead
 inline constexpr std::uint32_t kUnitsAThread = 2;         // one being rendered, one ahead, however long they take
+// Of units that are only probably wanted: what a worker may have besides, or it would wait for messages between small ones.
+inline constexpr double kForeseenSeconds = .05;
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // at a job's tail leases are single units
 inline constexpr double kDeadlineFactor = 3.0;            // of the predicted duration
 inline constexpr Duration kDeadlineSlack = 10s;

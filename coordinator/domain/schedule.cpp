@@ -27,7 +27,9 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
-  const std::uint64_t share = std::max<std::uint64_t>(1, (waiting * threads + halves - 1) / halves);
+  // With single units a worker of many threads would reach the most leases there may be before all have something to do.
+  const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
+  const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
   const std::uint64_t most =
       job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
   const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
@@ -130,9 +132,12 @@ void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncove
   }
 }
 
-bool Farm::State::takes(Job& job, const Worker& worker) {
-  if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return false;
-  return audit_for(job, worker) || (room(job, worker) > 0 && next_for(job, worker));
+Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
+  if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return Takes::nothing;
+  if (audit_for(job, worker)) return Takes::now;
+  const auto code = room(job, worker) > 0 ? next_for(job, worker) : std::nullopt;
+  if (!code) return Takes::nothing;
+  return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
 // What a worker renders that is alone of its class nobody can check: a job goes to a class of several where there is
@@ -149,7 +154,8 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
 }
 
 // The job whose turn it is, or one whose world the worker holds, if that has not had much more than its share: to
-// load a world costs time. A job that nobody renders does not wait for that.
+// load a world costs time. A job that nobody renders does not wait for that. Null also if a job whose turn it is will take
+// the worker later: another's leases in between would keep it from that.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -159,7 +165,8 @@ Job* Farm::State::choose(const Worker& worker) {
   shares.in_turn([&](Job& job, double lag) {
     if (fair != nullptr && ++looked_at > kJobsLookedAt) return true;
     if (fair != nullptr && (lag - least > slack || !holds(job, worker))) return false;
-    if (!takes(job, worker)) return false;
+    const Takes when = takes(job, worker);
+    if (when != Takes::now) return when == Takes::later && fair == nullptr;
     if (fair == nullptr) fair = &job, least = lag;
     if (!holds(job, worker) && job.load.units > 0) return false;
     chosen = &job;
@@ -173,17 +180,18 @@ bool Farm::State::assign(Worker& worker, bool only_held) {
   return job != nullptr && (!only_held || holds(*job, worker)) && lease_from(*job, worker);
 }
 
-// What is only probably wanted is for a worker that would have nothing else to do once its threads are done: lent early it
-// would stand before what turns out to be wanted, and it is the more likely to be dropped.
-std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker, std::size_t taken) {
+std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   const auto excluded = [&](UnitCode code) {
     return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
   };
   const auto code = job.queue.front(job.units, excluded);
-  if (!code || out_of_time(job, worker, *code, now)) return std::nullopt;
-  return job.queue.wanted(*code) || worker.units_out + taken < kUnitsAThread * static_cast<std::size_t>(worker.threads)
-             ? code
-             : std::nullopt;
+  return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
+}
+
+// Lent early it would stand before what turns out to be wanted, and it would be the more likely to be dropped.
+bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const {
+  return !job.queue.wanted(code) && worker.units_out + units >= kUnitsAThread * static_cast<std::size_t>(worker.threads) &&
+         worker.seconds_until_free() + cost / worker.cores() >= kForeseenSeconds;
 }
 
 bool Farm::State::lease_from(Job& job, Worker& worker) {
@@ -193,8 +201,8 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
   std::vector<UnitCode> units;
   double cost = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
-    const auto code = next_for(job, worker, units.size());
-    if (!code) break;
+    const auto code = next_for(job, worker);
+    if (!code || too_early(job, worker, *code, units.size(), cost)) break;
     job.queue.pop(*code);
     units.push_back(*code);
     cost += job.predict(*code);

@@ -58,6 +58,7 @@ class UnitQueue {
     const float weight = std::isnan(variance) ? std::numeric_limits<float>::infinity() : static_cast<float>(variance);
     if (wanted_[tile].before == before && wanted_[tile].weight == weight) return;
     const bool was_wanted = wanted(unit_code(next_[tile], tile));
+    sort_returned(tile, wanted_[tile].before, before);
     counting(tile, [&] { wanted_[tile] = {before, weight}; });
     if (!was_wanted || !wanted(unit_code(next_[tile], tile))) offer(tile);
   }
@@ -65,6 +66,7 @@ class UnitQueue {
     if (wanted_.empty()) return;
     wanted_.clear();
     perhaps_ = {};
+    returned_.merge(returned_perhaps_);
     surely_ = 0;
     for (TileIndex t = 0; t < tiles(); ++t) {
       surely_ += surely(t);
@@ -89,17 +91,16 @@ class UnitQueue {
   // among the surely wanted, and among the others.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
-    std::optional<UnitCode> perhaps;
-    for (const UnitCode code : returned_) {
-      if ((perhaps && !wanted(code)) || excluded(code)) continue;
-      if (wanted(code)) return code;
-      perhaps = code;
-    }
-    while (const auto code = head()) {
-      if (!units.accepted(*code)) return perhaps && !wanted(*code) ? perhaps : code;
-      step(tile_of(*code));
-    }
-    return perhaps;
+    const auto first_of = [&](const std::set<UnitCode>& returned) {
+      const auto it = std::find_if_not(returned.begin(), returned.end(), excluded);
+      return it == returned.end() ? std::nullopt : std::optional(*it);
+    };
+    if (const auto code = first_of(returned_)) return code;
+    std::optional<UnitCode> next = head();
+    for (; next && units.accepted(*next); next = head()) step(tile_of(*next));
+    if (next && wanted(*next)) return next;
+    const auto perhaps = first_of(returned_perhaps_);
+    return perhaps ? perhaps : next;
   }
   bool empty(const UnitTable& units) {
     return !front(units, [](UnitCode) { return false; });
@@ -109,15 +110,19 @@ class UnitQueue {
     if (head() == code)
       step(tile_of(code));
     else
-      returned_.erase(code);
+      forget(code);
   }
   // A lent unit waits again.
   void put_back(UnitCode code) {
-    if (plans(code) && round_of(code) < next_[tile_of(code)]) returned_.insert(code);
+    if (plans(code) && round_of(code) < next_[tile_of(code)]) (wanted(code) ? returned_ : returned_perhaps_).insert(code);
   }
   // A late result came for a unit that may be waiting.
-  void forget(UnitCode code) { returned_.erase(code); }
-  const std::set<UnitCode>& returned() const { return returned_; }
+  void forget(UnitCode code) {
+    returned_.erase(code);
+    returned_perhaps_.erase(code);
+  }
+  bool returned(UnitCode code) const { return returned_.contains(code) || returned_perhaps_.contains(code); }
+  std::size_t returned_count() const { return returned_.size() + returned_perhaps_.size(); }
   std::size_t entries() const { return heads_.size() + perhaps_.size(); }  // memory, in its unit
 
  private:
@@ -182,8 +187,16 @@ class UnitQueue {
     offer(tile);
   }
   void forget_from(TileIndex tile, RoundIndex round) {
-    if (returned_.empty()) return;
-    for (RoundIndex k = round; k < next_[tile]; ++k) returned_.erase(unit_code(k, tile));
+    if (returned_count() == 0) return;
+    for (RoundIndex k = round; k < next_[tile]; ++k) forget(unit_code(k, tile));
+  }
+  // The tile's rounds before `to` are wanted, no longer those before `from`.
+  void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
+    if (returned_count() == 0) return;
+    auto& there = from < to ? returned_perhaps_ : returned_;
+    auto& here = from < to ? returned_ : returned_perhaps_;
+    for (RoundIndex k = std::min(from, to); k < std::min(std::max(from, to), next_[tile]); ++k)
+      if (there.erase(unit_code(k, tile)) > 0) here.insert(unit_code(k, tile));
   }
 
   std::vector<RoundIndex> next_, end_, window_;
@@ -191,7 +204,7 @@ class UnitQueue {
   std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads_;
   std::priority_queue<Perhaps> perhaps_;
   std::vector<Wanted> wanted_;  // empty: all is
-  std::set<UnitCode> returned_;
+  std::set<UnitCode> returned_, returned_perhaps_;
 };
 
 }  // namespace ls::coordinator

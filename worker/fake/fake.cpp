@@ -46,7 +46,8 @@ class FakeBackend final : public LocalBackend {
     }
     const bool faulty = matches(brief.settings.seed, unit);
     if (faulty) misbehave(stop);
-    if (!pause(stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
+    const double work = options_.sample_seconds * static_cast<double>(unit.rect.pixels()) * static_cast<double>(unit.samples.count());
+    if (!pause(options_.delay + from_seconds(work), stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
     out.partial =
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples},
@@ -54,7 +55,7 @@ class FakeBackend final : public LocalBackend {
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
     if (faulty && options_.fault.kind == FakeFault::Kind::unwell)
       out.health.add(HealthCause::infinite, 2, {unit.rect.x0, unit.rect.y0, unit.samples.s0});
-    out.cpu_seconds = thread_cpu_seconds() - start;
+    out.cpu_seconds = thread_cpu_seconds() - start + work;
     out.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
   }
@@ -93,10 +94,10 @@ class FakeBackend final : public LocalBackend {
   }
 
   // False if told to stop meanwhile.
-  bool pause(const std::atomic<bool>& stop) const {
-    const auto end = std::chrono::steady_clock::now() + options_.delay;
+  static bool pause(Duration delay, const std::atomic<bool>& stop) {
+    const auto end = std::chrono::steady_clock::now() + delay;
     while (!stop && std::chrono::steady_clock::now() < end)
-      ::usleep(static_cast<useconds_t>(std::min<std::int64_t>(1000, options_.delay.count() / 1000 + 1)));
+      ::usleep(static_cast<useconds_t>(std::min<std::int64_t>(1000, delay.count() / 1000 + 1)));
     return !stop;
   }
 

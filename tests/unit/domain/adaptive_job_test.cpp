@@ -99,5 +99,44 @@ TEST(Adaptive, FewUnitsAreRenderedInVain) {
   }
 }
 
+// Waiting for the worker to have next to nothing is no reason to pass a job over: leases of others in between would keep
+// it from that.
+TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.cpu_seconds = .1;
+  rig.join("w", 1);
+  JobPlan plan = uneven_plan(1e-4);
+  plan.grid = {{32, 32}, 32};
+  plan.priority = 1;
+  rig.submit(plan);
+  while (rig.job().units_folded < 7) rig.render("w");  // more than are wanted whatever comes
+  ASSERT_EQ(rig.worker("w").units_out, 2u);
+
+  rig.submit(plan_of("other", 100, 2));
+  const auto others = [&] {
+    const auto& held = rig.held[{"w"}];
+    return std::any_of(held.begin(), held.end(), [](const Rig::Held& h) { return h.job.value == "other"; });
+  };
+  int kept = 0;
+  for (; rig.job().state == JobState::running && !others(); ++kept) rig.render("w");
+  EXPECT_GE(kept, 5) << "until nothing more was foreseen";
+}
+
+// Single units must not bring a worker of many threads to the most leases it may have, and to idle threads.
+TEST(Adaptive, AWorkerOfManyThreadsIsKeptBusyByWhatIsForeseen) {
+  Rig rig;
+  rig.rel_error = uneven_error;
+  rig.join("w", 200);
+  rig.submit(uneven_plan(1e-4));
+  std::uint32_t least = 200;
+  for (int i = 0; i < 400; ++i) {
+    rig.render("w");
+    least = std::min(least, rig.worker("w").units_out);
+  }
+  ASSERT_EQ(rig.job().state, JobState::running);
+  EXPECT_EQ(least, 200u);
+}
+
 }  // namespace
 }  // namespace ls::coordinator

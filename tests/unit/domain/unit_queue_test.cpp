@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -103,7 +104,7 @@ struct Oracle {
     return best;
   }
   std::uint64_t surely() const {
-    std::uint64_t n = returned.size();
+    auto n = static_cast<std::uint64_t>(std::count_if(returned.begin(), returned.end(), [&](UnitCode c) { return wanted(c); }));
     for (TileIndex t = 0; t < next.size(); ++t) {
       const RoundIndex last = std::min({end[t], window[t], all ? end[t] : before[t]});
       n += last - std::min(last, next[t]);
@@ -162,6 +163,28 @@ TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
       ASSERT_EQ(queue.surely_waiting(), oracle.surely()) << "seed " << seed << " step " << step;
     }
   }
+}
+
+// However many came back that are only probably wanted, they are not looked through for one that surely is.
+TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
+  const UnitTable units(2);
+  UnitQueue queue(2, 10'000);
+  queue.set_wanted(0, 0, 1);
+  queue.set_wanted(1, 10'000, 1);
+  std::vector<UnitCode> out;
+  while (queue.front(units, nobody)) {
+    out.push_back(*queue.front(units, nobody));
+    queue.pop(out.back());
+  }
+  for (const UnitCode code : out)
+    if (code != unit_code(9'999, 1)) queue.put_back(code);
+  int looked_at = 0;
+  const auto none_of_tile_1 = [&](UnitCode code) { return ++looked_at, tile_of(code) == 1 && round_of(code) > 0; };
+  EXPECT_EQ(queue.front(units, none_of_tile_1), unit_code(0, 1));
+  EXPECT_EQ(looked_at, 1);
+  queue.set_wanted(0, 1, 1);  // one more is wanted
+  EXPECT_EQ(queue.front(units, none_of_tile_1), unit_code(0, 0));
+  EXPECT_EQ(looked_at, 2);
 }
 
 // A rule that changes its mind a million times leaves no million entries.
