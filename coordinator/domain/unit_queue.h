@@ -128,7 +128,7 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // Most tiles have no such entry: of a job by samples all is wanted.
+  // Of one tile. Of a job by samples there is none: all is wanted.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
