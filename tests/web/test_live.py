@@ -207,6 +207,8 @@ def test_tiles_in_flight_are_marked_until_they_are_folded_and_the_image_follows(
     assert page.evaluate(pixel)[:3] == [200, 120, 40]
 
     farm.image = png(64, 48, (20, 40, 240))
+    # The farm says the same to whoever asks from now on: the page may ask again once its stream is open.
+    farm.tiles = [{"tile": 0, "rect": [0, 0, 32, 32], "rounds": 1, "spp": 4, "workers": ["lab-02"]}]
     farm.emit("tile", {"job": "j-1", "tile": 0, "rect": [0, 0, 32, 32], "state": "leased", "spp": 4, "worker": "w-2"})
     farm.emit("tile", {"job": "j-1", "tile": 1, "rect": [32, 0, 64, 32], "state": "folded", "spp": 8, "worker": "w-1"})
 
