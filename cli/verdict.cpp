@@ -55,7 +55,8 @@ std::string estimate_text(const json& job, const char* key, const char* interval
 std::string time_left_text(const json& job, const char* key, const char* interval) {
   const auto value = number_field(job, key);
   if (!value) return "-";
-  if (verdict_of(job).doubtful) return "at least " + show_seconds(*value);
+  // Samples that are counted take what they take, whatever the error is.
+  if (number_field(job, "target_error") && verdict_of(job).doubtful) return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(job, interval) : std::nullopt;
   return show_seconds(*value) +
          (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());

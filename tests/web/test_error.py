@@ -160,8 +160,19 @@ def test_a_target_reached_by_an_estimate_in_doubt_is_not_said_to_be_reached(farm
     assert "the target error is reached by its own estimate: don't trust yet." in page.text(".job-head .sub")
 
 
+def test_samples_that_are_counted_take_what_they_take(farm, dashboard):
+    """However doubtful the error is: only the time to a target depends on it."""
+    farm.jobs["j-1"] = job(verdict=HEAVY)
+    page = dashboard()
+    page.wait("document.querySelector('[data-job] .doubt')")
+    assert "at least" not in page.text("[data-job]")
+    page.evaluate("void (location.hash = '#/jobs/j-1')")
+    page.wait("document.querySelector('.figures .doubt')")
+    assert "at least" not in page.text(".job")
+
+
 def test_a_job_that_is_trusted_again_gets_its_interval_back(farm, dashboard):
-    farm.jobs["j-1"] = job(verdict=EARLY)
+    farm.jobs["j-1"] = job(target_error=0.001, verdict=EARLY)
     page = dashboard()
     page.wait("document.querySelector('[data-job] .doubt')")
     assert "at least 42 s" in " ".join(page.text("[data-job]").split())

@@ -52,6 +52,14 @@ TEST(ProgressLine, OfAJobInDoubtPromisesNothing) {
             " 42 % 27.2 spp  relMSE 0.0123 (don't trust yet)  at least 4:12 left");
 }
 
+TEST(ProgressLine, SamplesThatAreCountedTakeWhatTheyTakeInDoubtToo) {
+  ProgressFigures figures = kForecast;
+  figures.doubtful = true;
+  figures.target_error.reset();
+
+  EXPECT_EQ(progress_line(figures, 70), " 42 % 27.2 spp  relMSE 0.0123 (don't trust yet)  4:12 left");
+}
+
 TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
   const std::string line = progress_line({"queued", 0, 0, 0, {}, {}, "no worker is connected"}, 120);
 

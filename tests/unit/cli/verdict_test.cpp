@@ -107,6 +107,13 @@ TEST(ShownJob, InDoubtHasNoIntervalsAndTakesAtLeastSoLong) {
   EXPECT_THAT(shown, Not(HasSubstr("-1.06"))) << "of the slope";
 }
 
+TEST(ShownJob, SamplesThatAreCountedTakeWhatTheyTakeInDoubtToo) {
+  json job = untrusted_job();
+  job["target_error"] = nullptr;
+  EXPECT_THAT(job_text(job), Not(HasSubstr("at least")));
+  EXPECT_THAT(jobs_table({{"jobs", {job}}}), Not(HasSubstr("at least")));
+}
+
 TEST(ShownJob, SaysWhatEndsIt) {
   const auto samples = [](const char* fields) {
     json job = json::parse(fields);

@@ -22,8 +22,10 @@ export function confidence(job, ci) {
 /** A figure against a reference; 0 is never what is meant. */
 export const trueFigure = (value, belowNoise) => (belowNoise === true ? "below the reference's noise" : figure(value));
 
-/** Bright outliers that are still missing only ever add to it. */
+/** Bright outliers that are still missing only ever add to the time to a target; samples that are counted take what they take. */
+export const atLeast = (job) => job.target_error > 0 && doubtful(job.verdict);
+
 export function timeLeft(job) {
   const known = typeof job.eta_seconds === "number";
-  return known && doubtful(job.verdict) ? `at least ${duration(job.eta_seconds)}` : duration(job.eta_seconds);
+  return known && atLeast(job) ? `at least ${duration(job.eta_seconds)}` : duration(job.eta_seconds);
 }

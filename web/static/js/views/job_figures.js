@@ -2,7 +2,7 @@
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
 import { count, duration, figure, given, plural, spp } from "../format.js";
-import { confidence, doubtful, kDoubt, trueFigure } from "../verdict.js";
+import { atLeast, confidence, doubtful, kDoubt, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
@@ -12,7 +12,7 @@ export function figures(job) {
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
     fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 ? `target ${given(job.target_error)}` : null], "key"),
-    isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(doubtful(job.verdict) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
+    isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(atLeast(job) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
     fact("Samples per pixel", spp(job.spp_done), samplesAsked(job)),
     fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),
     fact("Core time", duration(job.core_seconds)),
