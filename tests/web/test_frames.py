@@ -25,6 +25,15 @@ def sequence(farm, states, current):
     return frames
 
 
+def advance(farm, states, current, changed):
+    """What the coordinator tells in events, and from then on whoever asks: the page may ask again once its stream is open."""
+    frames = sequence(farm, states, current)
+    for frame in changed:
+        farm.emit("job", farm.jobs[frame_id(frame)])
+    whole = {key: value for key, value in farm.jobs[SEQUENCE].items() if key != "frames"}
+    farm.emit("job", {**whole, "frames": frames})  # events have no list
+
+
 def pixel(page):
     return page.evaluate("[...document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]")[:3]
 
@@ -68,23 +77,19 @@ def test_frames_are_chosen_and_each_has_its_own_image(farm, dashboard):
 
 
 def test_events_move_the_frames_and_the_page_follows_what_is_rendered(farm, dashboard):
-    frames = sequence(farm, {1: "running", 2: "queued", 3: "queued", 4: "queued"}, current=1)
+    sequence(farm, {1: "running", 2: "queued", 3: "queued", 4: "queued"}, current=1)
     page = dashboard(f"#/jobs/{SEQUENCE}")
     page.wait("document.querySelector('.frame[aria-current]')?.dataset.frame === '1'")
 
-    farm.change(frame_id(1), state="done", progress=1)
-    farm.change(frame_id(2), state="running")
-    whole = {key: value for key, value in farm.jobs[SEQUENCE].items() if key != "frames"}
-    farm.emit("job", {**whole, "frames": {**frames, "done": 1, "current": 2}})  # events have no list
+    advance(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2, changed=(1, 2))
 
     page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '2'")
     page.wait("document.querySelector('[data-frame=\"1\"]').className === 'frame is-done'")
-    assert "1 of 4 done" in page.text(".frames-head")
+    page.wait("document.querySelector('.frames-head').innerText.includes('1 of 4 done')")
 
     page.click("[data-frame='1']")
     page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '1'")
-    farm.emit("job", {**whole, "frames": {**frames, "done": 1, "current": 3}})
-    farm.change(frame_id(3), state="running")
+    advance(farm, {1: "done", 2: "running", 3: "running", 4: "queued"}, current=3, changed=(3,))
     page.wait("document.querySelector('[data-frame=\"3\"]').className === 'frame is-running'")
     assert shown(page) == "1", "a frame that was chosen stays"
     page.click(".follow")
