@@ -20,6 +20,7 @@ function(ls_embed target out)
     math(EXPR index "${index} + 1")
   endforeach()
   configure_file(${CMAKE_CURRENT_SOURCE_DIR}/embedded.cpp.in ${out} @ONLY)
-  set_source_files_properties(${out} PROPERTIES OBJECT_DEPENDS "${depends}")
+  # By itself: what a file of several depends on beyond its includes CMake forgets, and a changed page stayed the old one.
+  set_source_files_properties(${out} PROPERTIES OBJECT_DEPENDS "${depends}" SKIP_UNITY_BUILD_INCLUSION ON)
   target_sources(${target} PRIVATE ${out})
 endfunction()
