@@ -36,8 +36,8 @@ void Job::move_windows(int farm_threads) {
 
 void Job::move_window(TileIndex tile, int farm_threads) {
   if (!steered()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
-  // Small images need more rounds in flight to keep a large farm busy: two units for every thread.
-  const RoundIndex busy = static_cast<RoundIndex>(2 * std::max(farm_threads, 0)) / units.tiles();
+  // Small images need more rounds in flight to keep a large farm busy.
+  const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->foreseen(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));
 }

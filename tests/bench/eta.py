@@ -38,7 +38,23 @@ def views(farm, job):
             if line.startswith(b"data:"):
                 view = json.loads(line[5:])
                 if view.get("id") == job:
+                    if view["state"] in ("failed", "cancelled"):
+                        raise SystemExit(f"job {job} is {view['state']}: {view['error']}")
                     yield time.monotonic(), view
+    raise SystemExit(f"the events of job {job} ended before it was done")
+
+
+def checkpoints(farm, job, figure):
+    """The time and the job's JSON at each new checkpoint whose view has this figure, and at its end."""
+    relmse = None
+    for now, view in views(farm, job):
+        fresh = view["relmse"] not in (None, relmse) and view[figure] is not None
+        if fresh:
+            relmse = view["relmse"]
+        if fresh or view["state"] == "done":
+            yield now, view
+        if view["state"] == "done":
+            return
 
 
 def submit(farm, scene, *flags):
@@ -49,14 +65,8 @@ def submit(farm, scene, *flags):
 
 def told(farm, job):
     """[(time, eta, its interval)] at each new checkpoint, and the time of its end."""
-    seen, relmse = [], None
-    for now, view in views(farm, job):
-        if view["state"] == "done":
-            return seen, now
-        if view["relmse"] not in (None, relmse) and view["eta_seconds"] is not None:
-            relmse = view["relmse"]
-            seen.append((now, view["eta_seconds"], view["eta_ci95"]))
-    raise SystemExit(f"the events of job {job} ended before it was done")
+    *seen, (end, _) = checkpoints(farm, job, "eta_seconds")
+    return [(now, view["eta_seconds"], view["eta_ci95"]) for now, view in seen], end
 
 
 def told_for_more(scene, checkpoint, seed):
@@ -65,19 +75,16 @@ def told_for_more(scene, checkpoint, seed):
     with LocalFarm() as farm:
         farm.add_worker(*map(str, sleeps))
         job = submit(farm, scene, "--size", MORE_SIZE, "--target-error", MORE_TARGET, "--spp", 20000, "--seed", seed)
-        seen, relmse, told_at = 0, None, None
-        for now, view in views(farm, job):
+        told_at, view_told = None, None
+        for number, (now, view) in enumerate(checkpoints(farm, job, "eta_with_8_more_ci95"), 1):
             if view["state"] == "done":
                 assert told_at, f"the job was done before checkpoint {checkpoint}"
-                return *told_at[1:], now - told_at[0]
-            if view["relmse"] not in (None, relmse) and view["eta_with_8_more_ci95"]:
-                relmse, seen = view["relmse"], seen + 1
-                if seen == checkpoint:
-                    told_at = now, view["eta_with_8_more"], view["eta_with_8_more_ci95"]
-                    farm.add_workers(8, *map(str, sleeps))
-                    farm.wait_for_workers(9)
-                    told_at = time.monotonic(), *told_at[1:]  # the start of a process is none of what is told
-    raise SystemExit(f"the events of job {job} ended before it was done")
+                return view_told["eta_with_8_more"], view_told["eta_with_8_more_ci95"], now - told_at
+            if number == checkpoint:
+                view_told = view
+                farm.add_workers(8, *map(str, sleeps))
+                farm.wait_for_workers(9)
+                told_at = time.monotonic()  # the start of processes is none of what is told
 
 
 def scenes(options):

@@ -7,13 +7,12 @@ of all units over those of the image's own, and the seconds of the clock of all 
 """
 import argparse
 import pathlib
-import os
-import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
-from local_farm import LocalFarm, bin_dir  # noqa: E402
+from eta import submit  # noqa: E402
+from local_farm import LocalFarm  # noqa: E402
 
 JOBS = [("tint", "96x96", .00143), ("surface", "96x96", .000229), ("cloud", "96x96", .0018), ("tint", "256x192", .00328),
         ("surface", "256x192", .0003), ("surface", "512x384", .001)]
@@ -28,12 +27,9 @@ def main():
     print("| scene | size | target | seed | rendered / wanted | seconds x workers / wanted |\n|---|---|---|---|---|---|")
     with LocalFarm() as farm:
         farm.add_workers(options.workers, fake=False)
-        environment = {**os.environ, "LIGHTSHAFT_URL": f"{farm.url()}/", "LIGHTSHAFT_TOKEN": farm.token}
         for scene, size, target in JOBS:
             for seed in range(options.seeds):
-                job = subprocess.run([bin_dir() / "lightshaft", "submit", options.scenes / f"{scene}.xml", "--size", size, "--target-error",
-                                      str(target), "--spp", "20000", "--seed", str(seed)], env=environment, check=True, capture_output=True,
-                                     text=True).stdout.split()[0]
+                job = submit(farm, options.scenes / f"{scene}.xml", "--size", size, "--target-error", target, "--spp", 20000, "--seed", seed)
                 view = farm.wait_for_job(job, patience=600)
                 wanted = farm.report(job)["convergence"][-1]["core_seconds"]
                 print(f"| {scene} | {size} | {target} | {seed} | {view['core_seconds'] / wanted:.2f} | "

@@ -67,6 +67,14 @@ def test_open_addresses_answer_without_a_token(farm):
     assert page.headers["X-Content-Type-Options"] == "nosniff"
 
 
+def test_the_pages_are_those_of_this_checkout(farm):
+    """They are built into the program: one that is built again after a page has changed has the new one."""
+    pages = Path(__file__).resolve().parents[2] / "web" / "static"
+    names = [str(file.relative_to(pages)) for file in pages.rglob("*") if file.is_file()]
+    assert "index.html" in names and "js/main.js" in names
+    assert [name for name in names if farm.get(f"/{name}", token=None).body != (pages / name).read_bytes()] == []
+
+
 @pytest.mark.parametrize("path", ["/api/v1/jobs", "/api/v1/workers", "/api/v1/events", "/metrics", "/api/v1/nothing"])
 @pytest.mark.parametrize("token", [None, "", "wrong"])
 def test_everything_else_asks_for_the_token(farm, path, token):
