@@ -87,7 +87,8 @@ class SceneRace {
     std::vector<std::filesystem::path> files = options_.reference;
     if (!options_.references.empty()) files = references_in(options_.references, race_.scene);
     if (files.empty()) {
-      if (auto possible = race::judges_itself(race_, options_.seeds); !possible) return tl::unexpected(possible.error());
+      if (auto possible = race::judges_itself(race_, options_.seeds); !possible)
+        return tl::unexpected(possible.error());
       return std::optional<race::Reference>();
     }
     std::vector<race::ReferenceFile> read;
@@ -106,10 +107,12 @@ class SceneRace {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)
         if (const std::uint64_t seed = options_.first_seed + i; same_noise(file.picture.origin, scene, seed))
-          return fail(Errc::invalid_argument,
-                      fmt::format("--reference: {} was rendered from this scene with seed {}, which races, too: its noise is "
-                                  "the same noise; race other seeds (--seed {})",
-                                  file.name, seed, seed + 1));
+          return fail(
+              Errc::invalid_argument,
+              fmt::format(
+                  "--reference: {} was rendered from this scene with seed {}, which races, too: its noise is "
+                  "the same noise; race other seeds (--seed {})",
+                  file.name, seed, seed + 1));
     return {};
   }
 

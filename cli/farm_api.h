@@ -40,7 +40,8 @@ class FarmApi {
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& said);
   // Uploads a file if the coordinator lacks it; the digest is how a spec names it.
-  Answer<Digest> upload(const std::filesystem::path& file, const std::function<void(const std::string&)>& said);
+  Answer<Digest> upload(const std::filesystem::path& file,
+                        const std::function<void(const std::string&)>& said);
   // Sends an archive as it is; `query` as of spec_query().
   Answer<Json> submit_bundle(const std::filesystem::path& file, const std::string& type,
                              const std::string& query);
@@ -56,7 +57,8 @@ class FarmApi {
     std::uint64_t reached = 0;  // the most that the coordinator said it has
     int barren = 0;             // attempts since it had more
   };
-  Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file, Sending& sending);
+  Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file,
+                                 Sending& sending);
 
   HttpClient client_;
 };

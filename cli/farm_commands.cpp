@@ -27,13 +27,16 @@ using Run = int (*)(FarmApi& api, const FarmFlags& flags);
 
 std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
 
-int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags, std::string (*table)(const json&)) {
+int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
+                std::string (*table)(const json&)) {
   if (!answer) return say_rejected(answer.error());
   print(flags.farm.json ? dump(*answer) : table(*answer));
   return kOk;
 }
 
-int jobs(FarmApi& api, const FarmFlags& flags) { return show_answer(api.get("/api/v1/jobs"), flags, jobs_table); }
+int jobs(FarmApi& api, const FarmFlags& flags) {
+  return show_answer(api.get("/api/v1/jobs"), flags, jobs_table);
+}
 int workers(FarmApi& api, const FarmFlags& flags) {
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
 }
@@ -122,8 +125,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
   plain("resume", "go on with a paused job", resume, true);
   plain("cancel", "end a job for good", cancel, true);
   auto extending = std::make_shared<FarmFlags>();
-  CLI::App* extend_command =
-      add(app, action, "extend", "more samples or less error for a job, done or not", extend, extending, true);
+  CLI::App* extend_command = add(app, action, "extend", "more samples or less error for a job, done or not",
+                                 extend, extending, true);
   extend_command->add_option("--spp", extending->spp, "the new total per pixel")->type_name("TOTAL");
   extend_command
       ->add_option("--target-error", extending->target_error,
@@ -132,9 +135,16 @@ void add_farm_commands(CLI::App& app, Action& action) {
   auto fetching = std::make_shared<FarmFlags>();
   CLI::App* fetch_command =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
-  fetch_command->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
-  fetch_command->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")->type_name("REPORT.json");
-  fetch_command->add_option("--html", fetching->html, "its report as a page; of a sequence every frame's, with # in the name")->type_name("REPORT.html");
+  fetch_command
+      ->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")
+      ->type_name("OUT.exr");
+  fetch_command
+      ->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")
+      ->type_name("REPORT.json");
+  fetch_command
+      ->add_option("--html", fetching->html,
+                   "its report as a page; of a sequence every frame's, with # in the name")
+      ->type_name("REPORT.html");
   plain("workers", "the workers of a farm", workers, false);
 }
 

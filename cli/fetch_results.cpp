@@ -37,10 +37,11 @@ Result<Plan> plan_sequence(const std::string& id, const json& frames, const Resu
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
   for (const auto& [option, name] : {std::pair("-o", wanted.image), std::pair("--html", wanted.html)})
     if (!name.empty() && !has_frame_number(name) && list->size() != 1)
-      return fail(Errc::invalid_argument,
-                  fmt::format("{} {}: job {} has {} frames: give a name with # for their numbers, out_#### say, "
-                              "or choose one by --frame N",
-                              option, name, id, list->size()));
+      return fail(
+          Errc::invalid_argument,
+          fmt::format("{} {}: job {} has {} frames: give a name with # for their numbers, out_#### say, "
+                      "or choose one by --frame N",
+                      option, name, id, list->size()));
   Plan plan;
   const bool reports = has_frame_number(wanted.report);
   for (const json& frame : *list) {

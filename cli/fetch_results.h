@@ -10,8 +10,8 @@ namespace ls::cli {
 
 struct Results {
   std::string image, report, html;  // names of files; empty: not wanted. A run of # is the number of a frame
-  bool json = false;          // each file as a line of JSON on stdout
-  bool patient = false;       // a coordinator that is away for a while is waited for
+  bool json = false;                // each file as a line of JSON on stdout
+  bool patient = false;             // a coordinator that is away for a while is waited for
 };
 
 // Before a job is submitted: can files of such a name, or of each frame's, be written?

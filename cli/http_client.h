@@ -22,8 +22,8 @@ struct HttpResponse {
 class HttpClient {
  public:
   struct Options {
-    // "https://farm.example:8080"; http or https, with or without a path before /api. Several, separated by commas,
-    // where several coordinators share a farm: what one does not answer the next one is asked.
+    // "https://farm.example:8080"; http or https, with or without a path before /api. Several, separated by
+    // commas, where several coordinators share a farm: what one does not answer the next one is asked.
     std::string url;
     std::string token;  // sent as a bearer token; may be empty
     std::string ca;     // file of certificates to trust instead of the system's; may be empty
@@ -38,8 +38,8 @@ class HttpClient {
   // response.
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
-  // PUTs the bytes of a file, without holding them in memory; with an offset those behind it, as a part of the whole
-  // that the other side keeps if the connection breaks.
+  // PUTs the bytes of a file, without holding them in memory; with an offset those behind it, as a part of
+  // the whole that the other side keeps if the connection breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
   // POSTs them; the coordinator may take up to an hour to answer, as it unpacks them first.

@@ -65,8 +65,8 @@ Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& te
   const auto value = number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
   const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
   if (!value || *value == 0 || *value > kMaxMemory >> shift)
-    return wrong(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T", what, text,
-                             kMaxMemory >> 40));
+    return wrong(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T", what,
+                             text, kMaxMemory >> 40));
   return *value << shift;
 }
 

@@ -68,7 +68,8 @@ void add_error(const ProgressFigures& f, const Add& add) {
 
 void add_time_left(const ProgressFigures& f, const Add& add) {
   if (!f.eta_seconds) return;
-  add(0, fmt::format("  {}{} left", f.doubtful && f.target_error ? "at least " : "", show_seconds(*f.eta_seconds)));
+  add(0, fmt::format("  {}{} left", f.doubtful && f.target_error ? "at least " : "",
+                     show_seconds(*f.eta_seconds)));
   if (f.eta_ci95 && !f.doubtful)
     add(2, fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second)));
   if (f.eta_with_more) add(5, fmt::format(", {} with 8 more", show_seconds(*f.eta_with_more)));

@@ -26,7 +26,8 @@ struct ProgressFigures {
 // " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  4:12
 // left (3:06 to 5:30), 1:06 with 8 more". What a narrow terminal has no room for is left out whole: the rate
 // first, then what more workers would do, the error's interval, the bar, the forecast's, the target. Of a
-// doubtful job there are no intervals, but "don't trust yet" and, with a target, "at least 4:12 left", which stay.
+// doubtful job there are no intervals, but "don't trust yet" and, with a target, "at least 4:12 left", which
+// stay.
 std::string progress_line(const ProgressFigures& figures, int columns);
 
 // Writes to stderr, only if that is a terminal.

@@ -97,7 +97,9 @@ void add_render(CLI::App& app, Action& action) {
   render->add_option("--pixel", flags->pixel, "with --sample: print the value of one sample of this pixel")
       ->type_name("X,Y");
   render->add_option("--sample", flags->sample, "its number, from 0")->type_name("N");
-  render->add_option("--reference", flags->reference, "the right image, of another seed: the report has the true error, too")
+  render
+      ->add_option("--reference", flags->reference,
+                   "the right image, of another seed: the report has the true error, too")
       ->type_name("REF.exr");
   render->add_option("--report", flags->report, "write what it cost and how large the error is, as JSON")
       ->type_name("REPORT.json");

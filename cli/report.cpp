@@ -64,8 +64,10 @@ std::string report_summary(const std::string& report) {
   if (const auto ci = pair_field(j, "relmse_ci95"); ci && !verdict.doubtful)
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
   const auto reference = j.find("reference");
-  const bool same_seed = reference != j.end() && reference->is_object() && flag_field(*reference, "same_seed");
-  if (const std::string truth = truth_text(j, "true_relmse", "true_relmse_below_noise", same_seed); !truth.empty())
+  const bool same_seed =
+      reference != j.end() && reference->is_object() && flag_field(*reference, "same_seed");
+  if (const std::string truth = truth_text(j, "true_relmse", "true_relmse_below_noise", same_seed);
+      !truth.empty())
     line += ", true relMSE " + truth;
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
   const bool news = verdict.doubtful || text_field(j, "verdict_kind") != "early";

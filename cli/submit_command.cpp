@@ -86,8 +86,8 @@ FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
 int run(const SubmitFlags& flags) {
   auto spec = flags.job.parse();
   if (!spec) return say_error(spec.error());
-  for (const auto& [option, file] : {std::pair("-o", flags.out), std::pair("--report", flags.report),
-                                     std::pair("--html", flags.html)})
+  for (const auto& [option, file] :
+       {std::pair("-o", flags.out), std::pair("--report", flags.report), std::pair("--html", flags.html)})
     if (!file.empty())
       if (const auto ok = check_outputs(option, file, spec->frames); !ok) return say_error(ok.error());
   if (!flags.reference.empty())
@@ -121,18 +121,29 @@ void add_submit(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("A,B");
-  submit->add_option("--max-workers", flags->job.max_workers, "at most so many workers at once")->type_name("N");
+  submit->add_option("--max-workers", flags->job.max_workers, "at most so many workers at once")
+      ->type_name("N");
   submit->add_option("--max-units", flags->job.max_units, "at most so many units lent to workers at once")
       ->type_name("N");
-  submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")->type_name("BYTES");
+  submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")
+      ->type_name("BYTES");
   submit
       ->add_option("--reference", flags->reference,
                    "the right image: every checkpoint is compared with it. Of another seed than the job's")
       ->type_name("REF.exr");
   submit->add_flag("--wait", flags->wait, "until the job is done");
-  submit->add_option("-o,--output", flags->out, "wait, then fetch the image; of a sequence every frame's, out_####.exr say")->type_name("OUT.exr");
-  submit->add_option("--report", flags->report, "wait, then fetch the report; with # in its name, every frame's")->type_name("REPORT.json");
-  submit->add_option("--html", flags->html, "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")->type_name("REPORT.html");
+  submit
+      ->add_option("-o,--output", flags->out,
+                   "wait, then fetch the image; of a sequence every frame's, out_####.exr say")
+      ->type_name("OUT.exr");
+  submit
+      ->add_option("--report", flags->report,
+                   "wait, then fetch the report; with # in its name, every frame's")
+      ->type_name("REPORT.json");
+  submit
+      ->add_option("--html", flags->html,
+                   "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")
+      ->type_name("REPORT.html");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
   submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }

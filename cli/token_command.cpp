@@ -71,7 +71,8 @@ void add_tokens(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"submit", "read", "join", "admin"}));
   add_command->add_option("--user", adding->user, "whose it is: owner of the jobs handed in with it")
       ->type_name("NAME");
-  add(*token, action, "list", "the tokens, without their secrets", list_tokens, std::make_shared<TokenFlags>());
+  add(*token, action, "list", "the tokens, without their secrets", list_tokens,
+      std::make_shared<TokenFlags>());
   auto revoking = std::make_shared<TokenFlags>();
   add(*token, action, "revoke", "makes a token worthless, at once", revoke_token, revoking)
       ->add_option("id", revoking->id, "its id, as `list` prints it")

@@ -15,7 +15,8 @@ struct ValidateCase {
   double allowance = 0;
   // How probable a figure at least as far off is if the program is right; and below which it is not believed.
   double p = 1, level = 0;
-  double band_level = 0;        // of the interval that must lie within the band; `level` is that of what must cover the answer
+  double band_level =
+      0;  // of the interval that must lie within the band; `level` is that of what must cover the answer
   std::uint64_t nonfinite = 0;  // samples that went wrong: with any the case fails
   double seconds = 0;
   std::string why;  // of a failure
@@ -29,13 +30,13 @@ struct ValidateCase {
   bool passed() const { return why.empty(); }
 };
 
-// What a case says once its figures are known: fills z, p, allowance and why. `freedom`: of the standard error. Up to
-// `rounding` off is what float32 may do to a figure whose every sample is the same.
+// What a case says once its figures are known: fills z, p, allowance and why. `freedom`: of the standard
+// error. Up to `rounding` off is what float32 may do to a figure whose every sample is the same.
 void judge(ValidateCase& c, double freedom, double rounding);
 
-// Equivalence: the interval at the case's level, made wider by `unknown`, covers the answer, and the one at its
-// band_level lies inside the band around it; too few samples fail. A standard error above `rounding` of fewer than `least` degrees
-// of freedom is not believed.
+// Equivalence: the interval at the case's level, made wider by `unknown`, covers the answer, and the one at
+// its band_level lies inside the band around it; too few samples fail. A standard error above `rounding` of
+// fewer than `least` degrees of freedom is not believed.
 void judge_equivalence(ValidateCase& c, double freedom, double unknown, double rounding, double least);
 
 }  // namespace ls::cli

@@ -1,6 +1,7 @@
-// The mean of a scene's frame (of a spherical camera: over directions), rendered as a job's is (taken in, sent to a
-// worker, rendered in units), with a standard error that low-discrepancy sequences don't fool: the two halves of every pixel
-// and all pixels are independent, so that (A - B)^2 / 4 estimates each pixel's squared error without bias.
+// The mean of a scene's frame (of a spherical camera: over directions), rendered as a job's is (taken in,
+// sent to a worker, rendered in units), with a standard error that low-discrepancy sequences don't fool: the
+// two halves of every pixel and all pixels are independent, so that (A - B)^2 / 4 estimates each pixel's
+// squared error without bias.
 #pragma once
 
 #include <array>

@@ -56,7 +56,8 @@ std::string time_left_text(const json& job, const char* key, const char* interva
   const auto value = number_field(job, key);
   if (!value) return "-";
   // Samples that are counted take what they take, whatever the error is.
-  if (number_field(job, "target_error") && verdict_of(job).doubtful) return "at least " + show_seconds(*value);
+  if (number_field(job, "target_error") && verdict_of(job).doubtful)
+    return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(job, interval) : std::nullopt;
   return show_seconds(*value) +
          (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());
@@ -65,7 +66,8 @@ std::string time_left_text(const json& job, const char* key, const char* interva
 std::string truth_text(const json& object, const char* key, const char* below, bool same_seed, int digits) {
   const auto value = number_field(object, key);
   if (!value) return "";
-  if (same_seed) return fmt::format("{:.{}g} (not to be trusted: the reference has this job's seed)", *value, digits);
+  if (same_seed)
+    return fmt::format("{:.{}g} (not to be trusted: the reference has this job's seed)", *value, digits);
   return flag_field(object, below) ? "below the reference's noise" : fmt::format("{:.{}g}", *value, digits);
 }
 

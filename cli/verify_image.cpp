@@ -53,7 +53,8 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
                               image.tiles[tile].hex());
   else if (const auto pixel = first_difference(image, film.pixels(tile)))
     out.problem = fmt::format(
-        "its seal is right, but pixel {},{} has another {} than its samples give: the image was changed afterwards",
+        "its seal is right, but pixel {},{} has another {} than its samples give: the image was changed "
+        "afterwards",
         pixel->x, pixel->y, pixel->what);
   return out;
 }

@@ -181,12 +181,14 @@ tl::expected<Intake, Rejected> take_in(const SubmitRequest& request, const BlobS
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs) {
   const Digest& digest = *spec.reference;
   if (!blobs.has(digest))
-    return fail(Errc::failed_precondition,
-                fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
+    return fail(
+        Errc::failed_precondition,
+        fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
   // No more than one of the right size takes; a little, so that a wrong one is told by its size.
-  limits.max_pixels = std::max<std::uint64_t>(static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
-                                              std::uint64_t{1} << 22);
+  limits.max_pixels = std::max<std::uint64_t>(
+      static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
+      std::uint64_t{1} << 22);
   const auto bytes = blobs.size(digest);
   if (!bytes) return tl::unexpected(bytes.error());
   if (*bytes > limits.max_bytes)

@@ -13,8 +13,8 @@
 namespace ls::coordinator {
 
 struct Intake {
-  StoredJob job;           // without id and time
-  std::string scene_json;  // canonical; its digest is job.scene
+  StoredJob job;               // without id and time
+  std::string scene_json;      // canonical; its digest is job.scene
   std::size_t text_bytes = 0;  // of all scene files that were read
 };
 
@@ -30,8 +30,8 @@ tl::expected<std::vector<Intake>, Rejected> take_in_sequence(const SubmitRequest
                                                              const BlobStore& blobs);
 
 // What renders one of its samples again: common/job/replay_command.h.
-// The reference that a job of this size asks for. failed_precondition: its blob is not here; invalid_argument: it
-// is not such a picture.
+// The reference that a job of this size asks for. failed_precondition: its blob is not here;
+// invalid_argument: it is not such a picture.
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
 std::string replay_of(const StoredJob& job);

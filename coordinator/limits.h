@@ -14,14 +14,15 @@ inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;   // one 
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // in one read()
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;               // kept to be gone on with
 inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
-inline constexpr Duration kAwaitedLook = std::chrono::seconds(1);  // between two looks for blobs that jobs wait for
+inline constexpr Duration kAwaitedLook =
+    std::chrono::seconds(1);  // between two looks for blobs that jobs wait for
 
 // ---- submission ----
 inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
-inline constexpr std::size_t kMaxAssets = 100'000;  // named by one request
-inline constexpr std::size_t kMaxWarnings = 100;    // kept with a job
-inline constexpr std::size_t kMaxNameBytes = 256;   // of a job or worker
-inline constexpr std::size_t kMaxJobs = 100'000;        // frames count, each
+inline constexpr std::size_t kMaxAssets = 100'000;     // named by one request
+inline constexpr std::size_t kMaxWarnings = 100;       // kept with a job
+inline constexpr std::size_t kMaxNameBytes = 256;      // of a job or worker
+inline constexpr std::size_t kMaxJobs = 100'000;       // frames count, each
 inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // of those
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
@@ -30,12 +31,12 @@ inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
 inline constexpr int kMaxPriority = 1'000'000;
 
 // ---- sequences (how many frames: common/base/frame_range.h) ----
-inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;  // read for all frames together
+inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;     // read for all frames together
 inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;  // 24 bytes each from the start
-inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // named by all frames together
+inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;      // named by all frames together
 inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1}
                                                  << 26;  // of done frames that are extended at once
-inline constexpr std::size_t kFramesPerEvent = 2500;  // a sequence of more tells of itself less often
+inline constexpr std::size_t kFramesPerEvent = 2500;     // a sequence of more tells of itself less often
 
 // ---- results ----
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg

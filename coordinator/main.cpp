@@ -130,8 +130,8 @@ Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinato
 // As many wrong join tokens of an address as HTTP takes of other ones.
 ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   const double a_minute = limits.wrong_tokens_per_minute;
-  const auto throttle =
-      std::make_shared<ls::http::Throttle>(ls::http::Pace{}, ls::http::Pace{a_minute / 60, std::max(1.0, a_minute)});
+  const auto throttle = std::make_shared<ls::http::Throttle>(
+      ls::http::Pace{}, ls::http::Pace{a_minute / 60, std::max(1.0, a_minute)});
   const auto name_of = [](std::string_view token) { return ls::sha256(token).hex(); };
   const auto now = ls::http::system_unix_clock();
   return {[=](const std::string& address, std::string_view token) {
@@ -171,8 +171,10 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   if (!tls) return tl::unexpected(tls.error());
   others.reset();
   if (flags.shared && flags.secrets.empty())
-    ls::log_warn("", "tokens that are made here are known to this coordinator alone: give all that share this store the "
-                     "same --secrets folder");
+    ls::log_warn(
+        "",
+        "tokens that are made here are known to this coordinator alone: give all that share this store the "
+        "same --secrets folder");
   std::shared_ptr<const ls::http::TlsIdentity> identity;
   if (*tls) {
     auto made = ls::http::TlsIdentity::make((*tls)->cert, (*tls)->key);

@@ -81,9 +81,10 @@ void add_files(CLI::App& app, Flags& flags) {
                "other coordinators have the same --store and --blobs: each owns whole jobs, and those of one "
                "that dies "
                "go to another");
-  app.add_option("--secrets", flags.secrets,
-                 "folder of tokens and of what --tls makes, if not --data: with --shared one that all coordinators "
-                 "reach, so that each knows what another one's users and workers show");
+  app.add_option(
+      "--secrets", flags.secrets,
+      "folder of tokens and of what --tls makes, if not --data: with --shared one that all coordinators "
+      "reach, so that each knows what another one's users and workers show");
   app.add_option("--public-http", flags.public_http,
                  "with --shared: http://HOST:PORT where clients reach this one, if not as --http says");
   app.add_option("--public-grpc", flags.public_grpc,
@@ -102,10 +103,12 @@ Result<void> check_shared(const Flags& flags) {
                 "--shared and --keep-unused-hours do not go together: one coordinator cannot "
                 "know which files the jobs of another one need");
   if (flags.tls && flags.tls_ca.empty() && flags.secrets.empty())
-    return fail(Errc::invalid_argument,
-                "--shared with --tls: each coordinator would make an authority of its own, which the others' workers and "
-                "users do not know. Give all of them the same --secrets FOLDER, or certificates of one authority "
-                "(deploy/make-certificates.sh; --tls-ca, --tls-cert, --tls-key)");
+    return fail(
+        Errc::invalid_argument,
+        "--shared with --tls: each coordinator would make an authority of its own, which the others' workers "
+        "and "
+        "users do not know. Give all of them the same --secrets FOLDER, or certificates of one authority "
+        "(deploy/make-certificates.sh; --tls-ca, --tls-cert, --tls-key)");
   const bool anywhere = flags.http.starts_with("0.0.0.0:") || flags.http.starts_with("[::]:");
   if (anywhere && flags.public_http.empty())
     return fail(Errc::invalid_argument,

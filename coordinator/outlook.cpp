@@ -15,31 +15,36 @@ struct CoreSeconds {
 // Nothing: not known yet.
 std::optional<CoreSeconds> core_seconds_left(const OutlookFacts& facts, std::span<const ErrorPoint> points,
                                              Outlook& out) {
-  const auto known = [](double core) { return core > 0 ? std::optional(CoreSeconds{core, {}}) : std::nullopt; };
+  const auto known = [](double core) {
+    return core > 0 ? std::optional(CoreSeconds{core, {}}) : std::nullopt;
+  };
   const auto forecast = facts.target && !points.empty() ? forecast_of(points, *facts.target) : std::nullopt;
   if (!forecast) return known(facts.core_left);
   const ErrorPoint& last = points.back();
   const double more = std::max(0.0, forecast->spp - last.spp);
   if (last.spp > 0) out.progress = std::max(out.progress, last.spp / (last.spp + more));
   const double spent = std::max(0.0, facts.core_seconds - last.core_seconds);
-  const double limit = facts.core_to_limit > 0 ? facts.core_to_limit : std::numeric_limits<double>::infinity();
+  const double limit =
+      facts.core_to_limit > 0 ? facts.core_to_limit : std::numeric_limits<double>::infinity();
   if (forecast->core_seconds - spent >= limit) return known(limit);
   const auto from_now = [&](double core) { return std::clamp(core - spent, 0.0, limit); };
   return CoreSeconds{from_now(forecast->core_seconds),
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
-// How many units' time threads have nothing to do at a target's end but what will be dropped: between nothing and all of one
-// for the last that is wanted (Graham 1969: what is lent one by one takes no longer than W / P + (1 - 1 / P) u), and as long
-// again until a thread is free for that. Where the samples end it, their number is known and units come out even.
+// How many units' time threads have nothing to do at a target's end but what will be dropped: between nothing
+// and all of one for the last that is wanted (Graham 1969: what is lent one by one takes no longer than W / P
+// + (1 - 1 / P) u), and as long again until a thread is free for that. Where the samples end it, their number
+// is known and units come out even.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
-// A unit is one thread's: no more threads help than units may be under way, and none is done before its time. Of what is
-// less than a unit it is the part of it that is left.
+// A unit is one thread's: no more threads help than units may be under way, and none is done before its time.
+// Of what is less than a unit it is the part of it that is left.
 double seconds_on(double cores, double core, double wait, const OutlookFacts& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);
-  return std::max(std::min(core / busy + waits, std::max(core, core / busy)), std::min(core, facts.unit_seconds));
+  return std::max(std::min(core / busy + waits, std::max(core, core / busy)),
+                  std::min(core, facts.unit_seconds));
 }
 
 }  // namespace

@@ -30,7 +30,9 @@ Result<void> check_store(const std::string& store) {
 }
 
 JoinCheck join_check(std::string token) {
-  return [token = std::move(token)](std::string_view shown) { return token.empty() || equal_secret(shown, token); };
+  return [token = std::move(token)](std::string_view shown) {
+    return token.empty() || equal_secret(shown, token);
+  };
 }
 
 namespace {
@@ -86,8 +88,7 @@ Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
   }
   const auto start = store->reserve("starts", 1);
   if (!start) return tl::unexpected(start.error());
-  auto collected = std::make_shared<CollectedBlobs>(std::move(blobs), options.clock,
-                                                    options.keep_unused);
+  auto collected = std::make_shared<CollectedBlobs>(std::move(blobs), options.clock, options.keep_unused);
   std::unique_ptr<Service> service(
       new Service(std::move(options), std::move(collected), std::move(store), std::move(lock), *start + 1));
   if (auto restored = service->restore(); !restored) return tl::unexpected(restored.error());
@@ -123,8 +124,7 @@ void Service::start_threads() {
       for (const auto& awaited : looks_.pop(1, token)) look_for(awaited);
   });
   if (!options_.tick) return;
-  if (on_disk())
-    threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
+  if (on_disk()) threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
   if (!options_.blobs_at.empty())
     threads_.emplace_back(
         [this](const std::stop_token& token) { every(kBlobsLookedAt, token, [&] { look_at_blobs(); }); });
@@ -152,7 +152,8 @@ void Service::tick() {
   look_for_moved_jobs();
   const std::lock_guard lock(mutex_);
   for (const auto& [id, worker] : workers_)
-    if (worker.connection && worker.connection->open && worker.connection->held_back) run_locked(ResultsWait{id});
+    if (worker.connection && worker.connection->open && worker.connection->held_back)
+      run_locked(ResultsWait{id});
   run_locked(Tick{});
   look_for_awaited_locked();
   for (const auto& [id, entry] : entries_)

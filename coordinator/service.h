@@ -23,9 +23,9 @@
 #include "common/protocol/messages.h"
 #include "common/scene/diagnostic.h"
 #include "common/scene/read.h"
+#include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/figures.h"
 #include "coordinator/domain/job_state.h"
-#include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/time_split.h"
 
 namespace ls::coordinator {
@@ -93,19 +93,19 @@ struct JobView {
   std::optional<double> target_error;  // relMSE, asked
   double spp_done = 0;                 // mean over pixels
   std::optional<ErrorFigures> error_now;
-  std::optional<TrueFigures> truth;              // as of the last checkpoint that has it
-  bool reference_same_seed = false;              // truth says nothing: see same_noise() there
-  std::optional<Judgement> judgement;            // nothing: no sample yet
-  std::optional<std::uint64_t> few_hits;         // pixels of the image as it is
-  std::optional<Trend> trend;                    // nothing: too few checkpoints
-  std::optional<double> efficiency;              // 1 / (relMSE x core seconds) at the last checkpoint
+  std::optional<TrueFigures> truth;                     // as of the last checkpoint that has it
+  bool reference_same_seed = false;                     // truth says nothing: see same_noise() there
+  std::optional<Judgement> judgement;                   // nothing: no sample yet
+  std::optional<std::uint64_t> few_hits;                // pixels of the image as it is
+  std::optional<Trend> trend;                           // nothing: too few checkpoints
+  std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
   std::optional<std::uint64_t> pixels_without_samples;  // of the image as it is; nothing: not known
   std::optional<double> eta_seconds;
   std::optional<std::pair<double, double>> eta_ci95;  // where it is an error target that ends the job
   std::optional<double> eta_with_more;                // with kMoreWorkers more workers like those there are
   std::optional<std::pair<double, double>> eta_with_more_ci95;  // as eta_ci95
-  std::string error;                                  // why it failed
-  std::vector<std::string> warnings;                  // of the scene
+  std::string error;                                            // why it failed
+  std::vector<std::string> warnings;                            // of the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
@@ -155,7 +155,7 @@ struct WorkerView {
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
   std::uint64_t memory_bytes = 0;  // that it may use; 0: not told
-  double last_seen_seconds = 0;  // ago
+  double last_seen_seconds = 0;    // ago
 };
 
 // A thing that happened, as the event stream tells it. `data` is JSON. Ids grow by one and survive restarts.
@@ -202,7 +202,8 @@ class WorkerSession {
   virtual void disconnected() = 0;
 };
 
-// Bytes by digest. put() verifies; a blob is visible only when complete. What is damaged is never read: see prove().
+// Bytes by digest. put() verifies; a blob is visible only when complete. What is damaged is never read: see
+// prove().
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
@@ -211,11 +212,12 @@ class BlobStore {
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
   // Whether the place where they are kept answers, asked once; may take seconds.
   virtual Result<void> answers() const { return {}; }
-  // That it is there with the bytes of its digest: read once in a process and when its file has changed since, or, if
-  // a reader has found it wrong, `again`. not_found; failed_precondition: it was damaged, is out of the way now and
-  // counts as missing.
+  // That it is there with the bytes of its digest: read once in a process and when its file has changed
+  // since, or, if a reader has found it wrong, `again`. not_found; failed_precondition: it was damaged, is
+  // out of the way now and counts as missing.
   virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
-    return has(digest) ? Result<void>() : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
+    return has(digest) ? Result<void>()
+                       : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
   }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
@@ -233,9 +235,9 @@ class BlobStore {
   // ---- uploads in parts ----
   // How many bytes are kept of a blob that is not complete.
   virtual std::uint64_t received(const Digest&) const { return 0; }
-  // Goes on behind those; failed_precondition: `offset` is not received(). What has been appended stays when the
-  // upload is destroyed before finish(), also over restarts. From now on an earlier upload in parts of the same
-  // blob is refused: its connection has broken, and only nobody noticed yet.
+  // Goes on behind those; failed_precondition: `offset` is not received(). What has been appended stays when
+  // the upload is destroyed before finish(), also over restarts. From now on an earlier upload in parts of
+  // the same blob is refused: its connection has broken, and only nobody noticed yet.
   virtual Result<std::unique_ptr<Upload>> resume_upload(const Digest&, std::uint64_t) {
     return fail(Errc::unavailable, "this store takes no uploads in parts");
   }
@@ -275,17 +277,17 @@ class JobStore;  // store/job_store.h
 class Coordinator {
  public:
   struct Options {
-    std::filesystem::path data;        // empty: everything in memory, nothing survives (`lightshaft render`)
-    std::string store = "sqlite";      // where jobs are kept: sqlite, or a redis:// address (store/redis_link.h)
+    std::filesystem::path data;    // empty: everything in memory, nothing survives (`lightshaft render`)
+    std::string store = "sqlite";  // where jobs are kept: sqlite, or a redis:// address (store/redis_link.h)
     std::shared_ptr<JobStore> jobs;    // given for tests; otherwise made as `store` says
     std::shared_ptr<BlobStore> blobs;  // given for in-memory use; otherwise made as `blobs_at` says
     std::string blobs_at;              // empty: under `data`; else a folder, or an s3:// address
-    // How long a blob stays that no job needs and nobody asks for, and an unfinished upload that does not grow;
-    // nothing: blobs for good, unfinished uploads for a day.
+    // How long a blob stays that no job needs and nobody asks for, and an unfinished upload that does not
+    // grow; nothing: blobs for good, unfinished uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
-    bool shared = false;               // other coordinators have the same store and blobs
-    std::string join_token;            // empty: any worker may join
-    JoinCheck may_join;                // given: asked instead
+    bool shared = false;     // other coordinators have the same store and blobs
+    std::string join_token;  // empty: any worker may join
+    JoinCheck may_join;      // given: asked instead
     ShareLimits limits;
     double audit_rate = 0.01;  // share of the results that another worker renders again
     std::shared_ptr<const Clock> clock;
@@ -321,7 +323,8 @@ class Coordinator {
   virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
   virtual Result<std::string> report_json(const JobId& id) const = 0;
   virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
-  // Where `name` (image.exr, report.json) of a job that is done lies on the disk; empty: it does not, ask for it.
+  // Where `name` (image.exr, report.json) of a job that is done lies on the disk; empty: it does not, ask for
+  // it.
   virtual std::filesystem::path final_file(const JobId&, const std::string&) const { return {}; }
   virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
   virtual Result<std::string> job_log(const JobId& id) const = 0;
@@ -350,7 +353,8 @@ class Coordinator {
   virtual Result<std::optional<Elsewhere>> elsewhere(const JobId&) { return std::nullopt; }
   virtual AuditFigures audits() const { return {}; }
   virtual FarmFigures figures() const { return {}; }
-  // A worker asked for a blob that is not here, or was damaged: the jobs that need it wait until it is here again.
+  // A worker asked for a blob that is not here, or was damaged: the jobs that need it wait until it is here
+  // again.
   virtual void blob_lacking(const Digest&, const Error&) {}
   virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // to a worker: to be counted
   virtual void tick() = 0;

@@ -1,5 +1,5 @@
-// Jobs that wait for a file: its blob is missing or damaged here. They are paused, which costs no unit and no worker
-// anything, and go on by themselves when the blob is here again, however it came.
+// Jobs that wait for a file: its blob is missing or damaged here. They are paused, which costs no unit and no
+// worker anything, and go on by themselves when the blob is here again, however it came.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,17 +12,19 @@ namespace {
 
 std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
   if (job.scene == digest) return BlobRef{digest, 0, job.name};
-  const auto asset = std::find_if(job.assets.begin(), job.assets.end(), [&](const BlobRef& a) { return a.digest == digest; });
+  const auto asset = std::find_if(job.assets.begin(), job.assets.end(),
+                                  [&](const BlobRef& a) { return a.digest == digest; });
   return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
 }
 
 // What a user can send again: the scene is kept in a form of our own, which only a submission makes.
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
-  return fmt::format("it waits for its {} '{}', whose blob {} {}: {}hand in the same scene again with `lightshaft submit`, "
-                     "and this job goes on by itself",
-                     scene ? "scene" : "file", file.name, file.digest.hex(), damaged ? "was damaged here" : "is not here",
-                     scene ? "" : fmt::format("upload the file again (PUT /api/v1/blobs/{}), or ", file.digest.hex()));
+  return fmt::format(
+      "it waits for its {} '{}', whose blob {} {}: {}hand in the same scene again with `lightshaft submit`, "
+      "and this job goes on by itself",
+      scene ? "scene" : "file", file.name, file.digest.hex(), damaged ? "was damaged here" : "is not here",
+      scene ? "" : fmt::format("upload the file again (PUT /api/v1/blobs/{}), or ", file.digest.hex()));
 }
 
 bool is_open(JobState state) { return state == JobState::queued || state == JobState::running; }
@@ -52,7 +54,8 @@ void Service::blob_lacking(const Digest& digest, const Error& why) {
   std::vector<EntryPtr> waiting;
   for (const auto& [id, entry] : entries_) {
     const bool waits = !entry->stored.awaited.empty() && !entry->stored.awaited.contains(digest);
-    if (!entry->dormant && !entry->finishing && (waits || is_open(shown_state(*entry))) && file_of(entry->stored, digest))
+    if (!entry->dormant && !entry->finishing && (waits || is_open(shown_state(*entry))) &&
+        file_of(entry->stored, digest))
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;

@@ -45,7 +45,8 @@ void Service::collect() {
 }
 
 void Service::collect_loop(const std::stop_token& token) {
-  const Duration pause = std::min(options_.keep_unused.value_or(kLongestPause) / kSweepsPerTime, kLongestPause);
+  const Duration pause =
+      std::min(options_.keep_unused.value_or(kLongestPause) / kSweepsPerTime, kLongestPause);
   every(pause, token, [this] { collect(); });
 }
 

@@ -164,7 +164,8 @@ Result<void> Service::save_pin_locked(JobEntry& entry) {
 // `done` is shown and stored when the final image is written: see finish().
 void Service::on(const JobStateChanged& e, Todo&) {
   const auto entry = find_locked(e.job);
-  if (!entry || entry->removed || e.to == JobState::done) return;  // removed: it goes on elsewhere, or nowhere
+  if (!entry || entry->removed || e.to == JobState::done)
+    return;  // removed: it goes on elsewhere, or nowhere
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
   if (e.to != JobState::paused) entry->stored.awaited.clear();
@@ -201,27 +202,28 @@ void Service::on(const Checkpoint& e, Todo&) {
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {  // known from before the restart
-    const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
-      return p.spp == error.spp && !p.truth;
-    });
+    const bool compared = std::none_of(entry->points.begin(), entry->points.end(),
+                                       [&](const auto& p) { return p.spp == error.spp && !p.truth; });
     if (!compared) compare_locked(entry, e.rounds, error.spp);
     return;
   }
   // A tile is rendered again, and of the others it is not known any more what they said so early.
   if (!exact) return;
-  add_point_locked(entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
+  add_point_locked(
+      entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
   compare_locked(entry, e.rounds, error.spp);
 }
 
-// What a job ends with by time, or because it is cancelled, may be more than its last checkpoint: the curve ends
-// with the image that is handed out, so that all who ask are told the same.
+// What a job ends with by time, or because it is cancelled, may be more than its last checkpoint: the curve
+// ends with the image that is handed out, so that all who ask are told the same.
 void Service::end_curve_locked(const EntryPtr& entry) {
   if (!entry->assembly || entry->assembly->film().pixels_without_samples() > 0) return;
   const ImageError error = image_error(entry->assembly->film().error());
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  add_point_locked(entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
+  add_point_locked(entry,
+                   {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
 }
 
 void Service::add_point_locked(const EntryPtr& entry, const ConvergencePoint& point) {
@@ -262,9 +264,10 @@ void Service::on(const JobFinished& e, Todo&) {
   end_curve_locked(entry);
   compare_last_locked(entry);
   if (e.unaudited > 0)
-    log_job(e.job, fmt::format("{} results were to be rendered again by another worker, but nobody else of their "
-                               "numeric class was there: who rendered them is believed",
-                               e.unaudited));
+    log_job(e.job,
+            fmt::format("{} results were to be rendered again by another worker, but nobody else of their "
+                        "numeric class was there: who rendered them is believed",
+                        e.unaudited));
   entry->finishing = ++last_final_;
   entry->leased.clear();
   if (entry->assembly) entry->assembly->forget_waiting();

@@ -8,9 +8,9 @@
 #include "common/base/step.h"
 #include "common/image/final_image.h"
 #include "common/scene/serialize.h"
+#include "coordinator/assemble/snapshot.h"
 #include "coordinator/intake.h"
 #include "coordinator/mattes.h"
-#include "coordinator/assemble/snapshot.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
@@ -26,7 +26,9 @@ constexpr TileIndex kTilesAtOnce = 64;  // of a snapshot, copied under the lock
 class ImageFile final : public ByteSink {
  public:
   explicit ImageFile(AtomicFile& file) : file_(file) {}
-  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override { return file_.write_at(at, bytes); }
+  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
+    return file_.write_at(at, bytes);
+  }
 
  private:
   AtomicFile& file_;
@@ -96,9 +98,9 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   chores_.push([this, entry] { take_snapshot(entry); });
 }
 
-// While the film goes on. A tile that is folded on after it was copied is folded again after a restart. What the
-// snapshot holds must have its convergence points in the store before it: they are in the keeper's queue by now, so
-// that the snapshot takes its place behind them.
+// While the film goes on. A tile that is folded on after it was copied is folded again after a restart. What
+// the snapshot holds must have its convergence points in the store before it: they are in the keeper's queue
+// by now, so that the snapshot takes its place behind them.
 void Service::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -110,7 +112,8 @@ void Service::take_snapshot(const EntryPtr& entry) {
   chores_.push([this, entry, done, before = entry->snapshots,
                 file = std::make_shared<SnapshotFile>(std::move(*file))] {
     std::unique_lock lock(mutex_);
-    const bool wanted = entry->assembly && !entry->removed && entry->snapshots == before;  // no later one is there
+    const bool wanted =
+        entry->assembly && !entry->removed && entry->snapshots == before;  // no later one is there
     lock.unlock();
     if (!wanted) return done({});
     ++entry->snapshots;
@@ -122,7 +125,8 @@ void Service::take_snapshot(const EntryPtr& entry) {
 
 Result<SnapshotFile> Service::copy_folded(const EntryPtr& entry) {
   const auto where = folder(entry->stored.id);
-  if (auto made = make_folder(where); !made) return tl::unexpected(made.error());  // nothing may have come of it
+  if (auto made = make_folder(where); !made)
+    return tl::unexpected(made.error());  // nothing may have come of it
   auto file = SnapshotFile::create(where / "film.snap", ".new", entry->grid, aovs_of(entry->stored.settings),
                                    snapshot_format());
   if (!file) return file;
@@ -130,7 +134,8 @@ Result<SnapshotFile> Service::copy_folded(const EntryPtr& entry) {
     std::vector<TileSnapshot> tiles;
     {
       const std::lock_guard lock(mutex_);
-      if (!entry->assembly || entry->removed) return fail(Errc::failed_precondition, "it has ended: no snapshot is needed");
+      if (!entry->assembly || entry->removed)
+        return fail(Errc::failed_precondition, "it has ended: no snapshot is needed");
       for (TileIndex t = first; t < std::min(first + kTilesAtOnce, entry->grid.count()); ++t)
         tiles.push_back(
             snapshot_of(entry->assembly->film(), entry->assembly->errors(), entry->assembly->health(), t));
@@ -154,7 +159,8 @@ Result<void> Service::write_snapshot(const EntryPtr& entry, const Folded& folded
       SnapshotFile::create(where / "film.snap", ".tmp", entry->grid, folded.film.aovs(), snapshot_format());
   if (!file) return tl::unexpected(file.error());
   for (TileIndex t = 0; t < entry->grid.count(); ++t)
-    if (auto added = file->add(snapshot_of(folded.film, folded.errors, folded.health, t)); !added) return added;
+    if (auto added = file->add(snapshot_of(folded.film, folded.errors, folded.health, t)); !added)
+      return added;
   if (auto sealed = file->finish(); !sealed) return sealed;
   ++entry->snapshots;
   const auto written = file->commit();
@@ -185,7 +191,8 @@ Result<std::uint64_t> Service::write_image(const Film& film, const ReportFacts& 
 void Service::load_folded(JobEntry& entry) const {
   const bool keep = entry.stored.spec.target_error.has_value();
   const AovSet aovs = aovs_of(entry.stored.settings);
-  entry.assembly = load_snapshot(folder(entry.stored.id) / "film.snap", entry.grid, keep, snapshot_format(), aovs);
+  entry.assembly =
+      load_snapshot(folder(entry.stored.id) / "film.snap", entry.grid, keep, snapshot_format(), aovs);
   if (!entry.assembly) entry.assembly.emplace(entry.grid, keep, aovs);
 }
 

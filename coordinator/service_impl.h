@@ -48,17 +48,17 @@ struct JobEntry {
   StoredJob stored;
   Digest settings_digest;
   TileGrid grid;
-  std::shared_ptr<PartialLog> log;   // none in memory
-  std::optional<Assembly> assembly;  // none once an ended job is on disk
-  std::optional<TruthBook> truths;   // with a reference only, while there is an assembly
+  std::shared_ptr<PartialLog> log;                // none in memory
+  std::optional<Assembly> assembly;               // none once an ended job is on disk
+  std::optional<TruthBook> truths;                // with a reference only, while there is an assembly
   std::optional<ReferenceNoise> reference_noise;  // as of the last comparison; nothing: not known
   std::vector<ConvergencePoint> points;
-  std::uint64_t curve = 0;      // number of the curve of these points: those of wrong or lost pixels are dropped
-  bool dormant = false;         // has ended and is on the disk: the farm does not know it
-  bool removed = false;         // by its user; nothing of it is stored any more
-  bool pin_unsaved = false;     // its numeric class is not stored yet: no result of it may be
-  std::string audits;           // under way, as last told to the disk (store/audit_file.h)
-  std::string broken;           // why it could not be taken up at the start
+  std::uint64_t curve = 0;   // number of the curve of these points: those of wrong or lost pixels are dropped
+  bool dormant = false;      // has ended and is on the disk: the farm does not know it
+  bool removed = false;      // by its user; nothing of it is stored any more
+  bool pin_unsaved = false;  // its numeric class is not stored yet: no result of it may be
+  std::string audits;        // under way, as last told to the disk (store/audit_file.h)
+  std::string broken;        // why it could not be taken up at the start
   std::uint64_t finishing = 0;  // number of the final image being made; 0: none
   bool snapshot_running = false;
   std::uint64_t snapshots = 0;  // that were put at their place; the keeper's alone
@@ -86,8 +86,8 @@ struct Connection {
   std::uint64_t epoch = 0;
   Digest numeric_class;
   std::shared_ptr<WorkerSink> sink;
-  bool open = true;                                        // under the service's lock
-  std::atomic<bool> held_back{false};                      // a result of its waits for room; its stream is not read
+  bool open = true;                    // under the service's lock
+  std::atomic<bool> held_back{false};  // a result of its waits for room; its stream is not read
   std::shared_ptr<const std::atomic<bool>> service_lives;  // a session may outlive the service
   std::optional<std::uint64_t> first_lease;                // number of the first one assigned over it
 };
@@ -304,7 +304,8 @@ class Service final : public Coordinator {
   // ---- references (service_truth.cpp); compare() and reference_of() on the comparing thread ----
   void compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
   void compare_last_locked(const EntryPtr& entry);
-  void compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles, bool last);
+  void compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles,
+               bool last);
   std::shared_ptr<const Reference> reference_of(const StoredJob& job);
   void after_comparisons(const EntryPtr& entry, std::function<void()> chore);
 
@@ -356,9 +357,9 @@ class Service final : public Coordinator {
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
   std::vector<BarredWorker> barred_unsaved_;  // found, and not stored yet: no result may be
   std::vector<Inheritance> inherited_;        // to be taken over again later; under mutex_
-  std::string store_trouble_;     // the last result that could not be stored
-  std::string blobs_trouble_;     // why blobs cannot be asked for; empty: they can
-  std::vector<EntryPtr> folded_;  // jobs that the events being handled have folded something of
+  std::string store_trouble_;                 // the last result that could not be stored
+  std::string blobs_trouble_;                 // why blobs cannot be asked for; empty: they can
+  std::vector<EntryPtr> folded_;              // jobs that the events being handled have folded something of
   bool restoring_ = false;
   FarmFigures figures_;  // what is as it is now is filled in by figures()
   std::atomic<std::uint64_t> blob_bytes_{0};
@@ -369,7 +370,8 @@ class Service final : public Coordinator {
   WorkQueue<Arrived> arrived_;
   WorkQueue<Checked> checked_;
   WorkQueue<std::function<void()>> chores_, comparisons_;
-  WorkQueue<std::set<Digest>> looks_;  // for blobs that jobs wait for: the store may be away, and then only this waits
+  WorkQueue<std::set<Digest>>
+      looks_;  // for blobs that jobs wait for: the store may be away, and then only this waits
   TimePoint last_look_{};
   std::shared_ptr<const Reference> reference_;  // the last one compared with
   Digest reference_digest_;

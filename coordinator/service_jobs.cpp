@@ -31,14 +31,19 @@ JobId Service::unused_id_locked() const {
 Result<void> Service::room_for_locked(const std::string& owner, std::size_t jobs) const {
   if (entries_.size() + jobs > limits::kMaxJobs)
     return fail(Errc::resource_exhausted,
-                fmt::format("{} jobs are kept already, and {} more are more than {}", entries_.size(), jobs, limits::kMaxJobs));
+                fmt::format("{} jobs are kept already, and {} more are more than {}", entries_.size(), jobs,
+                            limits::kMaxJobs));
   if (owner.empty()) return {};
-  const auto own = static_cast<std::size_t>(std::count_if(
-      entries_.begin(), entries_.end(), [&](const auto& entry) { return entry.second->stored.owner == owner; }));
+  const auto own =
+      static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [&](const auto& entry) {
+        return entry.second->stored.owner == owner;
+      }));
   if (own + jobs <= limits::kMaxJobsOfUser) return {};
-  return fail(Errc::resource_exhausted,
-              fmt::format("{} jobs of user {} are kept already, and {} more are more than {}: remove some that are done",
-                          own, owner, jobs, limits::kMaxJobsOfUser));
+  return fail(
+      Errc::resource_exhausted,
+      fmt::format(
+          "{} jobs of user {} are kept already, and {} more are more than {}: remove some that are done", own,
+          owner, jobs, limits::kMaxJobsOfUser));
 }
 
 tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
@@ -86,7 +91,8 @@ Result<void> Service::wait(const JobId& id) const {
   ended_.wait(lock, [&] {
     return std::all_of(awaited.begin(), awaited.end(), [&](const EntryPtr& entry) {
       const JobState state = shown_state(*entry);
-      return entry->removed || state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+      return entry->removed || state == JobState::done || state == JobState::failed ||
+             state == JobState::cancelled;
     });
   });
   return {};

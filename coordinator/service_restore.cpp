@@ -49,14 +49,17 @@ Result<void> Service::restore() {
     register_locked(entry);
     if (entry->stored.damaged)
       set_aside_locked(*entry, {Errc::internal, entry->stored.error});
-    else if (auto taken = take_up_locked(*entry, state, ended ? std::vector<BlobRef>() : lacking(entry->stored)); !taken)
+    else if (auto taken =
+                 take_up_locked(*entry, state, ended ? std::vector<BlobRef>() : lacking(entry->stored));
+             !taken)
       set_aside_locked(*entry, taken.error());
   }
   restoring_ = false;
   return {};
 }
 
-Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Result<std::vector<BlobRef>>& missing) {
+Result<void> Service::take_up_locked(JobEntry& entry, JobState state,
+                                     const Result<std::vector<BlobRef>>& missing) {
   const JobId& id = entry.stored.id;
   auto points = store_->points(id);
   if (!points) return tl::unexpected(points.error());
@@ -68,7 +71,8 @@ Result<void> Service::take_up_locked(JobEntry& entry, JobState state, const Resu
     if (!missing->empty()) state = entry.stored.state = JobState::paused;
   }
   if (auto loaded = load_locked(entry); !loaded) return loaded;
-  const bool begins_again = entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
+  const bool begins_again =
+      entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
   if (begins_again || has_barred_locked(entry)) forget_curve_locked(entry);
   auto event = restored_locked(entry, state);
   if (!event) return tl::unexpected(event.error());
@@ -95,7 +99,8 @@ Result<void> Service::load_locked(JobEntry& entry) {
   load_folded(entry);
   // The snapshot may be from before a worker turned out to lie: all is folded again from the others' results.
   if (has_barred_locked(entry))
-    entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(), aovs_of(entry.stored.settings));
+    entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(),
+                           aovs_of(entry.stored.settings));
   if (entry.stored.spec.reference) entry.truths.emplace(entry.assembly->film());
   return {};
 }
@@ -159,7 +164,8 @@ void Service::remove_strangers(const std::vector<StoredJob>& jobs) const {
   std::error_code error, none;
   for (std::filesystem::directory_iterator at(options_.data / "jobs", error), end; !error && at != end;
        at.increment(error))
-    if (!known.contains(at->path().filename().string()) && !std::filesystem::exists(at->path() / "image.exr", none))
+    if (!known.contains(at->path().filename().string()) &&
+        !std::filesystem::exists(at->path() / "image.exr", none))
       strangers.push_back(at->path());
   for (const auto& path : strangers) std::filesystem::remove_all(path, error);
 }
@@ -209,7 +215,8 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
         not_seen(record);
         continue;
       }
-      entry.assembly->hold(record.tile, record.round, {std::nullopt, place, record.samples, record.digest, record.health});
+      entry.assembly->hold(record.tile, record.round,
+                           {std::nullopt, place, record.samples, record.digest, record.health});
       entry.replay_at[{record.tile, record.round}] = record.at_seconds;
     }
     event.accepted.push_back({record.tile, record.round, record.samples, record.digest, record.worker});

@@ -5,18 +5,19 @@
 #include <set>
 
 #include "common/base/log.h"
-#include "common/base/step.h"
 #include "common/base/overloaded.h"
+#include "common/base/step.h"
 #include "coordinator/service_impl.h"
 
 namespace ls::coordinator {
 
 namespace {
-// Sums of what workers say go into records that must be read again: an absurd figure counts for nothing. What is no
-// number at all is refused with the result (verify_result).
+// Sums of what workers say go into records that must be read again: an absurd figure counts for nothing. What
+// is no number at all is refused with the result (verify_result).
 void believe(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
-  for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle, &result.times.wait})
+  for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
+                       &result.times.wait})
     *part = believed_seconds(*part);
 }
 }  // namespace
@@ -37,7 +38,8 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
     const Wanted wanted = farm_.wanted(unit);
     if (!arrived.job || wanted.verdict == Wanted::Verdict::no)
       return acknowledge_locked(arrived, std::nullopt), next();
-    if (!wanted.numeric_class && !farm_.may_pin(unit.job, from->worker)) return acknowledge_locked(arrived, std::nullopt), next();
+    if (!wanted.numeric_class && !farm_.may_pin(unit.job, from->worker))
+      return acknowledge_locked(arrived, std::nullopt), next();
     const Digest numeric_class = wanted.numeric_class.value_or(from->numeric_class);
     if (numeric_class != from->numeric_class)
       return acknowledge_locked(arrived,
@@ -104,7 +106,8 @@ void Service::commit(std::vector<Checked> batch) {
   }
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const Arrived& a = batch[i].arrived;
-    if (a.duplicate || a.barred || !logs[i] || stored[i].error || !std::holds_alternative<Partial>(batch[i].verified))
+    if (a.duplicate || a.barred || !logs[i] || stored[i].error ||
+        !std::holds_alternative<Partial>(batch[i].verified))
       continue;
     const UnitResult& r = a.result;
     auto place = logs[i]->append({r.unit.tile, r.unit.round, a.expected.samples, r.digest, a.from->worker,
@@ -126,7 +129,8 @@ void Service::commit(std::vector<Checked> batch) {
   for (std::size_t i = 0; i < batch.size(); ++i) {
     Checked& item = batch[i];
     if (farm_.barred(item.arrived.from->worker))
-      acknowledge_locked(item.arrived, Error{Errc::failed_precondition, "this worker is barred: it rendered wrong pixels"});
+      acknowledge_locked(item.arrived,
+                         Error{Errc::failed_precondition, "this worker is barred: it rendered wrong pixels"});
     else if (stored[i].error)
       cannot_store_locked(item.arrived, *stored[i].error);
     else if (const auto* bad = std::get_if<BadResult>(&item.verified))
@@ -164,7 +168,8 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
   if (wanted.verdict == Wanted::Verdict::yes && entry.log && !place)
     run_locked(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else
-    run_locked(UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds, r.times.wait});
+    run_locked(
+        UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds, r.times.wait});
   acknowledge_locked(a, std::nullopt);
 }
 

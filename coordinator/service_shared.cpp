@@ -76,7 +76,8 @@ void Service::take_over(Inheritance inheritance) {
   // Without the lock: a store of blobs may be a network away.
   const auto missing = lacking(job);
   if (!missing) {
-    log_warn(fmt::format("job={}", job.id.value), "cannot be taken over now, and is tried again: " + missing.error().message);
+    log_warn(fmt::format("job={}", job.id.value),
+             "cannot be taken over now, and is tried again: " + missing.error().message);
     const std::lock_guard lock(mutex_);
     inheritance.again = now() + kTakeOverPause;
     inherited_.push_back(std::move(inheritance));
@@ -84,7 +85,8 @@ void Service::take_over(Inheritance inheritance) {
   }
   const std::lock_guard lock(mutex_);
   if (entries_.contains(job.id)) return;
-  if (on_disk()) {  // what lies here is from when this coordinator had the job before: the record has moved on since
+  if (on_disk()) {  // what lies here is from when this coordinator had the job before: the record has moved
+                    // on since
     std::error_code error;
     std::filesystem::remove_all(folder(job.id), error);
   }

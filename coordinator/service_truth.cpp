@@ -32,9 +32,8 @@ void Service::compare_last_locked(const EntryPtr& entry) {
   if (!entry->truths || entry->points.empty()) return;
   auto tiles = entry->truths->latest();
   if (!tiles) return;
-  comparisons_.push([this, entry, curve = entry->curve, spp = entry->points.back().spp, tiles = std::move(*tiles)] {
-    compare(entry, curve, spp, tiles, true);
-  });
+  comparisons_.push([this, entry, curve = entry->curve, spp = entry->points.back().spp,
+                     tiles = std::move(*tiles)] { compare(entry, curve, spp, tiles, true); });
 }
 
 namespace {
@@ -62,12 +61,13 @@ std::shared_ptr<const Reference> Service::reference_of(const StoredJob& job) {
   return reference_;
 }
 
-void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles,
-                      bool last) {
+void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp,
+                      const std::vector<TilePicture>& tiles, bool last) {
   std::unique_lock lock(mutex_);
   const auto of_spp = [&](const ConvergencePoint& p) { return p.spp == spp; };
   const auto known = std::find_if(entry->points.begin(), entry->points.end(), of_spp);
-  if (entry->removed || entry->curve != curve || known == entry->points.end() || (known->truth && known->truth->flip))
+  if (entry->removed || entry->curve != curve || known == entry->points.end() ||
+      (known->truth && known->truth->flip))
     return;
   const StoredJob job = entry->stored;
   const bool flip = last || wants_flip(entry->points, spp);

@@ -89,13 +89,15 @@ Outlook Service::outlook_locked(const JobEntry& entry, const JobFigures& figures
   const double cores = farm_.cores_connected();
   const int workers = farm_.workers_connected();
   facts.cores = figures.cores > 0 ? figures.cores : cores;
-  const int room = job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
+  const int room =
+      job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
   if (workers > 0)
     facts.cores_with_more = facts.cores + static_cast<double>(std::min(room, kMoreWorkers)) * cores / workers;
   facts.units_at_once = static_cast<double>(entry.grid.count()) * kRoundsAhead;
   if (job.spec.max_units) facts.units_at_once = std::min<double>(facts.units_at_once, *job.spec.max_units);
   if (figures.units_total > figures.units_done)
-    facts.unit_seconds = figures.core_seconds_to_limit / static_cast<double>(figures.units_total - figures.units_done);
+    facts.unit_seconds =
+        figures.core_seconds_to_limit / static_cast<double>(figures.units_total - figures.units_done);
   return outlook_of(facts, error_points(entry.points));
 }
 

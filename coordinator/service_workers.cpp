@@ -7,8 +7,8 @@
 #include <random>
 
 #include "common/base/log.h"
-#include "common/base/step.h"
 #include "common/base/overloaded.h"
+#include "common/base/step.h"
 #include "common/protocol/limits.h"
 #include "coordinator/service_impl.h"
 #include "coordinator/views.h"
@@ -67,8 +67,8 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// Whoever names an id gets the stream of the worker that has it, so that one who comes back after a broken connection
-// goes on: nobody else may guess it.
+// Whoever names an id gets the stream of the worker that has it, so that one who comes back after a broken
+// connection goes on: nobody else may guess it.
 std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
   std::random_device device;
   const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
@@ -95,8 +95,7 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   const auto known = workers_.find(id);
   // An id that came with a copied folder belongs to the worker that has it.
   const bool taken = known != workers_.end() && known->second.hello.name != hello.name;
-  if (id.empty() || !well_formed(id) || taken)
-    id.value = new_worker_id(start_, last_epoch_ & 0xffffffff);
+  if (id.empty() || !well_formed(id) || taken) id.value = new_worker_id(start_, last_epoch_ & 0xffffffff);
   if (workers_.size() >= limits::kMaxWorkers && !workers_.contains(id))
     return fail(Errc::resource_exhausted,
                 fmt::format("{} workers are known; more are not taken", workers_.size()));
@@ -118,7 +117,8 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   worker.connection = connection;
   worker.last_seen = now();
   connection->sink->send(Welcome{id, connection->epoch});
-  log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch), "joined");
+  log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch),
+           "joined");
   run_locked(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads, hello.tags,
                           hello.memory_bytes, hello.blobs_held});
   return std::make_unique<Session>(*this, std::move(connection));
@@ -230,8 +230,9 @@ void Service::on(const WorkerBlocked& e, Todo&) {
   log_job(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
-// Stored beside the jobs, and for longer: after a restart, and in jobs that are extended then, nothing of this worker's
-// is taken up again. Until it is stored every job waits, since a restart would believe what is in its log.
+// Stored beside the jobs, and for longer: after a restart, and in jobs that are extended then, nothing of
+// this worker's is taken up again. Until it is stored every job waits, since a restart would believe what is
+// in its log.
 void Service::on(const WorkerDistrusted& e, Todo& todo) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),
@@ -251,8 +252,9 @@ Result<void> Service::save_barred_locked() {
     if (const auto kept = store_->bar(barred_unsaved_.back()); !kept) {
       store_trouble_ = kept.error().message;
       log_error(fmt::format("worker={}", barred_unsaved_.back().worker.value), kept.error().message);
-      return fail(Errc::unavailable, fmt::format("that a worker is barred cannot be stored: {}; then resume the job",
-                                                 store_trouble_));
+      return fail(
+          Errc::unavailable,
+          fmt::format("that a worker is barred cannot be stored: {}; then resume the job", store_trouble_));
     }
     barred_unsaved_.pop_back();
   }

@@ -89,11 +89,10 @@ json to_value(const JobView& v) {
                                   {"rmse_below_noise", v.truth->rmse_below_noise()}}
                            : json();
   j["reference_same_seed"] = v.reference_same_seed;
-  j["verdict"] =
-      v.judgement ? json{{"kind", to_string(v.judgement->kind)},
-                         {"words", v.judgement->words},
-                         {"trusted", v.judgement->trusted}}
-                  : json();
+  j["verdict"] = v.judgement ? json{{"kind", to_string(v.judgement->kind)},
+                                    {"words", v.judgement->words},
+                                    {"trusted", v.judgement->trusted}}
+                             : json();
   j["few_hits"] = v.few_hits ? json(*v.few_hits) : json();
   j["pixels_without_samples"] = v.pixels_without_samples ? json(*v.pixels_without_samples) : json();
   j["slope"] = v.trend ? number(-v.trend->slope) : json();
@@ -148,13 +147,14 @@ std::string tiles_json(const std::vector<TileView>& tiles) {
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
   std::string csv =
-      "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,rmse_lo,rmse_hi\n";
+      "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,rmse_lo,rmse_"
+      "hi\n";
   const auto or_nothing = [](const auto& truth, auto figure) {
     return truth ? fmt::format("{}", figure(*truth)) : std::string();
   };
   for (const auto& p : points)
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp, p.error.rmse,
-                       p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", p.seconds, p.core_seconds, p.spp,
+                       p.error.rmse, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi,
                        or_nothing(p.truth, [](const TrueFigures& t) { return t.rmse; }),
                        or_nothing(p.truth, [](const TrueFigures& t) { return t.relmse; }),
                        p.truth && p.truth->flip ? fmt::format("{}", *p.truth->flip) : std::string(),

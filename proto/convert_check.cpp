@@ -52,7 +52,8 @@ Result<std::string> text_from(const std::string& text, std::size_t limit, const 
 
 Result<double> seconds_from(double value, const char* field) {
   if (!(value >= 0 && value <= limits::kSeconds))
-    return wrong(field, fmt::format("is {}; it must be a time in seconds, at most {}", value, limits::kSeconds));
+    return wrong(field,
+                 fmt::format("is {}; it must be a time in seconds, at most {}", value, limits::kSeconds));
   return value;
 }
 

@@ -22,7 +22,8 @@ class LinkObserver {
 struct BlobRequest {
   Digest digest;
   std::uint64_t offset = 0;
-  bool arrived_wrong = false;  // an earlier transfer brought other bytes: the coordinator shall look at its own
+  bool arrived_wrong =
+      false;  // an earlier transfer brought other bytes: the coordinator shall look at its own
 };
 
 class CoordinatorLink {

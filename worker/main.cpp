@@ -38,11 +38,13 @@ int run_child(const worker::Options& options) {
   worker::child::confine(options.memory_limit);
   const auto caged = worker::child::shut_in({options.cache});
   if (!caged.calls || !caged.files)
-    log_warn("", fmt::format("this kernel cannot keep the renderer from {}: take care whose scenes it renders",
-                             caged.files ? "opening sockets" : "files that are not a scene's"));
+    log_warn("",
+             fmt::format("this kernel cannot keep the renderer from {}: take care whose scenes it renders",
+                         caged.files ? "opening sockets" : "files that are not a scene's"));
   else if (!caged.sizes)
-    log_warn("", "this kernel (before Linux 6.2) cannot keep the renderer from cutting cached files short: take "
-                 "care whose scenes it renders");
+    log_warn("",
+             "this kernel (before Linux 6.2) cannot keep the renderer from cutting cached files short: take "
+             "care whose scenes it renders");
 #ifdef LIGHTSHAFT_RENDERER
   const auto limit = render::limit_threads(options.threads);
 #endif

@@ -26,7 +26,8 @@ struct Files {
 
 void describe(CLI::App& app, Options& o, Files& files) {
   app.add_option("--coordinator", o.coordinators,
-                 "HOST:PORT where the coordinator listens for workers; several that share a farm, separated by commas")
+                 "HOST:PORT where the coordinator listens for workers; several that share a farm, separated "
+                 "by commas")
       ->delimiter(',');
   app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")
       ->check(CLI::Range(1, kMostChildThreads));
@@ -50,7 +51,8 @@ void describe(CLI::App& app, Options& o, Files& files) {
   auto* ca = app.add_option("--tls-ca", files.tls_ca,
                             "Speak TLS, with a coordinator whose certificate is of this authority (its "
                             "DATA/tls/ca.pem)");
-  auto* cert = app.add_option("--tls-cert", files.tls_cert, "This worker's certificate (DATA/tls/worker.pem)");
+  auto* cert =
+      app.add_option("--tls-cert", files.tls_cert, "This worker's certificate (DATA/tls/worker.pem)");
   auto* key = app.add_option("--tls-key", files.tls_key, "Its key (DATA/tls/worker.key)");
   ca->needs(cert)->needs(key);
   cert->needs(ca);
@@ -108,7 +110,8 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
     if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay is a number of milliseconds");
     o.fake_options.delay = from_seconds(ms * 1e-3);
   }
-  if (!(o.fake_options.sample_seconds >= 0 && o.fake_options.sample_seconds <= 1)) return usage("--fake-sample-seconds is 0 to 1");
+  if (!(o.fake_options.sample_seconds >= 0 && o.fake_options.sample_seconds <= 1))
+    return usage("--fake-sample-seconds is 0 to 1");
   if (const auto* format = app.get_option("--log-format"); format->count() > 0)
     o.log_format = *log_format_of(format->as<std::string>());
   const auto fault = parse_fake_fault(o.fake_fault_text);
@@ -139,8 +142,9 @@ std::vector<std::string> child_arguments(const Options& o) {
   if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});  // what it may read
   if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");
-  arguments.insert(arguments.end(), {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3),
-                                     "--fake-sample-seconds", fmt::format("{}", o.fake_options.sample_seconds)});
+  arguments.insert(arguments.end(),
+                   {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3),
+                    "--fake-sample-seconds", fmt::format("{}", o.fake_options.sample_seconds)});
   if (!o.fake_fault_text.empty()) arguments.insert(arguments.end(), {"--fake-fault", o.fake_fault_text});
   if (!o.fake_class.empty()) arguments.insert(arguments.end(), {"--fake-class", o.fake_class});
   return arguments;

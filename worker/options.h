@@ -27,7 +27,7 @@ struct Options {
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;
-  std::string fake_class;     // another numeric class, named by the SHA-256 of this; empty: the usual one
+  std::string fake_class;  // another numeric class, named by the SHA-256 of this; empty: the usual one
   LogFormat log_format = LogFormat::text;
   bool render_child = false;  // this process is one; started by a worker only
 };

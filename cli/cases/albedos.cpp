@@ -68,8 +68,8 @@ void deep(Table& t) {
           fmt::format("N17-white-slab-{:g}{}", tau, way.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(way, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // Few paths are so long that they matter: a small first run sees none of them, or thinks there were more,
-          // and few pixels have one.
+          // Few paths are so long that they matter: a small first run sees none of them, or thinks there were
+          // more, and few pixels have one.
           {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
   }

@@ -59,8 +59,8 @@ struct MeanOptions {
   bool channels = false;
   // Left out of the quick table: long paths, or heavy tails.
   bool slow = false;
-  // Not 0: so many paths to begin with, where a first run of few misses what matters, or takes it for more than
-  // it is.
+  // Not 0: so many paths to begin with, where a first run of few misses what matters, or takes it for more
+  // than it is.
   std::uint64_t paths = 0;
   // Not 0: so many whole frames, and the error is told by how their means differ. For frames in which a few
   // pixels vary so much more than all others that an error from one frame rests on these alone.

@@ -21,14 +21,15 @@ double phi(double x) { return x == 0 ? 1 : -std::expm1(-x) / x; }
 
 void nothing(Table& t) {
   for (const Way& way : all_ways()) {
-    t.exact("N01-no-extinction" + way.name(), "N1",
-            "A medium that takes a part in 1e30, and so stays in the scene, shows a white sky as 1 exactly, in "
-            "every sample.",
-            [way](const Bench& b) {
-              SceneKit kit = unit_cube(way, rgb(1e-30));
-              kit.environment();
-              return every_value(b, kit, 64, grey(1), 0);
-            });
+    t.exact(
+        "N01-no-extinction" + way.name(), "N1",
+        "A medium that takes a part in 1e30, and so stays in the scene, shows a white sky as 1 exactly, in "
+        "every sample.",
+        [way](const Bench& b) {
+          SceneKit kit = unit_cube(way, rgb(1e-30));
+          kit.environment();
+          return every_value(b, kit, 64, grey(1), 0);
+        });
     if (!way.grid) continue;
     t.exact("N01-zeros" + way.name(), "N1",
             "A grid whose values are all 0, which only its file says, shows 1 exactly, in every sample.",
@@ -113,9 +114,10 @@ void opaque(Table& t) {
              "An all but endless medium of this depth reflects what Chandrasekhar's H gives.",
              [=] { return half_space(way, .9, tau, 1); }, grey(.414947),
              {.band = coarse ? .006 : kBand,
-              .why_band = coarse ? "17 float32 places to a mean free path at the face's height: a sum that is .31 % "
-                                   "above its integral"
-                                 : "",
+              .why_band =
+                  coarse ? "17 float32 places to a mean free path at the face's height: a sum that is .31 % "
+                           "above its integral"
+                         : "",
               .slack = coarse ? kPlaces : kDigits});
     }
   }
@@ -151,7 +153,8 @@ void shadows(Table& t) {
            return kit;
          },
          grey(std::exp(-8.) / (2 * kPi)),
-         {.band = .02, .why_band = "an e^-8 of the light, by the few shadow rays that are walked on in the dark"});
+         {.band = .02,
+          .why_band = "an e^-8 of the light, by the few shadow rays that are walked on in the dark"});
 }
 
 }  // namespace

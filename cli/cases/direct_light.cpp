@@ -90,10 +90,10 @@ void plates(Table& table, int m) {
   kit.environment();
   kit.look({0, 0, m + 1.}, {0, 0, 0}, 1e-3, {0, 1, 0});
   const double r = .04, t = (1 - r) / (1 + (2 * m - 1) * r);
-  table.mean(fmt::format("N42-{}-plates-of-glass", m), "N42 7.6g",
-             "A thousand interfaces at normal incidence: R = 1 - T, T = (1 - r) / (1 + (2 m - 1) r) = 3 / 128.",
-             kit, grey(1 - t),
-             {.band = .005, .why_band = "paths of a thousand interfaces on average", .slow = true});
+  table.mean(
+      fmt::format("N42-{}-plates-of-glass", m), "N42 7.6g",
+      "A thousand interfaces at normal incidence: R = 1 - T, T = (1 - r) / (1 + (2 m - 1) r) = 3 / 128.", kit,
+      grey(1 - t), {.band = .005, .why_band = "paths of a thousand interfaces on average", .slow = true});
 }
 
 }  // namespace

@@ -72,7 +72,8 @@ const std::vector<Elsewhere>& answered_elsewhere() {
        "SampleStream, PixelsHalvesSeedsVerticesAndPurposesAreUncorrelated"},
       {"N56", "tests/unit/render/sampler_test.cpp", "SampleStream, NoKeyRepeatsOverAJobOfAMillionNumbers"},
       {"N57", "tests/unit/assemble/assemble_test.cpp", "Report, HasEveryKeyOfTheContract"},
-      // What denormals cost is not measured: tests read no clocks. Where there are none they cost what zeros do.
+      // What denormals cost is not measured: tests read no clocks. Where there are none they cost what zeros
+      // do.
       {"N58", "tests/unit/render/health_test.cpp",
        "Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread"},
       {"N59", "tests/unit/render/boundary_test.cpp", "Boundaries, RejectSamplesWhoseShadowRaysAreCutOff"},

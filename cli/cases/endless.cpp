@@ -34,7 +34,8 @@ double endless_fluence(double albedo, double distance, double radius) {
     const double above = std::exp(u), rate = 1 + above;
     const double real = 1 - albedo * (std::log(2 + above) - u) / (2 * rate),
                  imaginary = albedo * kPi / (2 * rate);
-    return above * std::exp(-rate * distance) * of_ball(rate * radius) / (real * real + imaginary * imaginary);
+    return above * std::exp(-rate * distance) * of_ball(rate * radius) /
+           (real * real + imaginary * imaginary);
   };
   const double rest = integrate(cut, kLeast, std::log(kMostExponent / (distance - radius)), 4000);
   return (pole + rest) / (4 * kPi * distance);

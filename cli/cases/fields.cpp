@@ -94,14 +94,16 @@ SceneKit endless(double albedo, double r, MediumIndex* medium) {
 }
 
 // The fluence of a ball of 1 W and half the distance for its radius; what a camera of all directions shows is
-// that over 4 pi. A ball, because estimates of a point's light have no finite variance: towards the point radiance
-// grows like the inverse of the angle to it. At albedo .999 paths are a thousand segments long: a wider band.
+// that over 4 pi. A ball, because estimates of a point's light have no finite variance: towards the point
+// radiance grows like the inverse of the angle to it. At albedo .999 paths are a thousand segments long: a
+// wider band.
 void endless_medium(Table& t) {
   for (const double c : {.3, .5, .8, .9, .99, .999}) {
     for (const double r : {.25, 1., 2., 5.}) {
       const double radius = r / 2;
       t.mean(fmt::format("7.6e-fluence-c{:g}-r{:g}/homogeneous/volpath", c, r), "7.6e",
-             "The light of a glowing ball in an endless medium, over all directions, at this many mean free paths.",
+             "The light of a glowing ball in an endless medium, over all directions, at this many mean free "
+             "paths.",
              [=] {
                MediumIndex around;
                SceneKit kit = endless(c, r, &around);
@@ -120,15 +122,14 @@ void endless_medium(Table& t) {
   }
 }
 
-// A lamp itself, which no camera sees: less e^-r / (4 pi r^2) of its fluence. Its tails are heavy, the more the
-// lower the albedo, so that it is asked where they matter least.
+// A lamp itself, which no camera sees: less e^-r / (4 pi r^2) of its fluence. Its tails are heavy, the more
+// the lower the albedo, so that it is asked where they matter least.
 void endless_lamp(Table& t) {
   struct Row {
     double c, r;
   };
   for (const auto& [c, r] : {Row{.8, .25}, {.8, 1}, {.9, .25}, {.9, 1}}) {
-    const double expected =
-        (endless_fluence(c, r, 0) - std::exp(-r) / (4 * kPi * r * r)) / (4 * kPi);
+    const double expected = (endless_fluence(c, r, 0) - std::exp(-r) / (4 * kPi * r * r)) / (4 * kPi);
     t.mean(fmt::format("7.6e-lamp-c{:g}-r{:g}/homogeneous/volpath", c, r), "7.6e",
            "The light of a lamp in an endless medium, over all directions, at this many mean free paths.",
            [c = c, r = r] {

@@ -144,8 +144,8 @@ void hot_voxels(Table& t) {
 }
 
 // Thin fog, and across it a wall that neither the ray, three voxels away, nor what lights it meets: but cells
-// of the bounds that the ray crosses hold a part of it, and by their means nothing gets through them. A lamp in
-// the fog; scattered once: the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
+// of the bounds that the ray crosses hold a part of it, and by their means nothing gets through them. A lamp
+// in the fog; scattered once: the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -153,7 +153,8 @@ void beside_a_wall(Table& t) {
   const double y = .6, z = .47;
   const double radiance = integrate(
       [&](double x) {
-        const double r2 = (x - lamp[0]) * (x - lamp[0]) + (y - lamp[1]) * (y - lamp[1]) + (z - lamp[2]) * (z - lamp[2]);
+        const double r2 =
+            (x - lamp[0]) * (x - lamp[0]) + (y - lamp[1]) * (y - lamp[1]) + (z - lamp[2]) * (z - lamp[2]);
         return sigma / (4 * kPi) * std::exp(-sigma * (x + std::sqrt(r2))) / r2;
       },
       0, 1, 20000);
@@ -162,19 +163,20 @@ void beside_a_wall(Table& t) {
     for (int i = 0; i < n; ++i) values[at({n, n, n}, i, wall, k)] = density;
   for (const Way& way : all_ways()) {
     if (!way.grid) continue;
-    t.mean("N10-beside-a-hot-wall" + way.name(), "N10 N32",
-           "Fog beside a wall of 1e4 times its density, which no ray meets: light of a lamp, scattered once.",
-           [=] {
-             SceneKit kit;
-             way.choose(kit);
-             kit.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), kit.null(),
-                           kit.heterogeneous(kit.grid({n, n, n}, values, Transform{}), rgb(1), sigma));
-             kit.scene.emitters.push_back(PointEmitter{lamp, rgb(1)});
-             kit.scene.integrator.max_depth = kOnce;
-             kit.look({-2, y, z}, {0, y, z}, 1e-4);
-             return kit;
-           },
-           grey(radiance));
+    t.mean(
+        "N10-beside-a-hot-wall" + way.name(), "N10 N32",
+        "Fog beside a wall of 1e4 times its density, which no ray meets: light of a lamp, scattered once.",
+        [=] {
+          SceneKit kit;
+          way.choose(kit);
+          kit.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), kit.null(),
+                        kit.heterogeneous(kit.grid({n, n, n}, values, Transform{}), rgb(1), sigma));
+          kit.scene.emitters.push_back(PointEmitter{lamp, rgb(1)});
+          kit.scene.integrator.max_depth = kOnce;
+          kit.look({-2, y, z}, {0, y, z}, 1e-4);
+          return kit;
+        },
+        grey(radiance));
   }
 }
 

@@ -118,9 +118,7 @@ void shapes(Table& t) {
       "N44-instance-squeezed-by-1e6", "N44", "An instance a million times as wide as high is the box there.",
       [] { return placed(true, scale(1, 1, 1e-6)); }, [] { return placed(false, scale(1, 1, 1e-6)); });
   t.exact("N44-squeezed-too-much", "N44", "One that is thinner than what the scene's size leaves is refused.",
-          [](const Bench& b) {
-            return refused(b, placed(true, scale(1e6, 1, 1e-6)), {"to_world"});
-          });
+          [](const Bench& b) { return refused(b, placed(true, scale(1e6, 1, 1e-6)), {"to_world"}); });
   t.exact("N44-singular", "N44", "An instance that is pressed flat is refused.", [](const Bench& b) {
     return refused(b, placed(true, scale(1, 1, 0)), {"to_world", "no inverse"});
   });
@@ -182,9 +180,13 @@ void textures(Table& t) {
           });
   t.exact("N46-normal-of-nothing", "N46",
           "A normal map whose normals are (0, 0, 0) is none: the surface's own, bit for bit.",
-          [](const Bench& b) { return same_bits(b, mapped(rgb(.5)), mapped({.5, .5, 1}), 16); });
-  t.exact("N46-normal-from-below", "N46", "A normal map whose normals point into the surface: nothing lights it.",
-          [](const Bench& b) { return every_value(b, mapped({.5, .5, 0}), 16, grey(0), 0); });
+          [](const Bench& b) {
+            return same_bits(b, mapped(rgb(.5)), mapped({.5, .5, 1}), 16);
+          });
+  t.exact("N46-normal-from-below", "N46",
+          "A normal map whose normals point into the surface: nothing lights it.", [](const Bench& b) {
+            return every_value(b, mapped({.5, .5, 0}), 16, grey(0), 0);
+          });
 }
 
 // ---- cameras
@@ -199,8 +201,7 @@ Figure cropped(const Bench& b, double radius) {
   Figure f;
   for (std::size_t y = 0; y < 6; ++y)
     for (std::size_t x = 0; x < 4; ++x)
-      for (std::size_t c = 0; c < 3; ++c)
-        f.got += w->mean((y + 3) * 16 + x + 5, c) != p->mean(y * 4 + x, c);
+      for (std::size_t c = 0; c < 3; ++c) f.got += w->mean((y + 3) * 16 + x + 5, c) != p->mean(y * 4 + x, c);
   return f;
 }
 
@@ -221,8 +222,8 @@ void cameras(Table& t) {
               lens.scene.sensor.focus_distance = focus;
               return refused(b, lens, {"focus_distance"});
             });
-  t.exact("N47-lens-wider-than-its-focus", "N47", "A lens ten times as wide as its focus is far: the sky stays white.",
-          [](const Bench& b) {
+  t.exact("N47-lens-wider-than-its-focus", "N47",
+          "A lens ten times as wide as its focus is far: the sky stays white.", [](const Bench& b) {
             SceneKit kit;
             kit.shape(SphereShape{}, translate({0, 0, -1e4}), kit.diffuse(.5));
             kit.environment();
@@ -251,7 +252,8 @@ void cameras(Table& t) {
             });
   // The second filter is as wide as filters may be: 64 pixels, more than the frame and than any tile of it.
   for (const double radius : {2., 32.})
-    t.exact(fmt::format("N48-crop-filter-{:g}", radius), "N48", "A crop is that part of the frame, bit for bit.",
+    t.exact(fmt::format("N48-crop-filter-{:g}", radius), "N48",
+            "A crop is that part of the frame, bit for bit.",
             [=](const Bench& b) { return cropped(b, radius); });
 }
 

@@ -107,20 +107,21 @@ void from_afar(Table& t) {
                return kit;
              },
              grey(lit_cube_answer(1, 1)), {.slack = 4 / distance});
-    t.mean("N24-sphere-of-1e2-at-1e3" + way.name(), "N24 N26",
-           "A shining sphere of radius 100 at 1000, of fluence 1: all but a sun.",
-           [=] {
-             SceneKit kit = lit_cube(way, rgb(.01), rgb(1));
-             kit.scene.emitters.clear();
-             const TextureIndex light = kit.texture(rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
-             kit.shape(SphereShape{}, translate({0, 1e3, 0}) * scale(1e2), kit.diffuse(0)).emitter =
-                 AreaEmitter{light};
-             return kit;
-           },
-           // Its rim is .1 rad off: the way down is longer by at most .005, times .01.
-           // Flights through a grid this thin seldom end in it.
-           grey(lit_cube_answer(.01, 1)),
-           {.slack = 5e-5, .slow = way.grid && !way.distant, .paths = way.grid && !way.distant ? 1u << 22 : 0u});
+    t.mean(
+        "N24-sphere-of-1e2-at-1e3" + way.name(), "N24 N26",
+        "A shining sphere of radius 100 at 1000, of fluence 1: all but a sun.",
+        [=] {
+          SceneKit kit = lit_cube(way, rgb(.01), rgb(1));
+          kit.scene.emitters.clear();
+          const TextureIndex light = kit.texture(rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
+          kit.shape(SphereShape{}, translate({0, 1e3, 0}) * scale(1e2), kit.diffuse(0)).emitter =
+              AreaEmitter{light};
+          return kit;
+        },
+        // Its rim is .1 rad off: the way down is longer by at most .005, times .01.
+        // Flights through a grid this thin seldom end in it.
+        grey(lit_cube_answer(.01, 1)),
+        {.slack = 5e-5, .slow = way.grid && !way.distant, .paths = way.grid && !way.distant ? 1u << 22 : 0u});
   }
 }
 

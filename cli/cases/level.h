@@ -10,8 +10,8 @@ namespace ls::cases {
 inline constexpr double kWrongVerdicts = 1e-3;
 
 // A renderer that is off by more than the band in a case passes that case with this probability at most: two
-// one-sided tests (Schuirmann 1987). It is not shared among cases, since the table is passed only where each of
-// them is (an intersection-union test: Berger 1982); among a case's attempts it is.
+// one-sided tests (Schuirmann 1987). It is not shared among cases, since the table is passed only where each
+// of them is (an intersection-union test: Berger 1982); among a case's attempts it is.
 inline constexpr double kWrongPass = 1e-3;
 
 // A case whose interval came out too wide is run anew with more paths, so often at most; each is an interval

@@ -30,7 +30,8 @@ SceneKit glint(double alpha, Microfacet d, double off) {
   return kit;
 }
 
-// Of GGX, what masking (Smith's, separable) leaves at angles of these tangents; Beckmann's is 1 here to every digit.
+// Of GGX, what masking (Smith's, separable) leaves at angles of these tangents; Beckmann's is 1 here to every
+// digit.
 double unmasked(double alpha, double view, double light) {
   const auto lambda = [alpha](double angle) {
     return (std::sqrt(1 + std::pow(alpha * std::tan(angle), 2)) - 1) / 2;

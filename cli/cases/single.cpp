@@ -105,8 +105,8 @@ void lights(Table& t) {
                spot = spot_answer(.5, .7);
   for (const bool grid : {false, true}) {
     for (const Setting& s : settings(grid)) {
-      // Points that come near a light by chance only: a first run of few misses them, or takes them for more than
-      // they are.
+      // Points that come near a light by chance only: a first run of few misses them, or takes them for more
+      // than they are.
       const bool by_chance = s.way.distance == DistanceSampling::exponential || (grid && !s.way.distant);
       const MeanOptions options{.slow = by_chance, .paths = by_chance ? 1u << 21 : 0u},
           of_square{.slow = by_chance, .paths = by_chance ? 1u << 23 : 0u};

@@ -50,9 +50,9 @@ void semi_infinite(Table& t) {
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});
 }
 
-// A white plate this far above a face at `foot`, a twentieth of that in radius, seen from below: it sees all of the
-// face under the cosine, so that what it shows is what the medium reflects of light from everywhere, but for the
-// sky that it hides.
+// A white plate this far above a face at `foot`, a twentieth of that in radius, seen from below: it sees all
+// of the face under the cosine, so that what it shows is what the medium reflects of light from everywhere,
+// but for the sky that it hides.
 void add_small_plate(SceneKit& kit, const Vec3& foot, double height) {
   const double radius = height / 20, x = foot[0], y = foot[1], z = foot[2];
   kit.shape(DiskShape{}, translate({x, y, z + height}) * rotate_x(180) * scale(radius), kit.diffuse(1));
@@ -60,9 +60,9 @@ void add_small_plate(SceneKit& kit, const Vec3& foot, double height) {
   kit.scene.sensor.near_clip = 1e-9;
 }
 
-// An endless medium's spherical albedo. Depths are 40 and a cube's side is 1: the plate is .04 mean free paths above
-// the face, and its shadow of (.002)^2 mean free paths is that share of what it sees; past the cube it sees
-// (2 x .001)^2.
+// An endless medium's spherical albedo. Depths are 40 and a cube's side is 1: the plate is .04 mean free
+// paths above the face, and its shadow of (.002)^2 mean free paths is that share of what it sees; past the
+// cube it sees (2 x .001)^2.
 void spherical(Table& t) {
   struct Row {
     double albedo, reflected;
@@ -109,10 +109,10 @@ void isotropic(Table& t) {
              [=] { return column(way, row.slab, false); }, grey(row.r),
              {.slack = kDigits * 10, .slow = row.slab.albedo != .9});
       if (way.grid && !by_both_ways(row.slab)) continue;
-      t.mean(named("slab", row.slab, "T", way), "7.2",
-             "What an isotropic slab lets through at normal incidence.",
-             [=] { return column(way, row.slab, true); }, grey(row.t),
-             of_little(row.t, row.slab.albedo != .9));
+      t.mean(
+          named("slab", row.slab, "T", way), "7.2",
+          "What an isotropic slab lets through at normal incidence.",
+          [=] { return column(way, row.slab, true); }, grey(row.t), of_little(row.t, row.slab.albedo != .9));
     }
   }
   t.mean("7.2-slab-split-by-a-boundary/homogeneous/volpath", "7.2 7.7",
@@ -148,9 +148,10 @@ void diffuse(Table& t) {
       if (way.grid && row.slab.tau > 1) continue;  // long, for what the slabs above show of grids
       const double lit = row.t_diffuse / (1 - row.r_diffuse / 2);
       const bool slow = row.slab.albedo != .9 || way.grid;
-      t.mean(named("diffuse", row.slab, "T", way), "7.2",
-             "A white plate over a slab that the sky shines through.",
-             [=] { return plate_above(way, row.slab); }, grey(lit / 2), of_little(row.t_diffuse, slow));
+      t.mean(
+          named("diffuse", row.slab, "T", way), "7.2",
+          "A white plate over a slab that the sky shines through.",
+          [=] { return plate_above(way, row.slab); }, grey(lit / 2), of_little(row.t_diffuse, slow));
       t.mean(named("diffuse", row.slab, "R", way), "7.2",
              "A small white plate over a slab in a sky: by what comes up to it.",
              [=] { return plate_facing(way, row.slab); }, grey(row.r_diffuse),
@@ -189,9 +190,10 @@ double first_order(double albedo, double tau) {
              1, 20'000);
 }
 
-// What an endless white medium reflects along its normal of light scattered one to three times: the first terms of 1 -
-// sqrt(1 - a) H(1) as a power series of the albedo. Those of H follow from its equation, H = 1 + a / 2 mu H int H(m) /
-// (mu + m) dm; m = x^2 takes the logarithm out of the integrals' ends, and Simpson's rule is good to 1e-8.
+// What an endless white medium reflects along its normal of light scattered one to three times: the first
+// terms of 1 - sqrt(1 - a) H(1) as a power series of the albedo. Those of H follow from its equation, H = 1 +
+// a / 2 mu H int H(m) / (mu + m) dm; m = x^2 takes the logarithm out of the integrals' ends, and Simpson's
+// rule is good to 1e-8.
 std::array<double, 3> orders_of_endless() {
   const auto over = [](auto h, double mu) {
     return integrate([&](double x) { return h(x * x) / (mu + x * x) * 2 * x; }, 0, 1, 100);
@@ -236,7 +238,8 @@ void orders(Table& t) {
       if (tau == 4 && way.grid) continue;  // the same flights as at 1 and at 60
       t.mean(fmt::format("7.6h-once-tau{:g}{}", tau, way.name()), "7.6h",
              "What a slab reflects of light scattered once: .142015352, .153412899, (1 - ln 2) / 2.",
-             [=] { return wide_slab(way, tau, 1); }, grey(first_order(1, tau)), {.slack = 1e-4, .slow = tau == 4});
+             [=] { return wide_slab(way, tau, 1); }, grey(first_order(1, tau)),
+             {.slack = 1e-4, .slow = tau == 4});
     }
   }
   const auto each = orders_of_endless();

@@ -37,8 +37,9 @@ SceneKit before_a_wall(SceneKit kit) {
   return kit;
 }
 
-// Of a white GGX metal seen from this many degrees off its normal, the mean over its visible normals (Heitz 2018) of
-// what masking leaves on the way out, 1 / (1 + lambda); masking is separable, as Mitsuba's is. Midpoints.
+// Of a white GGX metal seen from this many degrees off its normal, the mean over its visible normals (Heitz
+// 2018) of what masking leaves on the way out, 1 / (1 + lambda); masking is separable, as Mitsuba's is.
+// Midpoints.
 double unmasked_at(double degrees, double alpha) {
   constexpr int kSteps = 400;
   const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));
@@ -82,11 +83,13 @@ void microfacets(Table& t) {
               const TextureIndex zero = kit.texture(rgb(0)), one = kit.texture(rgb(1)),
                                  rough = kit.texture(rgb(roughness));
               kit.shape(SphereShape{}, {},
-                        kit.bsdf(PrincipledBsdf{one, rough, zero, one, {}, 1.5, zero, zero, zero, zero, zero, zero}));
+                        kit.bsdf(PrincipledBsdf{
+                            one, rough, zero, one, {}, 1.5, zero, zero, zero, zero, zero, zero}));
               return before_a_wall(kit);
             };
             Figure f = same_bits(b, ball(0), ball(.0316), 16);
-            if (same_bits(b, ball(0), ball(.05), 16).got == 0) f.why = "nor does a roughness above it change a bit";
+            if (same_bits(b, ball(0), ball(.05), 16).got == 0)
+              f.why = "nor does a roughness above it change a bit";
             return f;
           });
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
@@ -96,10 +99,11 @@ void microfacets(Table& t) {
              "A white metal this smooth in a white sky: masking takes less than alpha^2 of the light.",
              [=] { return in_white(sheet(30, [=](SceneKit& k) { return rough_mirror(k, alpha, d); })); },
              grey(1), {.band = .002, .slack = alpha * alpha});
-  t.mean("N38-furnace-1", "N38 7.6g",
-         "A white metal of roughness 1 from above, scattered once: 1 - ln 2 (GGX, where one way masks nothing).",
-         [] { return in_white(sheet(0, [](SceneKit& k) { return rough_mirror(k, 1); })); },
-         grey(1 - std::log(2.)), {.band = .003});
+  t.mean(
+      "N38-furnace-1", "N38 7.6g",
+      "A white metal of roughness 1 from above, scattered once: 1 - ln 2 (GGX, where one way masks nothing).",
+      [] { return in_white(sheet(0, [](SceneKit& k) { return rough_mirror(k, 1); })); },
+      grey(1 - std::log(2.)), {.band = .003});
   for (const double degrees : {89., 89.99, 89.9999})
     t.exact(fmt::format("N35-grazing-{:g}", degrees), "N35", "A perfect mirror at a grazing angle: 1.",
             [=](const Bench& b) {

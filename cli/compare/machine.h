@@ -15,7 +15,7 @@ Result<void> use_cores(int count);
 // "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
 double cpu_seconds(const rusage& usage);  // user and system
-double load_average();  // the kernel's, of a minute; negative: not known
+double load_average();                    // the kernel's, of a minute; negative: not known
 
 // How busy others are: counts from when it is made.
 class Others {

@@ -1,5 +1,5 @@
-#include "cli/compare/machine.h"
 #include "cli/compare/program.h"
+#include "cli/compare/machine.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

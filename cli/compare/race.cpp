@@ -127,7 +127,8 @@ void take_notes(Race& race, const Lanes& lanes) {
 
 tl::unexpected<Error> no_judge() {
   return fail(Errc::invalid_argument,
-              "without --reference the pictures are measured against those of the other seeds by an integrator of ours that "
+              "without --reference the pictures are measured against those of the other seeds by an "
+              "integrator of ours that "
               "sees all of the scene: there must be one, and two seeds at least");
 }
 
@@ -147,8 +148,8 @@ Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer
 }
 
 Result<void> judges_itself(const Race& race, std::size_t seeds) {
-  const bool sees_all =
-      std::any_of(race.entrants.begin(), race.entrants.end(), [](const Entrant& e) { return e.ours && e.whole; });
+  const bool sees_all = std::any_of(race.entrants.begin(), race.entrants.end(),
+                                    [](const Entrant& e) { return e.ours && e.whole; });
   return seeds >= 2 && sees_all ? Result<void>() : no_judge();
 }
 

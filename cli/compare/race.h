@@ -66,7 +66,8 @@ struct Race {
   std::vector<std::string> notes;
 };
 
-// Whether there is such an entrant of ours, and seeds enough, that judge() needs no reference: invalid_argument otherwise.
+// Whether there is such an entrant of ours, and seeds enough, that judge() needs no reference:
+// invalid_argument otherwise.
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
 // Measures all pictures against `reference`; without one against the other seeds' pictures by the best of our

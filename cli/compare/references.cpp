@@ -31,7 +31,8 @@ Reference combine(const std::vector<ReferenceFile>& files) {
 }
 
 std::string describe(const std::vector<ReferenceFile>& files) {
-  if (files.size() > 1) return fmt::format("{} and {}, two independent references", files[0].name, files[1].name);
+  if (files.size() > 1)
+    return fmt::format("{} and {}, two independent references", files[0].name, files[1].name);
   if (files[0].picture.error.empty())
     return fmt::format("{}, whose own noise counts as everybody's error", files[0].name);
   return fmt::format("{}, less its own noise by its layers of errors", files[0].name);

@@ -95,7 +95,8 @@ Table summary_table(const Results& results) {
               {}};
   for (const Race& race : results.races)
     for (const Row& row : rows_of(race))
-      table.rows.push_back({race.scene, name(race, row.entrant), report::sample_count(row.spp), figure(row.seconds),
+      table.rows.push_back({race.scene, name(race, row.entrant), report::sample_count(row.spp),
+                            figure(row.seconds),
                             with_interval(row.relmse) + (row.spread > kHeavySpread ? " tail" : ""),
                             with_interval(row.efficiency), with_interval(row.slope),
                             row.entrant == 0 ? "" : with_interval(row.ratio)});

@@ -23,7 +23,9 @@ std::string fields(const std::optional<Estimate>& e) {
   return e ? fmt::format("{},{},{}", field(e->value), field(e->lo), field(e->hi)) : ",,";
 }
 
-std::string entrant_field(const Race& race, std::size_t entrant) { return field(race.entrants[entrant].name); }
+std::string entrant_field(const Race& race, std::size_t entrant) {
+  return field(race.entrants[entrant].name);
+}
 
 double root(double square) { return square > 0 ? std::sqrt(square) : NAN; }
 
@@ -40,9 +42,10 @@ std::string points_csv(const Results& results) {
             p.estimate ? fmt::format("{},{},{}", field(p.estimate->relmse), field(p.estimate->relmse_lo),
                                      field(p.estimate->relmse_hi))
                        : ",,";
-        out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), entrant_field(race, lane.entrant),
-                           results.first_seed + lane.seed, field(p.spp), field(p.cost.wall), field(p.cost.cpu), field(p.seconds),
-                           field(p.relmse), field(root(p.mse)), estimate, p.last ? 1 : 0);
+        out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene),
+                           entrant_field(race, lane.entrant), results.first_seed + lane.seed, field(p.spp),
+                           field(p.cost.wall), field(p.cost.cpu), field(p.seconds), field(p.relmse),
+                           field(root(p.mse)), estimate, p.last ? 1 : 0);
       }
   return out;
 }
@@ -54,9 +57,10 @@ std::string summary_csv(const Results& results) {
       "slope_lo,slope_hi,ratio,ratio_lo,ratio_hi,spread\n";
   for (const Race& race : results.races)
     for (const Row& row : rows_of(race))
-      out += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), entrant_field(race, row.entrant),
-                         row.seeds, field(row.spp), field(row.seconds), fields(row.relmse),
-                         fields(row.efficiency), fields(row.slope), fields(row.ratio), field(row.spread));
+      out +=
+          fmt::format("{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), entrant_field(race, row.entrant),
+                      row.seeds, field(row.spp), field(row.seconds), fields(row.relmse),
+                      fields(row.efficiency), fields(row.slope), fields(row.ratio), field(row.spread));
   return out;
 }
 
@@ -64,9 +68,10 @@ std::string forecasts_csv(const Results& results) {
   std::string out = "scene,entrant,seed,spp,spent,target,predicted,lo,hi,actual,within\n";
   for (const Race& race : results.races)
     for (const Prediction& p : predictions_of(race))
-      out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene), entrant_field(race, p.entrant),
-                         results.first_seed + p.seed, field(p.spp), field(p.spent), field(p.target), field(p.predicted),
-                         field(p.lo), field(p.hi), field(p.actual.value_or(NAN)), p.within() ? 1 : 0);
+      out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(race.scene),
+                         entrant_field(race, p.entrant), results.first_seed + p.seed, field(p.spp),
+                         field(p.spent), field(p.target), field(p.predicted), field(p.lo), field(p.hi),
+                         field(p.actual.value_or(NAN)), p.within() ? 1 : 0);
   return out;
 }
 

@@ -15,8 +15,9 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   if (head.starts_with("BM")) return decode_bmp(name, file, max_pixels);
   if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file, max_pixels);
   if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file, max_pixels);
-  return fail(Errc::invalid_argument,
-              fmt::format("'{}': is no PNG, JPEG, BMP, OpenEXR or Radiance HDR image (by its first bytes)", name));
+  return fail(
+      Errc::invalid_argument,
+      fmt::format("'{}': is no PNG, JPEG, BMP, OpenEXR or Radiance HDR image (by its first bytes)", name));
 }
 
 Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,

@@ -1,5 +1,5 @@
-// PNG, JPEG, BMP, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels is
-// refused (resource_exhausted) before memory is spent on it.
+// PNG, JPEG, BMP, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels
+// is refused (resource_exhausted) before memory is spent on it.
 #pragma once
 
 #include <cstddef>

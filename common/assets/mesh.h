@@ -1,4 +1,5 @@
-// Wavefront OBJ, Stanford PLY and Mitsuba's `.serialized`. Polygons become fans of triangles from their first corner, as in Mitsuba.
+// Wavefront OBJ, Stanford PLY and Mitsuba's `.serialized`. Polygons become fans of triangles from their first
+// corner, as in Mitsuba.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +25,8 @@ Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> fi
 Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
                                  std::span<const std::byte> file);
 
-// Mitsuba's `.serialized`, versions 3 and 4: mesh number `index` of the file. Vertex colours are skipped over.
+// Mitsuba's `.serialized`, versions 3 and 4: mesh number `index` of the file. Vertex colours are skipped
+// over.
 bool is_serialized(std::span<const std::byte> file);
 Result<MeshData> decode_serialized(std::string_view name, std::span<const std::byte> file, int index);
 

@@ -18,29 +18,32 @@ tl::unexpected<Error> bad_grid(std::string_view name, const std::string& text) {
 // Without values.
 Result<GridData> read_grid_header(std::string_view name, ByteReader& r, std::size_t size) {
   if (size < kHeader)
-    return bad_grid(name, fmt::format("{} bytes are too few for the header of a .bin grid: {}", size, kHeader));
+    return bad_grid(name,
+                    fmt::format("{} bytes are too few for the header of a .bin grid: {}", size, kHeader));
   GridData g;
   g.channels = 1;
   std::uint64_t count = 1;
   for (std::uint32_t* side : {&g.nx, &g.ny, &g.nz}) {
     const auto n = *r.take<std::int32_t>();
     if (n < 2 || static_cast<std::uint32_t>(n) > kMaxGridSide)
-      return bad_grid(name, fmt::format("has {} nodes along an axis; 2 to {} are allowed. A .bin grid begins with "
-                                   "three int32, little endian",
-                                   n, kMaxGridSide));
+      return bad_grid(name,
+                      fmt::format("has {} nodes along an axis; 2 to {} are allowed. A .bin grid begins with "
+                                  "three int32, little endian",
+                                  n, kMaxGridSide));
     count *= * side = static_cast<std::uint32_t>(n);
   }
   for (auto* corner : {&g.bbox_min, &g.bbox_max})
     for (float& x : *corner) x = *r.take<float>();
   for (std::size_t a = 0; a < 3; ++a)
     if (!std::isfinite(g.bbox_min[a]) || !std::isfinite(g.bbox_max[a]) || !(g.bbox_min[a] < g.bbox_max[a]))
-      return bad_grid(name, fmt::format("has a box from {} to {} along axis {}", g.bbox_min[a], g.bbox_max[a], a));
+      return bad_grid(name,
+                      fmt::format("has a box from {} to {} along axis {}", g.bbox_min[a], g.bbox_max[a], a));
   if (count > kMaxGridValues)
     return fail(Errc::resource_exhausted,
                 fmt::format("'{}': {} values, more than the limit of {}", name, count, kMaxGridValues));
   if (r.left() != count * sizeof(float))
-    return bad_grid(name, fmt::format("{} x {} x {} nodes need {} bytes after the header, but {} are there", g.nx,
-                                 g.ny, g.nz, count * sizeof(float), r.left()));
+    return bad_grid(name, fmt::format("{} x {} x {} nodes need {} bytes after the header, but {} are there",
+                                      g.nx, g.ny, g.nz, count * sizeof(float), r.left()));
   return g;
 }
 
@@ -60,7 +63,7 @@ Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byt
     float v = *r.take<float>();
     if (!std::isfinite(v))
       return bad_grid(name, fmt::format("the node ({}, {}, {}) is {}; repair the grid", x, y, z,
-                                   std::isnan(v) ? "not a number" : "infinite"));
+                                        std::isnan(v) ? "not a number" : "infinite"));
     if (v < 0) {
       v = 0;
       ++g.negatives;

@@ -41,14 +41,16 @@ Result<Header> read_vol_header(std::string_view name, ByteReader& r, std::size_t
     return bad_vol(name, fmt::format("{} bytes are too few for a .vol header of {}", size, kHeader));
   const auto magic = *r.take<std::array<char, 3>>();
   const int version = *r.take<std::uint8_t>();
-  if (magic != std::array{'V', 'O', 'L'}) return bad_vol(name, "does not begin with \"VOL\": not a Mitsuba grid");
+  if (magic != std::array{'V', 'O', 'L'})
+    return bad_vol(name, "does not begin with \"VOL\": not a Mitsuba grid");
   if (version != 3)
     return bad_vol(name, fmt::format("is version {} of the .vol format; only 3 is known", version));
   Header h;
   h.type = *r.take<std::int32_t>();
   if (bytes_of(h.type) == 0)
-    return bad_vol(name, fmt::format("has value type {} at byte 4; known are 1 (float32), 2 (float16), 3 (uint8)",
-                                 h.type));
+    return bad_vol(
+        name,
+        fmt::format("has value type {} at byte 4; known are 1 (float32), 2 (float16), 3 (uint8)", h.type));
   std::uint32_t* const sides[] = {&h.grid.nx, &h.grid.ny, &h.grid.nz};
   h.count = 1;
   for (std::uint32_t* side : sides) {
@@ -68,7 +70,7 @@ Result<Header> read_vol_header(std::string_view name, ByteReader& r, std::size_t
     if (!std::isfinite(h.grid.bbox_min[a]) || !std::isfinite(h.grid.bbox_max[a]) ||
         !(h.grid.bbox_min[a] < h.grid.bbox_max[a]))
       return bad_vol(name, fmt::format("has a bounding box from {} to {} along axis {}", h.grid.bbox_min[a],
-                                   h.grid.bbox_max[a], a));
+                                       h.grid.bbox_max[a], a));
   if (h.count > kMaxGridValues)
     return fail(Errc::resource_exhausted,
                 fmt::format("'{}': {} values, more than the limit of {}", name, h.count, kMaxGridValues));
@@ -94,8 +96,8 @@ Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> fi
     if (!std::isfinite(v)) {
       const std::uint64_t voxel = i / g.channels;
       return bad_vol(name, fmt::format("the voxel ({}, {}, {}) is {}; repair the grid", voxel % g.nx,
-                                   voxel / g.nx % g.ny, voxel / g.nx / g.ny,
-                                   std::isnan(v) ? "not a number" : "infinite"));
+                                       voxel / g.nx % g.ny, voxel / g.nx / g.ny,
+                                       std::isnan(v) ? "not a number" : "infinite"));
     }
     if (v < 0) {
       v = 0;

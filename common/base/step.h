@@ -1,5 +1,6 @@
-// Named steps of a unit's life, at which the chaos tests kill a process: with LIGHTSHAFT_KILL_AT=STEP or STEP:N in its
-// environment it is gone, as by kill -9, when it comes to this step (for the N-th time). Otherwise a step costs a comparison.
+// Named steps of a unit's life, at which the chaos tests kill a process: with LIGHTSHAFT_KILL_AT=STEP or
+// STEP:N in its environment it is gone, as by kill -9, when it comes to this step (for the N-th time).
+// Otherwise a step costs a comparison.
 #pragma once
 
 #include <string_view>
@@ -9,9 +10,9 @@ namespace ls {
 // In the order of a unit's life.
 inline constexpr std::string_view kSteps[] = {
     // coordinator                            worker
-    "lease-sent",        "lease-received",   "unit-rendered",       "result-sent",    "result-arrived",
-    "result-checked",    "result-appended",  "result-durable",      "result-folded",  "result-acknowledged",
-    "acknowledged-seen", "checkpoint-stored", "snapshot-written",   "image-written",  "job-done",
+    "lease-sent",        "lease-received",    "unit-rendered",    "result-sent",   "result-arrived",
+    "result-checked",    "result-appended",   "result-durable",   "result-folded", "result-acknowledged",
+    "acknowledged-seen", "checkpoint-stored", "snapshot-written", "image-written", "job-done",
 };
 
 void step(std::string_view name);

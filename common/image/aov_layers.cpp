@@ -10,7 +10,6 @@
 namespace ls {
 namespace {
 
-
 std::size_t pixels_of(FrameSize size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }

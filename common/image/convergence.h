@@ -53,10 +53,10 @@ const char* to_string(Judgement::Kind kind);
 //
 // Bias floor: of the true error that part which the estimated one lacks is a squared bias, if it is there,
 // and does not fall with samples; what chance puts between the two falls as they do, but for what the
-// reference's own noise puts there: that stays, too. It is told where the last true error is above the estimated
-// one by four standard deviations of the interval's logarithm and of the reference's noise together (chance: once
-// in 30,000), and has kept more of its excess since half the samples or fewer than the root of their ratio, which
-// is half way between staying and falling like 1/N.
+// reference's own noise puts there: that stays, too. It is told where the last true error is above the
+// estimated one by four standard deviations of the interval's logarithm and of the reference's noise together
+// (chance: once in 30,000), and has kept more of its excess since half the samples or fewer than the root of
+// their ratio, which is half way between staying and falling like 1/N.
 Judgement judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {

@@ -24,15 +24,17 @@ constexpr double kLargeShare = 0.1;  // of one pixel, where there are many
 constexpr double kHeavy = 10;
 constexpr double kOneSided = 19;  // light of one half over that of the other: few hits
 
-// What skewed noise takes off the sum of relative squares in the mean (the header has the derivation). Summed by
-// columns, so that the loop is one of vectors.
-double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier, const RelativeWeights& w) {
+// What skewed noise takes off the sum of relative squares in the mean (the header has the derivation). Summed
+// by columns, so that the loop is one of vectors.
+double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
+               const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
   const auto width = static_cast<std::size_t>(now.width);
   std::vector<double> columns(width);
   double* sums = columns.data();
   for (std::size_t row = 0; row < now.a.size(); row += width) {
-    const double *a = &now.a[row], *b = &now.b[row], *a1 = &earlier.halves.a[row], *b1 = &earlier.halves.b[row];
+    const double *a = &now.a[row], *b = &now.b[row], *a1 = &earlier.halves.a[row],
+                 *b1 = &earlier.halves.b[row];
     const double *roots = &w.roots[row], *leans = &w.leans[row];
     for (std::size_t x = 0; x < width; ++x) {
       // Each half's part of the mean: a = last * a_n + before * a_o.
@@ -41,8 +43,12 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
       const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
       const double most = 0.5 * roots[x] * roots[x], change = leans[x] * apart;
       const double up = last * change, down = -before * change;
-      sums[x] += of_last * (up < -most ? -most : most < up ? most : up) +
-                 of_before * (down < -most ? -most : most < down ? most : down);
+      sums[x] += of_last * (up < -most  ? -most
+                            : most < up ? most
+                                        : up) +
+                 of_before * (down < -most  ? -most
+                              : most < down ? most
+                                            : down);
     }
   }
   return std::accumulate(columns.begin(), columns.end(), 0.0);
@@ -72,7 +78,8 @@ void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
   const double few = std::min(kFewPixels, pixels / kPartOfSmall);
   if (!lit) {
     out.verdict =
-        "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to find for so "
+        "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to "
+        "find for so "
         "few samples";
   } else if (out.effective_pixels == 0) {
     out.trusted = out.spp >= 64;
@@ -149,7 +156,8 @@ void TileError::subtract_skew(double part) {
 
 namespace {
 
-// Pixels with light in both halves, which are almost all, in one loop of vectors; only black ones look around.
+// Pixels with light in both halves, which are almost all, in one loop of vectors; only black ones look
+// around.
 void count_hits(const HalfMeans& h, TileError& out) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   const double *a = h.a.data(), *b = h.b.data();

@@ -84,9 +84,9 @@ struct TileError {
   // with 2 hits half are told, with 5 one in 16, with 10 one in 500.)
   std::uint64_t few_hits = 0;
   std::uint64_t lit = 0;  // pixels in which a sample has found light
-  NoiseSums plain;     // of D
-  NoiseSums relative;  // of D / sqrt(window^2 + 0.01)
-  double skew = 0;     // what has been subtracted from relative.squares, since noise is skewed
+  NoiseSums plain;        // of D
+  NoiseSums relative;     // of D / sqrt(window^2 + 0.01)
+  double skew = 0;        // what has been subtracted from relative.squares, since noise is skewed
   void add(const TileError& other);
   void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
@@ -118,8 +118,8 @@ struct ImageError {
   double effective_pixels = 0;  // (sum x)^2 / sum x^2 of the relative error: how many pixels carry it
   double top_share = 0;         // share of the relative error that stands in one pixel
   std::uint64_t few_hits = 0;   // pixels
-  bool trusted = false;         // false: few pixels carry the error, or there is no light: the interval means little
-  std::string verdict;          // in words; empty when trusted
+  bool trusted = false;  // false: few pixels carry the error, or there is no light: the interval means little
+  std::string verdict;   // in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);
 

@@ -95,7 +95,8 @@ std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Sour
 std::map<std::string, std::string> strings_of(const Imf::Header& header) {
   std::map<std::string, std::string> out;
   for (auto at = header.begin(); at != header.end(); ++at)
-    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute())) out.emplace(at.name(), text->value());
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute()))
+      out.emplace(at.name(), text->value());
   return out;
 }
 

@@ -35,11 +35,12 @@ struct ExrLimits {
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
 // A file whole: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
-Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path, const ExrLimits& limits = {});
+Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,
+                                              const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
-// The same with the standard error of each value, where the part has layers stderr.R, stderr.G and stderr.B at
-// full resolution; `error` is empty where it has not.
+// The same with the standard error of each value, where the part has layers stderr.R, stderr.G and stderr.B
+// at full resolution; `error` is empty where it has not.
 struct RgbWithError {
   RgbImage image;
   std::vector<float> error;                    // interleaved as image.rgb
@@ -74,8 +75,8 @@ class ByteSink {
   virtual ~ByteSink() = default;
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
-// A picture that comes in bands of whole rows, from the top: each of them as a picture of as many rows, all with the
-// same channels and without strings. The file is that of the whole picture.
+// A picture that comes in bands of whole rows, from the top: each of them as a picture of as many rows, all
+// with the same channels and without strings. The file is that of the whole picture.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;

@@ -54,8 +54,8 @@ void read_pixels(Imf::InputFile& file, FinalPicture& image) {
     image.spp.resize(first + pixels);
     Imf::FrameBuffer buffer;
     const auto insert = [&](const char* layer, float* to) {
-      buffer.insert(layer, Imf::Slice::Make(Imf::FLOAT, to, {0, y0}, image.size.width, rows, 3 * sizeof(float),
-                                            3 * sizeof(float) * width));
+      buffer.insert(layer, Imf::Slice::Make(Imf::FLOAT, to, {0, y0}, image.size.width, rows,
+                                            3 * sizeof(float), 3 * sizeof(float) * width));
     };
     for (std::size_t c = 0; c < 3; ++c) {
       insert(kColours[c], &image.rgb[3 * first + c]);

@@ -23,9 +23,10 @@ std::vector<half> to_half(const std::vector<float>& values) {
 }
 
 Imf::PixelType type_of(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel) {
-  return std::visit(overloaded{[](const ExrHalf&) { return Imf::HALF; }, [](const ExrFloat&) { return Imf::FLOAT; },
-                               [](const ExrUint&) { return Imf::UINT; }},
-                    channel);
+  return std::visit(
+      overloaded{[](const ExrHalf&) { return Imf::HALF; }, [](const ExrFloat&) { return Imf::FLOAT; },
+                 [](const ExrUint&) { return Imf::UINT; }},
+      channel);
 }
 
 Result<void> check(const ExrPicture& picture) {
@@ -48,22 +49,24 @@ void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   };
   for (const auto& entry : rows.channels) {
     const std::string& name = entry.first;
-    std::visit(
-        overloaded{
-            [&](const ExrHalf& c) { add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data()); },
-            [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); },
-            [&](const ExrUint& c) { add(name, Imf::UINT, c.values.data()); }},
-        entry.second);
+    std::visit(overloaded{[&](const ExrHalf& c) {
+                            add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data());
+                          },
+                          [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); },
+                          [&](const ExrUint& c) { add(name, Imf::UINT, c.values.data()); }},
+               entry.second);
   }
   file.setFrameBuffer(buffer);
   file.writePixels(rows.size.height);
 }
 
-Imf::Header header_of(FrameSize size, const ExrPicture& like, const std::map<std::string, std::string>& strings) {
+Imf::Header header_of(FrameSize size, const ExrPicture& like,
+                      const std::map<std::string, std::string>& strings) {
   Imf::Header header(size.width, size.height, 1, {0, 0}, 1, Imf::INCREASING_Y, Imf::ZIP_COMPRESSION);
   header.zipCompressionLevel() = kZipLevel;
   for (const auto& [name, text] : strings) header.insert(name, Imf::StringAttribute(text));
-  for (const auto& [name, channel] : like.channels) header.channels().insert(name, Imf::Channel(type_of(channel)));
+  for (const auto& [name, channel] : like.channels)
+    header.channels().insert(name, Imf::Channel(type_of(channel)));
   return header;
 }
 

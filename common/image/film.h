@@ -96,8 +96,8 @@ class Film {
   std::vector<std::byte> save() const;
   static Result<Film> load(std::span<const std::byte> bytes);
   std::vector<std::byte> save_tile(TileIndex tile) const;
-  // save_tile() of the tile as it is now, to be called later: it holds that one tile, where a copy of the film would
-  // hold all that are folded meanwhile.
+  // save_tile() of the tile as it is now, to be called later: it holds that one tile, where a copy of the
+  // film would hold all that are folded meanwhile.
   std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 

@@ -148,9 +148,7 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   return tile;
 }
 
-std::vector<std::byte> Film::save_tile(TileIndex tile) const {
-  return tile_bytes(tiles_[tile].get(), tile);
-}
+std::vector<std::byte> Film::save_tile(TileIndex tile) const { return tile_bytes(tiles_[tile].get(), tile); }
 
 std::function<std::vector<std::byte>()> Film::saver(TileIndex index) const {
   return [tile = tiles_[index], index] { return tile_bytes(tile.get(), index); };

@@ -94,7 +94,8 @@ std::uint64_t values_above_half(const Film& film) {
 namespace {
 
 // Of a film, or of one row of its tiles; without strings but those of the AOVs. Adds to `clamped`.
-ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool float_output, std::uint64_t& clamped) {
+ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool float_output,
+                      std::uint64_t& clamped) {
   Gathered planes = gather(film);
   ExrPicture picture{film.grid().frame, {}, {}};
   constexpr const char* kRgb[3] = {"R", "G", "B"};
@@ -113,7 +114,8 @@ ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool fl
 std::string pair_text(double lo, double hi) { return fmt::format("{:.9g} {:.9g}", lo, hi); }
 
 // What the film says of its own error; of an empty one there is nothing to say.
-void put_error(std::map<std::string, std::string>& strings, const Film& film, const std::optional<Judgement>& judgement) {
+void put_error(std::map<std::string, std::string>& strings, const Film& film,
+               const std::optional<Judgement>& judgement) {
   if (const auto missing = film.pixels_without_samples(); missing > 0)
     strings["lightshaft:pixels_without_samples"] = fmt::format("{}", missing);
   if (film.samples() == 0) return;
@@ -147,7 +149,8 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
 class MemorySink final : public ByteSink {
  public:
   Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
-    if (at + bytes.size() > this->bytes.size()) this->bytes.resize(static_cast<std::size_t>(at) + bytes.size());
+    if (at + bytes.size() > this->bytes.size())
+      this->bytes.resize(static_cast<std::size_t>(at) + bytes.size());
     std::copy(bytes.begin(), bytes.end(), this->bytes.begin() + static_cast<std::ptrdiff_t>(at));
     return {};
   }
@@ -156,11 +159,11 @@ class MemorySink final : public ByteSink {
 
 }  // namespace
 
-Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output, ByteSink& sink) {
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output,
+                                      ByteSink& sink) {
   std::uint64_t clamped = 0;
-  ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
-                   return picture_of(film.row(row), from.manifests, float_output, clamped);
-                 }};
+  ExrBands bands{film.grid().frame, strings_of(film, from),
+                 [&](int row) { return picture_of(film.row(row), from.manifests, float_output, clamped); }};
   if (!film.aovs().empty()) {  // names of identifiers, the same for every row
     std::uint64_t ignored = 0;
     bands.strings.merge(picture_of(film.row(0), from.manifests, float_output, ignored).strings);

@@ -22,9 +22,10 @@ namespace ls {
 // row by row, little endian. Pixels not rendered yet are zero.
 Digest pixels_sha256(const Film& film);
 
-// The header strings `lightshaft:...` of the final EXR; docs/error.md lists them. `:relmse`, `:relmse_ci95` ("LOW
-// HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and `:tiles` come
-// from the film; of one without a sample only the last. `:pixels_without_samples` stands there if there are any.
+// The header strings `lightshaft:...` of the final EXR; docs/error.md lists them. `:relmse`, `:relmse_ci95`
+// ("LOW HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and
+// `:tiles` come from the film; of one without a sample only the last. `:pixels_without_samples` stands there
+// if there are any.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
@@ -37,9 +38,9 @@ struct Provenance {
   MatteManifests manifests = {};
   double core_seconds = 0;   // CPU time of units; 0: not known, and not written
   std::string stopped = {};  // why there are no more samples, and what that means; empty: not written
-  std::optional<Judgement> judgement = {};          // knows of the curve, too, what the film alone does not
-  std::map<std::string, double> figures = {};       // more of them, by what follows "lightshaft:"
-  std::map<std::string, std::string> notes = {};    // the same in words
+  std::optional<Judgement> judgement = {};        // knows of the curve, too, what the film alone does not
+  std::map<std::string, double> figures = {};     // more of them, by what follows "lightshaft:"
+  std::map<std::string, std::string> notes = {};  // the same in words
 };
 struct FinalImage {
   std::vector<std::byte> exr;
@@ -48,8 +49,8 @@ struct FinalImage {
 // Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers. Works
 // on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
-// The same bytes into `sink`, made a row of tiles at a time: a large film's image takes no memory of its size. Returns
-// how many values were clamped.
+// The same bytes into `sink`, made a row of tiles at a time: a large film's image takes no memory of its
+// size. Returns how many values were clamped.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink);
 

@@ -1,4 +1,5 @@
-// Sums over the pixels of a tile: kept for each column, row after row, so that they are vectors, and added up at the end.
+// Sums over the pixels of a tile: kept for each column, row after row, so that they are vectors, and added up
+// at the end.
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -16,7 +17,7 @@ struct Values {
 };
 
 void add_squares(const Values& v, std::size_t width, double* __restrict squares, double* __restrict largest) {
-  const double *__restrict r = v.r, *__restrict g = v.g, *__restrict b = v.b;
+  const double* __restrict r = v.r, * __restrict g = v.g, * __restrict b = v.b;
   for (std::size_t x = 0; x < width; ++x) {
     const double sum = r[x] * r[x] + g[x] * g[x] + b[x] * b[x];
     squares[x] += sum;
@@ -26,7 +27,7 @@ void add_squares(const Values& v, std::size_t width, double* __restrict squares,
 
 void add_fourths(const Values& v, std::size_t width, double* __restrict channel, double* __restrict pixel,
                  double* __restrict edge_channel, double* __restrict edge_pixel) {
-  const double *__restrict r = v.r, *__restrict g = v.g, *__restrict b = v.b, *__restrict edges = v.edges;
+  const double* __restrict r = v.r, * __restrict g = v.g, * __restrict b = v.b, * __restrict edges = v.edges;
   for (std::size_t x = 0; x < width; ++x) {
     const double rr = r[x] * r[x], gg = g[x] * g[x], bb = b[x] * b[x], sum = rr + gg + bb;
     const double fourth = rr * rr + gg * gg + bb * bb, square = sum * sum;
@@ -38,21 +39,29 @@ void add_fourths(const Values& v, std::size_t width, double* __restrict channel,
 }
 
 struct Columns {
-  Line squares, channel_fourth, pixel_fourth, pair_covariance, pair_variance, edge_channel_fourth, edge_pixel_fourth, flat_pairs,
-      largest;
+  Line squares, channel_fourth, pixel_fourth, pair_covariance, pair_variance, edge_channel_fourth,
+      edge_pixel_fourth, flat_pairs, largest;
   explicit Columns(std::size_t width)
-      : squares(width), channel_fourth(width), pixel_fourth(width), pair_covariance(width), pair_variance(width),
-        edge_channel_fourth(width), edge_pixel_fourth(width), flat_pairs(width), largest(width) {}
+      : squares(width),
+        channel_fourth(width),
+        pixel_fourth(width),
+        pair_covariance(width),
+        pair_variance(width),
+        edge_channel_fourth(width),
+        edge_pixel_fourth(width),
+        flat_pairs(width),
+        largest(width) {}
 
   void add_pixels(const Values& v) {
     const std::size_t width = squares.size();
     add_squares(v, width, squares.data(), largest.data());
-    add_fourths(v, width, channel_fourth.data(), pixel_fourth.data(), edge_channel_fourth.data(), edge_pixel_fourth.data());
+    add_fourths(v, width, channel_fourth.data(), pixel_fourth.data(), edge_channel_fourth.data(),
+                edge_pixel_fourth.data());
   }
 
   // Each pixel with the one before it.
   void add_pairs(const Values& v) {
-    double *__restrict covariance = pair_covariance.data(), *__restrict variance = pair_variance.data();
+    double* __restrict covariance = pair_covariance.data(), * __restrict variance = pair_variance.data();
     const std::size_t width = squares.size();
     for (std::size_t x = 1; x < width; ++x) {
       const double r = v.r[x], g = v.g[x], b = v.b[x], r1 = v.r[x - 1], g1 = v.g[x - 1], b1 = v.b[x - 1];
@@ -62,9 +71,10 @@ struct Columns {
     }
   }
 
-  // (D(p) . D(q))^2 of the neighbours beside (from x on: with the one before and the one behind), above and below, 0
-  // where there is none.
-  void add_flat(const double* edges, const Line& beside, const Line& above, const Line& below, bool first, bool last) {
+  // (D(p) . D(q))^2 of the neighbours beside (from x on: with the one before and the one behind), above and
+  // below, 0 where there is none.
+  void add_flat(const double* edges, const Line& beside, const Line& above, const Line& below, bool first,
+                bool last) {
     const std::size_t width = squares.size();
     const double upright = (first ? 0 : 1) + (last ? 0 : 1);
     const double *before = beside.data(), *up = above.data(), *down = below.data();
@@ -92,7 +102,8 @@ double total(const Line& row) { return std::accumulate(row.begin(), row.end(), 0
 
 }  // namespace
 
-NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width, int height) {
+NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
+                     int height) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height), n = w * h;
   const auto row = [&](std::size_t y) {
     const double* at = &values[y * w];

@@ -49,7 +49,8 @@ Result<void> check_magic(ByteCursor& in) {
   const auto magic = in.value<std::uint32_t>(), version = in.value<std::uint32_t>();
   if (!magic || !version) return refuse_partial("the file ends in its first 8 bytes");
   if (*magic != 20000630u) return refuse_partial("not an EXR file (wrong magic number)");
-  if ((*version & 0xff) != 2) return refuse_partial(fmt::format("file version {}, expected 2", *version & 0xff));
+  if ((*version & 0xff) != 2)
+    return refuse_partial(fmt::format("file version {}, expected 2", *version & 0xff));
   if (*version & 0x200) return refuse_partial("it is tiled; a partial has scanlines");
   if (*version & 0x800) return refuse_partial("it has deep data");
   if (*version & 0x1000) return refuse_partial("it has several parts; a partial has one");
@@ -207,7 +208,8 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
       lines(exr.subspan(shape.pixels_at + height * 8));
   for (std::size_t y = 0; y < height; ++y) {
     const std::uint64_t at = shape.pixels_at + height * 8 + y * (8 + line);
-    if (table.value<std::uint64_t>() != at) return refuse_partial(fmt::format("line table: entry {} is wrong", y));
+    if (table.value<std::uint64_t>() != at)
+      return refuse_partial(fmt::format("line table: entry {} is wrong", y));
     if (lines.value<std::int32_t>() != t.y0 + static_cast<std::int32_t>(y) ||
         lines.value<std::int32_t>() != static_cast<std::int32_t>(line))
       return refuse_partial(fmt::format("line {}: wrong number or size", y));
@@ -227,8 +229,8 @@ Result<UnitHeader> read_header(const Shape& shape) {
     return refuse_partial(
         fmt::format("dataWindow {} is not the unit's tile {}", show(*shape.data), show(header->tile)));
   if (header->tile.x1 > shape.display->x1 || header->tile.y1 > shape.display->y1)
-    return refuse_partial(fmt::format("tile {} is not inside the frame {}x{}", show(header->tile), shape.display->x1,
-                              shape.display->y1));
+    return refuse_partial(fmt::format("tile {} is not inside the frame {}x{}", show(header->tile),
+                                      shape.display->x1, shape.display->y1));
   return header;
 }
 
@@ -243,8 +245,8 @@ Result<void> check_unit(const UnitHeader& got, const UnitHeader& want) {
   if (got.tile != want.tile)
     return refuse_partial(fmt::format("it is of tile {}, expected {}", show(got.tile), show(want.tile)));
   if (got.samples != want.samples)
-    return refuse_partial(fmt::format("it has samples [{}, {}), expected [{}, {})", got.samples.s0, got.samples.s1,
-                              want.samples.s0, want.samples.s1));
+    return refuse_partial(fmt::format("it has samples [{}, {}), expected [{}, {})", got.samples.s0,
+                                      got.samples.s1, want.samples.s0, want.samples.s1));
   return {};
 }
 
@@ -268,7 +270,8 @@ Result<void> all_finite(const Partial& partial) {
     const std::string name = plane < kPartialChannels
                                  ? kPartialChannelNames[plane]
                                  : planes_of(partial.aovs).names[plane - kPartialChannels];
-    return refuse_partial(fmt::format("channel {} of {} is {}", name, pixel_name(t, i % pixels), partial.sums[i]));
+    return refuse_partial(
+        fmt::format("channel {} of {} is {}", name, pixel_name(t, i % pixels), partial.sums[i]));
   }
   return {};
 }
@@ -300,8 +303,9 @@ Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader&
   const auto shape = read_shape(exr);
   if (!shape) return tl::unexpected(shape.error());
   if (shape->aovs != aovs)
-    return refuse_partial(fmt::format("it has the AOVs [{}], expected [{}]", fmt::join(names_of(shape->aovs), ", "),
-                              fmt::join(names_of(aovs), ", ")));
+    return refuse_partial(fmt::format("it has the AOVs [{}], expected [{}]",
+                                      fmt::join(names_of(shape->aovs), ", "),
+                                      fmt::join(names_of(aovs), ", ")));
   const PixelRect& display = *shape->display;
   if (display.x1 != frame.width || display.y1 != frame.height)
     return refuse_partial(

@@ -54,7 +54,9 @@ Result<Reference> read_reference(std::span<const std::byte> exr, const std::stri
   if (bad > 0) return refuse(name, fmt::format("{} of its values are NaN or infinite", bad));
   if (std::any_of(read->error.begin(), read->error.end(), [](float v) { return !(v >= 0) || std::isinf(v); }))
     return refuse(name, "its layers stderr.R, stderr.G, stderr.B hold values that are no standard errors");
-  return Reference{image.size, std::move(read->image.rgb), std::move(read->error),
+  return Reference{image.size,
+                   std::move(read->image.rgb),
+                   std::move(read->error),
                    {read->strings["lightshaft:scene"], read->strings["lightshaft:seed"]}};
 }
 
@@ -93,7 +95,9 @@ TrueError true_error(const Reference& reference, std::span<const float> rgb) {
   }
   const auto values = static_cast<double>(std::max<std::size_t>(1, rgb.size()));
   TrueError out{std::sqrt(std::max(0.0, squares / values)), std::max(0.0, relative / values)};
-  if (known) out.mse_stderr = std::sqrt(squares_variance) / values, out.relmse_stderr = std::sqrt(relative_variance) / values;
+  if (known)
+    out.mse_stderr = std::sqrt(squares_variance) / values,
+    out.relmse_stderr = std::sqrt(relative_variance) / values;
   return out;
 }
 

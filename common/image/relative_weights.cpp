@@ -8,9 +8,9 @@
 namespace ls {
 namespace {
 
-constexpr double kDark = 0.01;          // of relMSE's denominator
-constexpr std::size_t kWindowReach = 2;       // of the 5 x 5 window
-constexpr double kSignificant = 9;      // three standard deviations, squared
+constexpr double kDark = 0.01;           // of relMSE's denominator
+constexpr std::size_t kWindowReach = 2;  // of the 5 x 5 window
+constexpr double kSignificant = 9;       // three standard deviations, squared
 
 // Room whose first values nobody reads: to set it would take as long as the sums.
 class Room {
@@ -31,7 +31,10 @@ inline double smaller(double a, double b) { return b < a ? b : a; }
 class Windows {
  public:
   Windows(std::size_t width, std::size_t height)
-      : width_(width), height_(height), padded_(width + 2 * kWindowReach), rows_(width * (height + 2 * kWindowReach)) {}
+      : width_(width),
+        height_(height),
+        padded_(width + 2 * kWindowReach),
+        rows_(width * (height + 2 * kWindowReach)) {}
 
   void sum(const double* values, double* __restrict sums) {
     const std::size_t w = width_;
@@ -53,7 +56,8 @@ class Windows {
 };
 
 double span_of(std::size_t i, std::size_t count) {
-  return static_cast<double>(std::min(count - 1, i + kWindowReach) - (i > kWindowReach ? i - kWindowReach : 0) + 1);
+  return static_cast<double>(std::min(count - 1, i + kWindowReach) -
+                             (i > kWindowReach ? i - kWindowReach : 0) + 1);
 }
 
 // f = 1 / (m^2 + c) less f" s2 / 2, within [f/2, 2f]; f" = (6 m^2 - 2 c) / (m^2 + c)^3.
@@ -65,10 +69,11 @@ inline double corrected(double m, double f, double s2) {
 struct Channel {
   std::size_t size;
   Room own, square, noise, own_sum, square_sum, noise_sum;
-  explicit Channel(std::size_t n) : size(n), own(n), square(n), noise(n), own_sum(n), square_sum(n), noise_sum(n) {}
+  explicit Channel(std::size_t n)
+      : size(n), own(n), square(n), noise(n), own_sum(n), square_sum(n), noise_sum(n) {}
 
   void read(const double* a, const double* b, Windows& windows) {
-    double *__restrict s = own.at(0), *__restrict s2 = square.at(0), *__restrict d2 = noise.at(0);
+    double* __restrict s = own.at(0), * __restrict s2 = square.at(0), * __restrict d2 = noise.at(0);
     for (std::size_t i = 0; i < size; ++i) {
       const double mean = 0.5 * (a[i] + b[i]), d = a[i] - b[i];
       s[i] = mean;
@@ -118,7 +123,8 @@ void weigh_alone(const HalfMeans& h, RelativeWeights& out) {
 double relative_weight(double m, double s2) { return corrected(m, 1 / (m * m + kDark), s2); }
 
 RelativeWeights relative_weights(const HalfMeans& h) {
-  const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height), n = width * height;
+  const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height),
+             n = width * height;
   RelativeWeights out{std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(n)};
   if (n == 1) {
     weigh_alone(h, out);

@@ -1,5 +1,5 @@
-// What a picture may be at most: the same for scenes, jobs, the protocol and the coordinator, so that what one
-// of them takes the others do not refuse.
+// What a picture may be at most: the same for scenes, jobs, the protocol and the coordinator, so that what
+// one of them takes the others do not refuse.
 #pragma once
 
 #include <cstdint>

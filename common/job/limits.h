@@ -16,11 +16,11 @@ inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
 inline constexpr double kMaxSeconds = 1e9;  // of a time budget
 inline constexpr double kMaxTargetError = 1e6;
-inline constexpr int kMaxPriority = 1'000'000;                      // either sign
-inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;  // of a spec or settings text
-inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;                // workers or units that a job may hold
+inline constexpr int kMaxPriority = 1'000'000;                       // either sign
+inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;   // of a spec or settings text
+inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;               // workers or units that a job may hold
 inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 50;  // bytes asked of a worker
-inline constexpr std::size_t kMaxNames = 64;                        // aov, tags
+inline constexpr std::size_t kMaxNames = 64;                         // aov, tags
 inline constexpr std::size_t kMaxNameBytes = 64;
 inline constexpr std::size_t kMaxDefines = 1024, kMaxDefineBytes = 65536;
 

@@ -38,8 +38,8 @@ Result<SealedImage> read_sealed_image(std::span<const std::byte> exr, const std:
 // How many samples the tile's pixels say they have. invalid_argument: they do not agree.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The first pixel of the tile whose colour, or else its standard error, is not that of the film, as final_exr()
-// would store it.
+// The first pixel of the tile whose colour, or else its standard error, is not that of the film, as
+// final_exr() would store it.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string what;  // "colour" or "standard error"

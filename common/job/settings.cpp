@@ -58,7 +58,8 @@ void read_reference(Fields& fields, JobSpec& spec) {
   const Json* v = fields.find("reference");
   if (!v) return;
   spec.reference = v->is_string() ? Digest::parse(v->get_ref<const std::string&>()) : std::nullopt;
-  if (!spec.reference) return fields.wrong("reference", "must be the SHA-256 of a blob, 64 hexadecimal digits");
+  if (!spec.reference)
+    return fields.wrong("reference", "must be the SHA-256 of a blob, 64 hexadecimal digits");
   if (spec.frames && spec.frames->count() > 1)
     fields.wrong("reference", "is one image, and the job has several frames: submit them one by one");
 }

@@ -44,11 +44,11 @@ struct JobSpec {
   int priority = 0;
   bool float_output = false;
   std::vector<std::string> tags;
-  std::optional<FrameRange> frames;  // a sequence: one film per frame; absent: one image
+  std::optional<FrameRange> frames;          // a sequence: one film per frame; absent: one image
   std::optional<std::uint32_t> max_workers;  // that may render it at once
   std::optional<std::uint32_t> max_units;    // of work lent to workers at once
   std::optional<std::uint64_t> memory;       // bytes that a worker must have; at least its files' anyway
-  std::optional<Digest> reference;   // blob of the right image, an EXR of the job's size
+  std::optional<Digest> reference;           // blob of the right image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };
 

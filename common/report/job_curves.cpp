@@ -26,7 +26,8 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Of the error at a checkpoint. What each was worth is not kept: in doubt about the last there is none at all.
+// Of the error at a checkpoint. What each was worth is not kept: in doubt about the last there is none at
+// all.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
@@ -97,8 +98,8 @@ std::string table(const std::vector<Json>& points, bool doubt) {
   if (!doubt) column("95 % interval");
   if (truth) column("True relMSE");
   if (flip) column("FLIP");
-  const std::string title =
-      points.size() > kMostRows ? fmt::format("The last {} of {} points as a table", kMostRows, points.size())
+  const std::string title = points.size() > kMostRows
+                                ? fmt::format("The last {} of {} points as a table", kMostRows, points.size())
                                 : "The points as a table";
   return fmt::format(
       "<details><summary>{}</summary><div class=\"wide\"><table><caption "
@@ -148,7 +149,8 @@ std::string curves(const Json& report) {
   for (const Clock& clock : {kWall, kCores})
     body += fmt::format("<figure><figcaption>Against {}</figcaption>{}</figure>", clock.name,
                         svg_of(plot_of(report, points, clock)));
-  body += "</div><p class=\"note\">" + slope(report) + outlook(report) + "</p>" + table(points, doubtful(report));
+  body +=
+      "</div><p class=\"note\">" + slope(report) + outlook(report) + "</p>" + table(points, doubtful(report));
   return section("Error against time", body);
 }
 

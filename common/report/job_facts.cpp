@@ -117,8 +117,7 @@ std::string provenance(const Json& report) {
       row("Pixels (SHA-256)", text(report, "pixels_sha256"), true) +
       row("Numeric class", text(report, "numeric_class"), true) + row("Build", text(report, "build")) +
       row("Integrator", text(report, "integrator")) + row("Seed", whole(number(report, "seed"))) +
-      asked(report) +
-      row("Threads", threads_words(number(report, "threads"))) +
+      asked(report) + row("Threads", threads_words(number(report, "threads"))) +
       row("Reference", text(member(report, "reference"), "digest"), true);
   std::string warnings;
   for (const std::string& warning : texts(report, "warnings")) warnings += escape_html(warning) + "\n";

@@ -21,7 +21,8 @@ std::string unreached(const Json& report) {
 
 std::string one_seed(const Json& report) {
   if (!flag(member(report, "reference"), "same_seed", false)) return "";
-  return "The reference shares this job&#39;s seed: its noise is the same noise, and the true figures say nothing. "
+  return "The reference shares this job&#39;s seed: its noise is the same noise, and the true figures say "
+         "nothing. "
          "Render it with another --seed.";
 }
 
@@ -50,7 +51,8 @@ std::string verdict(const Json& report) {
   } else if (objects(report, "convergence").empty()) {  // else it stands under the curves
     out += paragraph("note", verdict_words(report));
   }
-  return out + paragraph("note", unreached(report)) + paragraph("note", one_seed(report)) + paragraph("note", escape_html(text(report, "note")));
+  return out + paragraph("note", unreached(report)) + paragraph("note", one_seed(report)) +
+         paragraph("note", escape_html(text(report, "note")));
 }
 
 std::string failure(const Json& report) {

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
-constexpr double kHalfLabel = 25;  // of the widest label of time, which must not leave the drawing
-constexpr double kLetter = 7.4;    // mean width of one, in the legend
+constexpr double kHalfLabel = 25;       // of the widest label of time, which must not leave the drawing
+constexpr double kLetter = 7.4;         // mean width of one, in the legend
 constexpr double kFarthestAhead = 100;  // times the last x: a forecast beyond it is not drawn
 constexpr std::string_view kNothing =
     "The first point appears when every tile has finished a round of samples.";

@@ -39,8 +39,8 @@ constexpr ChannelRow kChannels[] = {
 std::span<const ChannelRow> channels() { return kChannels; }
 
 const ChannelRow* channel_row(std::string_view theirs) {
-  const auto* it =
-      std::find_if(std::begin(kChannels), std::end(kChannels), [&](const auto& r) { return r.theirs == theirs; });
+  const auto* it = std::find_if(std::begin(kChannels), std::end(kChannels),
+                                [&](const auto& r) { return r.theirs == theirs; });
   return it == std::end(kChannels) ? nullptr : it;
 }
 
@@ -50,9 +50,10 @@ std::string mitsuba_channels(std::string_view aovs) {
     const auto end = std::min(aovs.find(','), aovs.size());
     const std::string_view name = aovs.substr(0, end);
     aovs.remove_prefix(std::min(end + 1, aovs.size()));
-    const auto* row =
-        std::find_if(std::begin(kChannels), std::end(kChannels), [&](const auto& r) { return r.ours == name; });
-    out += fmt::format("{}{}:{}", out.empty() ? "" : ",", name, row == std::end(kChannels) ? name : row->theirs);
+    const auto* row = std::find_if(std::begin(kChannels), std::end(kChannels),
+                                   [&](const auto& r) { return r.ours == name; });
+    out +=
+        fmt::format("{}{}:{}", out.empty() ? "" : ",", name, row == std::end(kChannels) ? name : row->theirs);
   }
   return out;
 }

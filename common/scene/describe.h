@@ -77,12 +77,13 @@ LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alte
 LS_TYPE(PeakTexture, "texture", "peak", "",
         "the largest channel of another texture, or its colour divided by that; not in Mitsuba: Nori's "
         "`microfacet_tex` is made of it")
-LS_TYPE(MeshAttributeTexture, "texture", "mesh_attribute", "",
-        "what a `ply` mesh carries at its vertices, interpolated over each triangle, or at its faces: one "
-        "number or three. Its properties `r g b` or `red green blue` (maybe with an `alpha`, left out) are the "
-        "attribute `color`; one or three of a kind like `foo_x foo_y foo_z`, `foo_0 foo_1 foo_2` or `foo_1 "
-        "foo_2 foo_3` are `foo`; `foo_r foo_g foo_b` are `foo_color`. As in Mitsuba 3.9, floats count as they "
-        "are, `uchar` from 0 to 255 (so give `scale` = 1/255), and other whole numbers as sRGB codes")
+LS_TYPE(
+    MeshAttributeTexture, "texture", "mesh_attribute", "",
+    "what a `ply` mesh carries at its vertices, interpolated over each triangle, or at its faces: one "
+    "number or three. Its properties `r g b` or `red green blue` (maybe with an `alpha`, left out) are the "
+    "attribute `color`; one or three of a kind like `foo_x foo_y foo_z`, `foo_0 foo_1 foo_2` or `foo_1 "
+    "foo_2 foo_3` are `foo`; `foo_r foo_g foo_b` are `foo_color`. As in Mitsuba 3.9, floats count as they "
+    "are, `uchar` from 0 to 255 (so give `scale` = 1/255), and other whole numbers as sRGB codes")
 LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
 LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
@@ -178,7 +179,6 @@ template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
 // ---- names of enumerators
-// -------------------------------------------------------------------------------------------
 template <class E>
 struct Named {
   std::string_view name;

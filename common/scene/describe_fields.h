@@ -8,7 +8,6 @@
 namespace ls::scene {
 
 // ---- textures
-// -------------------------------------------------------------------------------------------------------
 template <class V, Of<ConstantTexture> T>
 void describe(V& v, T& t) {
   v.field({.name = "value", .doc = "the colour"}, t.value);
@@ -44,12 +43,12 @@ void describe(V& v, T& t) {
 
 template <class V, Of<MeshAttributeTexture> T>
 void describe(V& v, T& t) {
-  v.field({.name = "name", .doc = "of the attribute, with `vertex_` or `face_` in front", .required = true}, t.name);
+  v.field({.name = "name", .doc = "of the attribute, with `vertex_` or `face_` in front", .required = true},
+          t.name);
   v.field({.name = "scale", .doc = "multiplies it", .range = kNonNegative}, t.scale);
 }
 
 // ---- volumes and media
-// ----------------------------------------------------------------------------------------------
 template <class V, Of<ConstVolume> T>
 void describe(V& v, T& s) {
   v.field({.name = "value", .doc = "the value", .range = kNonNegative}, s.value);
@@ -183,7 +182,6 @@ void describe(V& v, T& m) {
 }
 
 // ---- emitters
-// -------------------------------------------------------------------------------------------------------
 template <class V, Of<AreaEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "emitted radiance", .range = kNonNegative}, e.radiance);
@@ -269,7 +267,6 @@ void describe(V& v, T& e) {
 }
 
 // ---- integrator
-// ---------------------------------------------------------------------------------------
 template <class V, Of<IntegratorSettings> T>
 void describe(V& v, T& i) {
   v.field({.name = "name",

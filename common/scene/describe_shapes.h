@@ -6,7 +6,6 @@
 namespace ls::scene {
 
 // ---- shapes
-// ---------------------------------------------------------------------------------------------------------
 template <class V, Of<RectangleShape> T>
 void describe(V&, T&) {}
 template <class V, Of<CubeShape> T>
@@ -76,7 +75,6 @@ void describe(V& v, T& s) {
 }
 
 // ---- camera, film
-// ---------------------------------------------------------------------------------------
 template <class V, Of<BoxFilter> T>
 void describe(V& v, T& f) {
   v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);

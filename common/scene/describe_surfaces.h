@@ -16,7 +16,6 @@ void describe_multiple_scattering(V& v, T& b) {
 }
 
 // ---- surfaces
-// -------------------------------------------------------------------------------------------------------
 template <class V, Of<DiffuseBsdf> T>
 void describe(V& v, T& b) {
   v.field(

@@ -20,7 +20,10 @@ std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   if (row.ours != "path")
     p.push_back({"inmedium", kBoolean, "false", "the camera is in the medium of the mesh around it"});
   if (!row.max_depth)
-    p.push_back({"maxDepth", kInteger, "-1", "longest path in segments, as `max_depth`; -1: no limit",
+    p.push_back({"maxDepth",
+                 kInteger,
+                 "-1",
+                 "longest path in segments, as `max_depth`; -1: no limit",
                  {.min = -1, .max = kMaxDepthSetting}});
   if (row.name == "photonmapper")
     for (const std::string_view name : {"photonCount", "photonRadius"})

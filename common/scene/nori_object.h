@@ -63,7 +63,7 @@ class Object {
   std::vector<Child> children_;
 };
 
-// ---- elements in Mitsuba's words -------------------------------------------------------------------------
+// ---- elements in Mitsuba's words
 // A new one stands where the one stands that it comes of.
 Element made(std::string tag, std::string_view type, const Span& at);
 void set(Element& e, std::string attribute, std::string value, const Span& at);

@@ -171,7 +171,8 @@ void Reader::unbound_constant_density(const Element& e) {
     return report_.error(e.at,
                          "the density of this medium is the same everywhere: write it as a medium "
                          "\"homogeneous\" to give it an emission");
-  scene_.media.back() = HomogeneousMedium{*density, *albedo, medium.scale, medium.phase, {}, {}, medium.priority};
+  scene_.media.back() =
+      HomogeneousMedium{*density, *albedo, medium.scale, medium.phase, {}, {}, medium.priority};
 }
 
 }  // namespace ls::scene

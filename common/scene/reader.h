@@ -139,7 +139,7 @@ class Reader {
   std::vector<std::optional<Bounds>> texture_bounds_;  // of the first textures of scene_
   std::vector<BsdfTraits> bsdf_traits_;                // of the first bsdfs of scene_
 
-  bool reads_attributes_ = false;                      // some texture so far does
+  bool reads_attributes_ = false;                     // some texture so far does
   std::map<TextureIndex, TextureIndex> old_numbers_;  // by the textures as they were read
   Memo<TextureIndex> textures_;
   Memo<BsdfIndex> bsdfs_;

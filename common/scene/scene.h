@@ -18,7 +18,6 @@
 namespace ls {
 
 // ---- textures
-// -------------------------------------------------------------------------------------------------------
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
 
@@ -63,10 +62,9 @@ using Texture =
     std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture, MeshAttributeTexture>;
 
 // ---- surfaces
-// -------------------------------------------------------------------------------------------------------
 enum class Microfacet { beckmann, ggx };
-// Rough surfaces with multiple_scattering also send on the light that microfacets throw onto each other, which
-// the model leaves out (docs/multiple-scattering.md). Their roughness is one constant.
+// Rough surfaces with multiple_scattering also send on the light that microfacets throw onto each other,
+// which the model leaves out (docs/multiple-scattering.md). Their roughness is one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -168,7 +166,6 @@ using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, Dielec
                           BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf>;
 
 // ---- volumes and media
-// ----------------------------------------------------------------------------------------------
 // As a density it fills the unit cube [0,1]^3 of its local space, moved by to_world; as anything else it is
 // everywhere.
 struct ConstVolume {
@@ -235,7 +232,6 @@ struct HeterogeneousMedium {
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
 // ---- emitters without a shape
-// ---------------------------------------------------------------------------------------
 struct ConstantEmitter {  // radiance from everywhere
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
@@ -286,7 +282,6 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
                              ProjectorEmitter>;
 
 // ---- integrator
-// ---------------------------------------------------------------------------------------
 struct IntegratorSettings {
   std::string name = "volpath";  // ours: "volpath", "volpath_distant_mis" or "path"
   int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light

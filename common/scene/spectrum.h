@@ -26,8 +26,8 @@ Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
 // From CIE 1931 X, Y, Z.
 Rgb linear_srgb(const std::array<double, 3>& xyz);
 
-// X, Y, Z of a black body by Planck's law [W/(m^2 sr nm)], in the units of linear_srgb(): 1 at all wavelengths
-// would be X = Y = Z = 1. kelvin > 0.
+// X, Y, Z of a black body by Planck's law [W/(m^2 sr nm)], in the units of linear_srgb(): 1 at all
+// wavelengths would be X = Y = Z = 1. kelvin > 0.
 std::array<double, 3> black_body_xyz(double kelvin);
 
 // Of light of the same power at all wavelengths whose luminance is 1: X = Y = Z = 1, which is not white.

@@ -11,9 +11,10 @@ namespace ls::scene {
 // medium. `scene` is consistent. Paths begin at the camera, in the sensor's medium, and are in another's once
 // they leave a surface to its side, reflected or not. So there are two reasons:
 // - The surface is black behind: no path leaves it to that side, whatever comes there.
-// - It is a sphere or cube that lets nothing through, with neither the camera, nor anything that shines, nor a surface
-//   that light passes in it or on it. Only rounding takes a path into one (round an edge of a cube), and there it
-//   finds no light.
+// - It is a sphere or cube that lets nothing through, with neither the camera, nor anything that shines, nor
+// a surface
+//   that light passes in it or on it. Only rounding takes a path into one (round an edge of a cube), and
+//   there it finds no light.
 std::vector<bool> unreachable_interiors(const Scene& scene);
 
 }  // namespace ls::scene

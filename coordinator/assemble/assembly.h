@@ -1,5 +1,6 @@
 // One job's image in the making: the film, the accepted partials that wait for an earlier round, the error
-// figures, the costs. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside of it.
+// figures, the costs. Not thread-safe; the service holds its lock. image() is a cheap copy to work on outside
+// of it.
 #pragma once
 
 #include <atomic>
@@ -52,7 +53,10 @@ class Assembly {
   Assembly(TileGrid grid, bool keep_relative, AovSet aovs = {})
       : film_(grid, aovs), errors_(grid.count(), keep_relative), costs_(grid.count()) {}
   Assembly(Film film, RoundErrors errors, HealthBook health)
-      : film_(std::move(film)), errors_(std::move(errors)), health_(std::move(health)), costs_(film_.grid().count()) {}
+      : film_(std::move(film)),
+        errors_(std::move(errors)),
+        health_(std::move(health)),
+        costs_(film_.grid().count()) {}
 
   // Keeps a partial until take(). Its pixels are dropped, if it has a place, when those of all jobs that wait
   // take kMaxPendingPartials; then they are read from the log again.

@@ -28,16 +28,19 @@ Health HealthBook::total() const {
 // A line for each tile's full rounds, then one for each tail: "f" or "t", the tile and its health.
 std::string HealthBook::save() const {
   std::string text;
-  for (const auto& [tile, health] : full_) text += "f " + std::to_string(tile) + " " + canonical_json(health) + "\n";
-  for (const auto& [tile, health] : tails_) text += "t " + std::to_string(tile) + " " + canonical_json(health) + "\n";
+  for (const auto& [tile, health] : full_)
+    text += "f " + std::to_string(tile) + " " + canonical_json(health) + "\n";
+  for (const auto& [tile, health] : tails_)
+    text += "t " + std::to_string(tile) + " " + canonical_json(health) + "\n";
   return text;
 }
 
 std::string HealthBook::save_tile(TileIndex tile) const {
   const auto line = [&](char kind, const std::map<TileIndex, Health>& of) {
     const auto found = of.find(tile);
-    return found == of.end() ? std::string()
-                             : std::string{kind, ' '} + std::to_string(tile) + " " + canonical_json(found->second) + "\n";
+    return found == of.end()
+               ? std::string()
+               : std::string{kind, ' '} + std::to_string(tile) + " " + canonical_json(found->second) + "\n";
   };
   return line('f', full_) + line('t', tails_);
 }

@@ -37,7 +37,8 @@ json reference_of(const ReportFacts& facts, const std::optional<TrueFigures>& tr
           {"relmse", truth ? number(truth->relmse) : json()},
           {"flip", truth && truth->flip ? number(*truth->flip) : json()},
           {"same_seed", facts.job.reference_same_seed},
-          // The difference to the reference is no larger than its own noise: how wrong the image is it cannot tell.
+          // The difference to the reference is no larger than its own noise: how wrong the image is it cannot
+          // tell.
           {"below_noise", truth && truth->relmse_below_noise()},
           {"rmse_below_noise", truth && truth->rmse_below_noise()},
           {"mse_stderr", truth ? number(truth->mse_stderr) : json()},

@@ -18,7 +18,8 @@ namespace ls::coordinator {
 struct ReportFacts {
   StoredJob job;  // with totals as of now
   std::uint64_t samples = 0;
-  std::optional<ImageError> error;  // of the image as it is, of those pixels that have a sample; nothing: none has
+  std::optional<ImageError>
+      error;  // of the image as it is, of those pixels that have a sample; nothing: none has
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
   std::uint64_t clamped_values = 0;  // in the final EXR
@@ -36,8 +37,8 @@ struct Efficiency {
   std::optional<double> wall, per_core;  // 1 / (relMSE x seconds), and x core seconds
 };
 Efficiency efficiency_of(const ReportFacts& facts);
-// Of the final EXR's header besides those of the film: slope, efficiency, efficiency_per_core, target_error, true_rmse,
-// true_relmse, as far as they are known.
+// Of the final EXR's header besides those of the film: slope, efficiency, efficiency_per_core, target_error,
+// true_rmse, true_relmse, as far as they are known.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
 // true_below_noise and reference_same_seed, where they are so.
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);

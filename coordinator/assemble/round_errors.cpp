@@ -29,7 +29,8 @@ TileError RoundErrors::at(std::span<const RoundIndex> rounds) const {
 
 bool RoundErrors::knows(std::span<const RoundIndex> rounds) const {
   for (std::size_t i = 0; i < tiles_.size(); ++i)
-    if (rounds[i] > 0 && (tiles_[i].rounds.empty() || tiles_[i].rounds.front().first >= rounds[i])) return false;
+    if (rounds[i] > 0 && (tiles_[i].rounds.empty() || tiles_[i].rounds.front().first >= rounds[i]))
+      return false;
   return true;
 }
 

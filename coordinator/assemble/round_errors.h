@@ -27,7 +27,7 @@ class RoundErrors {
   TileError at(std::span<const RoundIndex> rounds) const;
   // Whether at() is what it was when these rounds were the last: nothing that it needs has been forgotten.
   bool knows(std::span<const RoundIndex> rounds) const;
-  void discard(TileIndex tile) { tiles_[tile] = {}; }  // it is folded again from round 0
+  void discard(TileIndex tile) { tiles_[tile] = {}; }         // it is folded again from round 0
   void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
 
   // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.

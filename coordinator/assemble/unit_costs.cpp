@@ -21,8 +21,8 @@ double UnitCosts::until(std::span<const RoundIndex> rounds) {
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
     Tile& t = tiles_[i];
     if (rounds[i] <= t.summed) continue;
-    const auto end =
-        t.ahead.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(rounds[i] - t.summed, t.ahead.size()));
+    const auto end = t.ahead.begin() +
+                     static_cast<std::ptrdiff_t>(std::min<std::size_t>(rounds[i] - t.summed, t.ahead.size()));
     sum_ = std::accumulate(t.ahead.begin(), end, sum_);
     t.ahead.erase(t.ahead.begin(), end);
     t.summed = rounds[i];

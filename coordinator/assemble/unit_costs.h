@@ -1,4 +1,5 @@
-// What the units of an image took: a checkpoint's cost is that of the units in it, though others are ahead already.
+// What the units of an image took: a checkpoint's cost is that of the units in it, though others are ahead
+// already.
 #pragma once
 
 #include <span>

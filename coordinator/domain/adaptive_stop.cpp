@@ -198,7 +198,8 @@ RoundIndex AdaptiveStop::foreseen(TileIndex tile) const {
 
 double AdaptiveStop::variance(TileIndex tile) const {
   const Group& g = groups_[group_of_[tile]];
-  return g.sums.empty() ? std::numeric_limits<double>::quiet_NaN() : variance(g, static_cast<RoundIndex>(g.sums.size() - 1));
+  return g.sums.empty() ? std::numeric_limits<double>::quiet_NaN()
+                        : variance(g, static_cast<RoundIndex>(g.sums.size() - 1));
 }
 
 double AdaptiveStop::samples_lacking(const Group& g, RoundIndex last) const {

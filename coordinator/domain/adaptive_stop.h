@@ -84,12 +84,12 @@ class AdaptiveStop {
   void foresee(double target);
   // Rounds of the tile that will probably be wanted; never fewer than those that surely are.
   RoundIndex foreseen(TileIndex tile) const;
-  // Of the tile's group, per sample, as told by its last round: with it, in whole rounds, the rule's order of gains can be
-  // foretold. NaN: not known.
+  // Of the tile's group, per sample, as told by its last round: with it, in whole rounds, the rule's order of
+  // gains can be foretold. NaN: not known.
   double variance(TileIndex tile) const;
   // Samples of all pixels that these still lack; nothing: not foreseen yet.
   std::optional<double> samples_left() const;
-  double samples_to_limit() const;  // that all pixels lack to the most there are
+  double samples_to_limit() const;                            // that all pixels lack to the most there are
   std::uint64_t rounds_seen() const { return rounds_seen_; }  // of all groups
   std::size_t groups() const { return groups_.size(); }
 
@@ -102,9 +102,9 @@ class AdaptiveStop {
     RoundIndex foreseen = 0;   // probably the last one
     bool settled = false;      // and it is this one, at this level
   };
-  double variance(const Group& g, RoundIndex round) const;  // per sample, as told by rounds 0..round
+  double variance(const Group& g, RoundIndex round) const;        // per sample, as told by rounds 0..round
   double samples_lacking(const Group& g, RoundIndex last) const;  // of its pixels, with rounds up to this one
-  double gain(const Group& g) const;                        // of one more round after `stop`
+  double gain(const Group& g) const;                              // of one more round after `stop`
   double measured() const;  // relMSE with the last rounds, which must be known
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }
   void advance(Group& g);

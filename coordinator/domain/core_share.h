@@ -1,7 +1,7 @@
-// How much of a core each thread of a worker gets, measured from what its results report: CPU seconds, and seconds that
-// the thread waited meanwhile for a core (other programs, a nice value, more threads than cores) or for memory from the
-// disk. Costs are CPU seconds (cost_model.h); this makes seconds of the clock of them. Decides the size of leases, their
-// deadlines and forecasts, never a pixel.
+// How much of a core each thread of a worker gets, measured from what its results report: CPU seconds, and
+// seconds that the thread waited meanwhile for a core (other programs, a nice value, more threads than cores)
+// or for memory from the disk. Costs are CPU seconds (cost_model.h); this makes seconds of the clock of them.
+// Decides the size of leases, their deadlines and forecasts, never a pixel.
 #pragma once
 
 #include <algorithm>

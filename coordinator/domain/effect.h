@@ -93,7 +93,8 @@ struct ReopenRound {
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
-  std::uint64_t unaudited = 0;  // results that were to be rendered again, and no other worker of the class was there
+  std::uint64_t unaudited =
+      0;  // results that were to be rendered again, and no other worker of the class was there
 };
 // For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to
 // `failed`.
@@ -114,15 +115,16 @@ struct WorkerBlocked {
   JobId job;
   std::string why;
 };
-// This worker rendered wrong pixels, as two others say: it gets no more work of any job, and nothing it sends is
-// taken. To be stored before what follows is carried out; none of its results may be taken up after a restart.
+// This worker rendered wrong pixels, as two others say: it gets no more work of any job, and nothing it sends
+// is taken. To be stored before what follows is carried out; none of its results may be taken up after a
+// restart.
 struct WorkerDistrusted {
   WorkerId worker;
   UnitKey unit;  // that it was found by
   std::string evidence;
 };
-// The film of this tile is void, since a worker that is not trusted has rendered some of it: it is folded again
-// from round 0. No result of it that was accepted so far counts.
+// The film of this tile is void, since a worker that is not trusted has rendered some of it: it is folded
+// again from round 0. No result of it that was accepted so far counts.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;
@@ -132,8 +134,9 @@ struct WorkerForgotten {
   WorkerId worker;
 };
 
-using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch,
-                            JobPinned, JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed,
-                            WorkerStateChanged, WorkerBlocked, WorkerDistrusted, TileDiscarded, WorkerForgotten>;
+using Effect =
+    std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
+                 JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed, WorkerStateChanged,
+                 WorkerBlocked, WorkerDistrusted, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

@@ -38,7 +38,6 @@ struct JobPlan {
 };
 
 // ---- jobs
-// -----------------------------------------------------------------------------------------------------------
 struct JobSubmitted {
   JobPlan plan;
 };
@@ -109,8 +108,7 @@ struct JobForgotten {
 };
 
 // ---- workers
-// -------------------------------------------------------------------------------------------------------- A
-// stream has been registered. An older stream of the same worker counts as lost.
+// A stream has been registered. An older stream of the same worker counts as lost.
 struct WorkerJoined {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -118,11 +116,11 @@ struct WorkerJoined {
   Digest numeric_class;
   int threads = 1;
   std::vector<std::string> tags;
-  std::uint64_t memory_bytes = 0;   // that its renderer may use; 0: not told, then it is given anything
-  std::vector<Digest> blobs_held;   // in its cache, the most recently used first
+  std::uint64_t memory_bytes = 0;  // that its renderer may use; 0: not told, then it is given anything
+  std::vector<Digest> blobs_held;  // in its cache, the most recently used first
 };
-// Known to have rendered wrong pixels, from before a restart or by another coordinator: it gets no work, and what it has
-// rendered of jobs that are here is void.
+// Known to have rendered wrong pixels, from before a restart or by another coordinator: it gets no work, and
+// what it has rendered of jobs that are here is void.
 struct WorkerBarred {
   WorkerId worker;
   std::string why;
@@ -139,8 +137,8 @@ struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;
 };
-// A result of this worker's has come and waits until the coordinator has room for it; behind it all else that the
-// worker says waits, too. That is no fault of the worker's: its leases go on.
+// A result of this worker's has come and waits until the coordinator has room for it; behind it all else that
+// the worker says waits, too. That is no fault of the worker's: its leases go on.
 struct ResultsWait {
   WorkerId worker;
 };
@@ -150,7 +148,6 @@ struct LeaseCameBack {
 };
 
 // ---- units
-// ----------------------------------------------------------------------------------------------------------
 // A verified and durable result. Raised once per arrival; the farm sorts out duplicates.
 struct UnitAccepted {
   UnitKey unit;
@@ -177,9 +174,9 @@ struct UnitFailed {
 // Raised regularly (about once a second): deadlines, speculation, forgiveness, time budgets.
 struct Tick {};
 
-using Event =
-    std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
-                 JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerBarred, WorkerLost,
-                 WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped,
+                           JobPriority, JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerBarred,
+                           WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, UnitAccepted,
+                           UnitFolded, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -54,8 +54,8 @@ std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
     if (a.failure.sample) text += fmt::format(" sample {}", *a.failure.sample);
   }
   if (last.pixel) {
-    text += ". Replay it with: " + replay_command(replay, last.pixel->first, last.pixel->second,
-                                                  last.sample.value_or(samples.s0));
+    text += ". Replay it with: " +
+            replay_command(replay, last.pixel->first, last.pixel->second, last.sample.value_or(samples.s0));
   }
   return text;
 }

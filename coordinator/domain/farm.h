@@ -54,13 +54,13 @@ struct JobFigures {
   std::uint64_t units_folded = 0;
   RoundIndex rounds_complete = 0;  // folded over all tiles
   int priority = 0;
-  // Predicted for what is not done, from measured cost; 0: nothing measured yet, or not foreseen when its target is
-  // reached.
+  // Predicted for what is not done, from measured cost; 0: nothing measured yet, or not foreseen when its
+  // target is reached.
   double core_seconds_left = 0;
   double core_seconds_to_limit = 0;  // the same until all samples are there, whatever the error
   double cores = 0;                  // of the workers that hold leases of it, by its share of their leases
-  double core_seconds_queued = 0;  // of those, predicted for units that no worker has
-  double seconds_per_sample = 0;  // mean CPU seconds per pixel sample; 0: nothing measured yet
+  double core_seconds_queued = 0;    // of those, predicted for units that no worker has
+  double seconds_per_sample = 0;     // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
 };

@@ -97,7 +97,8 @@ std::string audit_job_load(const Job& job, Lent& lent, const ShareLimits& limits
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
     return fmt::format("{}: charged with {} s, lent {} s", name, job.charge_out, charge);
   const bool alone = plan.group.empty();  // else the limits are the group's
-  return audit_load(name, job.load, lent.jobs[job.seq], alone ? tighter(plan.max_units, limits.units_per_job) : 0,
+  return audit_load(name, job.load, lent.jobs[job.seq],
+                    alone ? tighter(plan.max_units, limits.units_per_job) : 0,
                     alone ? tighter(plan.max_workers, limits.workers_per_job) : 0);
 }
 
@@ -105,7 +106,8 @@ std::string audit_loads(const std::string& what, const std::map<std::string, Loa
                         std::map<std::string, Load>& counted, std::uint32_t units, std::uint32_t workers) {
   if (counted.size() != kept.size()) return "a " + what + " that has nothing lent is counted";
   for (const auto& [name, load] : kept)
-    if (std::string wrong = audit_load(what + " " + name, load, counted[name], units, workers); !wrong.empty())
+    if (std::string wrong = audit_load(what + " " + name, load, counted[name], units, workers);
+        !wrong.empty())
       return wrong;
   return "";
 }
@@ -116,8 +118,8 @@ std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
   const State& s = *state_;
   std::size_t of_workers = 0, of_jobs = 0, units = 0;
   for (const auto& [index, w] : s.workers.all())
-    of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() + w->warmed_up.size() +
-                  w->failures.size();
+    of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() +
+                  w->warmed_up.size() + w->failures.size();
   for (const auto& [seq, job] : s.jobs) {
     of_jobs += job->out.size() + job->audits.size() + job->marks.size() + job->queue.returned_count() +
                job->load.leases_at.size();
@@ -170,7 +172,8 @@ std::string Farm::audit() const {
   if (wrong.empty())
     wrong = audit_loads("group", state.groups, lent.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
-  // The book adds and subtracts as workers come, go and are measured: some 2^-52 of the farm's threads are lost each time.
+  // The book adds and subtracts as workers come, go and are measured: some 2^-52 of the farm's threads are
+  // lost each time.
   if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }

@@ -124,7 +124,8 @@ void Farm::State::take_up_again(Job& job) {
   work_appeared = true;
   // Of what has ended nothing was void: as an image it stood.
   for (const auto& [worker, why] : barred)
-    if (const WorkerIndex liar = workers.index_of(worker); !job.units.tiles_of(liar).empty()) void_results(job, liar);
+    if (const WorkerIndex liar = workers.index_of(worker); !job.units.tiles_of(liar).empty())
+      void_results(job, liar);
   if (job.adaptive) judge(job);
   job.move_windows(workers.threads());
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);

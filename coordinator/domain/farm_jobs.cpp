@@ -29,7 +29,8 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  work_appeared |= units && !job.has_units;  // it may stand there already for an audit that not everyone can do
+  work_appeared |=
+      units && !job.has_units;  // it may stand there already for an audit that not everyone can do
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
     work_appeared |= shares.offer(job);
@@ -100,7 +101,8 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
-  // What is in hand is finished; the rest comes back at once. The last first: a lease waits behind earlier ones.
+  // What is in hand is finished; the rest comes back at once. The last first: a lease waits behind earlier
+  // ones.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);

@@ -27,7 +27,8 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   lease.units = std::move(units);
   lease.seconds_per_unit = sum / lease.remaining;
   lease.charge_per_unit = job.cost.known() ? lease.seconds_per_unit : kAssumedUnitSeconds;
-  lease.predicted = from_seconds(std::max(longest / worker.core_share.get(), (worker.seconds_out + sum) / worker.cores()));
+  lease.predicted =
+      from_seconds(std::max(longest / worker.core_share.get(), (worker.seconds_out + sum) / worker.cores()));
   lease.deadline = now + from_seconds(kDeadlineFactor * seconds(lease.predicted)) + kDeadlineSlack +
                    (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
 

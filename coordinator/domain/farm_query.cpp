@@ -96,12 +96,14 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
     const double planned = samples_of_last(f.units_total - f.units_done);
     f.core_seconds_left =
         (job->steered() ? job->adaptive->samples_left().value_or(0) : planned) * f.seconds_per_sample;
-    f.core_seconds_to_limit = (job->steered() ? job->adaptive->samples_to_limit() : planned) * f.seconds_per_sample;
+    f.core_seconds_to_limit =
+        (job->steered() ? job->adaptive->samples_to_limit() : planned) * f.seconds_per_sample;
     f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
   }
   for (const auto& [index, leases] : job->load.leases_at) {
     const Worker& w = *state_->workers.all().at(index);
-    f.cores += w.cores() * static_cast<double>(leases) / static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
+    f.cores += w.cores() * static_cast<double>(leases) /
+               static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
   }
   f.first_ray = job->first_ray;
   f.numeric_class = job->numeric_class;
@@ -196,7 +198,8 @@ std::vector<JobRestored::Audit> Farm::open_audits(const JobId& id) const {
   if (job == nullptr) return open;
   for (const auto& [code, audit] : job->audits) {
     open.push_back({tile_of(code), round_of(code), std::nullopt});
-    if (audit.second) open.back().second = {state_->workers.name_of(audit.second->first), audit.second->second};
+    if (audit.second)
+      open.back().second = {state_->workers.name_of(audit.second->first), audit.second->second};
   }
   return open;
 }

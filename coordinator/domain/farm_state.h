@@ -28,7 +28,7 @@ struct Farm::State {
   std::map<JobSeq, std::unique_ptr<Job>> jobs;
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
-  ShareBook shares;                   // the jobs with something to lease, and whose turn it is
+  ShareBook shares;                    // the jobs with something to lease, and whose turn it is
   std::map<std::string, Load> users;   // by owner; the administrator is none
   std::map<std::string, Load> groups;  // of jobs that have one
   std::map<WorkerId, std::string> barred;
@@ -132,8 +132,9 @@ struct Farm::State {
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
   void leave_load(Job& job, const Worker& worker);  // one lease less
-  // Units of the job that the limits still allow the worker. Audits pass them: they are the farm's doing, not the
-  // user's, and one that had to wait for the user's other work would keep a finished image from being said to be so.
+  // Units of the job that the limits still allow the worker. Audits pass them: they are the farm's doing, not
+  // the user's, and one that had to wait for the user's other work would keep a finished image from being
+  // said to be so.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // is the unit still out under it?
@@ -159,7 +160,8 @@ struct Farm::State {
   bool may_pin(const Job& job, const Worker& worker) const;
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
-  // What is only probably wanted waits until the worker, with so many units besides those it holds, has next to nothing.
+  // What is only probably wanted waits until the worker, with so many units besides those it holds, has next
+  // to nothing.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
   // At a job's tail: what lies untouched behind other work is better begun by a worker that has none. True if

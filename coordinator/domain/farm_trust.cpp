@@ -1,7 +1,7 @@
-// Which workers are believed. A share of the results, chosen by chance, is rendered again by another worker; copies
-// of slow units are compared, too. Only who was lent a unit has a say in what is right (witness_book.h). Where two
-// results of one unit differ a third worker decides, and who is alone is barred: every tile that it has touched, in any
-// job under way, is folded again from round 0.
+// Which workers are believed. A share of the results, chosen by chance, is rendered again by another worker;
+// copies of slow units are compared, too. Only who was lent a unit has a say in what is right
+// (witness_book.h). Where two results of one unit differ a third worker decides, and who is alone is barred:
+// every tile that it has touched, in any job under way, is folded again from round 0.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,8 +34,7 @@ Farm::State::Deciders Farm::State::deciders(const Job& job, const Audit& audit) 
 }
 
 void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
-  const double draw =
-      static_cast<double>(mixed(mixed(options.audit_seed ^ job.seq) ^ code) >> 11) * 0x1p-53;
+  const double draw = static_cast<double>(mixed(mixed(options.audit_seed ^ job.seq) ^ code) >> 11) * 0x1p-53;
   if (!(draw < options.audit_rate) || job.audits.size() >= kMaxAuditsOpen) return;
   Audit audit;
   audit.first = first;
@@ -50,7 +49,8 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// What was accepted and is doubted stays in doubt. Nobody is connected yet: workers have some time to come back.
+// What was accepted and is doubted stays in doubt. Nobody is connected yet: workers have some time to come
+// back.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -141,21 +141,21 @@ void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
   if (equal)
     effects.emplace_back(DropDuplicate{event.unit, event.worker});
   else
-    effects.emplace_back(DigestMismatch{event.unit, first.digest, event.digest,
-                                        workers.name_of(first.worker), event.worker});
+    effects.emplace_back(
+        DigestMismatch{event.unit, first.digest, event.digest, workers.name_of(first.worker), event.worker});
   if (job.ended()) return;
   equal ? agreed(job, code, event, asked) : disagreed(job, code, event, asked);
 }
 
 namespace {
 std::string contradiction(const UnitAccepted& now, const Digest& before) {
-  return fmt::format("it rendered tile {} round {} of job {} first to {}, then to {}", now.unit.tile, now.unit.round,
-                     now.unit.job.value, before.hex(), now.digest.hex());
+  return fmt::format("it rendered tile {} round {} of job {} first to {}, then to {}", now.unit.tile,
+                     now.unit.round, now.unit.job.value, before.hex(), now.digest.hex());
 }
 std::string outvoted(const UnitKey& unit, const Digest& said, const WorkerId& one, const WorkerId& other,
                      const Digest& truth) {
-  return fmt::format("it rendered tile {} round {} of job {} to {}; {} and {} both rendered it to {}", unit.tile,
-                     unit.round, unit.job.value, said.hex(), one.value, other.value, truth.hex());
+  return fmt::format("it rendered tile {} round {} of job {} to {}; {} and {} both rendered it to {}",
+                     unit.tile, unit.round, unit.job.value, said.hex(), one.value, other.value, truth.hex());
 }
 }  // namespace
 
@@ -210,8 +210,8 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
            outvoted(with.unit, first.digest, workers.name_of(second), with.worker, said));
 }
 
-// Who says by itself that an accepted result is wrong has chosen the unit: that is no vote. But another worker is
-// asked, and if that one says what the first one said, whoever claimed otherwise has lied.
+// Who says by itself that an accepted result is wrong has chosen the unit: that is no vote. But another
+// worker is asked, and if that one says what the first one said, whoever claimed otherwise has lied.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair said{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {
@@ -233,12 +233,13 @@ void Farm::State::undecided(Job& job, UnitCode code) {
   const UnitTable::Result first = *job.units.find(code);
   const auto second = *job.audits.at(code).second;
   fail(job,
-       fmt::format("two workers rendered tile {} round {} to different bits though they are of one numeric "
-                   "class: {} to {}, {} to {}, and no third one agrees with either. One of them has bad memory or "
-                   "is not what it says: let each render the scene alone with `lightshaft render`, take the one "
-                   "whose pixels_sha256 is not the others' off the farm, and submit the job again",
-                   tile_of(code), round_of(code), workers.name_of(first.worker).value, first.digest.hex(),
-                   workers.name_of(second.first).value, second.second.hex()),
+       fmt::format(
+           "two workers rendered tile {} round {} to different bits though they are of one numeric "
+           "class: {} to {}, {} to {}, and no third one agrees with either. One of them has bad memory or "
+           "is not what it says: let each render the scene alone with `lightshaft render`, take the one "
+           "whose pixels_sha256 is not the others' off the farm, and submit the job again",
+           tile_of(code), round_of(code), workers.name_of(first.worker).value, first.digest.hex(),
+           workers.name_of(second.first).value, second.second.hex()),
        std::nullopt);
 }
 

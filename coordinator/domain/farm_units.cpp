@@ -138,9 +138,9 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
   if (job.failures.exhausted(code, known)) return report(at_fault);
   if (known > 0 && willing == 0) {
-    return report(
-        fmt::format("{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
-                    kWorkerFailuresPerJob));
+    return report(fmt::format(
+        "{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
+        kWorkerFailuresPerJob));
   }
   if (was_blocked || !record.blocked_at(now)) return;
   effects.emplace_back(

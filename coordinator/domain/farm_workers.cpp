@@ -28,7 +28,8 @@ void Farm::State::on(const WorkerJoined& event) {
   std::sort(worker.tags.begin(), worker.tags.end());
   worker.memory_bytes = event.memory_bytes;
   worker.blobs.clear();
-  for (const Digest& blob : std::span(event.blobs_held).first(std::min(event.blobs_held.size(), kBlobsRemembered)))
+  for (const Digest& blob :
+       std::span(event.blobs_held).first(std::min(event.blobs_held.size(), kBlobsRemembered)))
     worker.blobs.push_back(head_of(blob));
   std::sort(worker.blobs.begin(), worker.blobs.end());
   const auto known = barred.find(event.worker);

@@ -1,6 +1,6 @@
-// Who gets what next. Higher priorities first, equal shares within one (share_book.h), previews first (the order of
-// unit codes); idle workers before those that already have something to do, and among them those that hold the
-// world; small pieces at a job's tail.
+// Who gets what next. Higher priorities first, equal shares within one (share_book.h), previews first (the
+// order of unit codes); idle workers before those that already have something to do, and among them those
+// that hold the world; small pieces at a job's tail.
 #include <algorithm>
 #include <limits>
 
@@ -27,7 +27,8 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
-  // With single units a worker of many threads would reach the most leases there may be before all have something to do.
+  // With single units a worker of many threads would reach the most leases there may be before all have
+  // something to do.
   const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
   const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
   const std::uint64_t most =
@@ -77,7 +78,8 @@ bool Farm::State::take_back_for_idle() {
   return false;
 }
 
-// It works through its leases in order: this one is not begun as long as earlier ones keep all its threads busy.
+// It works through its leases in order: this one is not begun as long as earlier ones keep all its threads
+// busy.
 bool Farm::State::untouched(const LeaseRecord& lease) const {
   std::uint32_t units = 0;
   for (const LeaseSeq seq : lease.worker->leases) {
@@ -140,22 +142,24 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// What a worker renders that is alone of its class nobody can check: a job goes to a class of several where there is
-// one. Where nothing is audited it does not matter.
+// What a worker renders that is alone of its class nobody can check: a job goes to a class of several where
+// there is one. Where nothing is audited it does not matter.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
   std::map<Digest, int> others;
   for (const auto& [index, other] : workers.all()) {
-    const bool there = other->connected && !other->draining && !other->sick_since && other->pause != Pause::silent &&
-                       other->pause != Pause::stuck && other->numeric_class != worker.numeric_class;
-    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1) return false;
+    const bool there = other->connected && !other->draining && !other->sick_since &&
+                       other->pause != Pause::silent && other->pause != Pause::stuck &&
+                       other->numeric_class != worker.numeric_class;
+    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1)
+      return false;
   }
   return true;
 }
 
-// The job whose turn it is, or one whose world the worker holds, if that has not had much more than its share: to
-// load a world costs time. A job that nobody renders does not wait for that. Null also if a job whose turn it is will take
-// the worker later: another's leases in between would keep it from that.
+// The job whose turn it is, or one whose world the worker holds, if that has not had much more than its
+// share: to load a world costs time. A job that nobody renders does not wait for that. Null also if a job
+// whose turn it is will take the worker later: another's leases in between would keep it from that.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -188,9 +192,12 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
 }
 
-// Lent early it would stand before what turns out to be wanted, and it would be the more likely to be dropped.
-bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const {
-  return !job.queue.wanted(code) && worker.units_out + units >= kUnitsAThread * static_cast<std::size_t>(worker.threads) &&
+// Lent early it would stand before what turns out to be wanted, and it would be the more likely to be
+// dropped.
+bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
+                            double cost) const {
+  return !job.queue.wanted(code) &&
+         worker.units_out + units >= kUnitsAThread * static_cast<std::size_t>(worker.threads) &&
          worker.seconds_until_free() + cost / worker.cores() >= kForeseenSeconds;
 }
 

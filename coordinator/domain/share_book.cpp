@@ -120,7 +120,8 @@ std::size_t ShareBook::kept() const {
   std::size_t count = levels_.size() + at_work_.size();
   for (const auto& [priority, level] : levels_) {
     count += level.users.size() + level.turns.size();
-    for (const auto& [name, user] : level.users) count += user.groups.size() + user.turns.size() + user.ready.size();
+    for (const auto& [name, user] : level.users)
+      count += user.groups.size() + user.turns.size() + user.ready.size();
   }
   return count;
 }

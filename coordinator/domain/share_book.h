@@ -1,11 +1,12 @@
-// Whose turn it is. Higher priorities go first; within one, users have equal shares, and within a user so have its
-// jobs (a sequence counts as one of them, its frames go in order). A share is measured in core seconds: those that
-// results have reported, and those that what is lent is predicted to take. Who has had least goes next (start-time
-// fair queueing, Goyal et al. 1996, with measured instead of declared lengths).
+// Whose turn it is. Higher priorities go first; within one, users have equal shares, and within a user so
+// have its jobs (a sequence counts as one of them, its frames go in order). A share is measured in core
+// seconds: those that results have reported, and those that what is lent is predicted to take. Who has had
+// least goes next (start-time fair queueing, Goyal et al. 1996, with measured instead of declared lengths).
 //
-// Who comes, or comes back, begins where the last one that was served stood: nobody saves up turns by waiting, and
-// nobody is made to pay for having had the farm alone. So of two users that both have work for all workers all the
-// time, the shares differ by no more than one lease each and what predictions were wrong by.
+// Who comes, or comes back, begins where the last one that was served stood: nobody saves up turns by
+// waiting, and nobody is made to pay for having had the farm alone. So of two users that both have work for
+// all workers all the time, the shares differ by no more than one lease each and what predictions were wrong
+// by.
 //
 // Every operation costs O(log jobs).
 #pragma once
@@ -39,9 +40,9 @@ class ShareBook {
   void leave(Job& job);
   void enter(Job& job);  // with what is lent of it
 
-  // Calls visit(job, lag) for the jobs in turn until it says true; lag: core seconds that the first user has had less
-  // than the job's, and the user's first group less than the job's; infinite at a lower priority. True if some visit
-  // said so.
+  // Calls visit(job, lag) for the jobs in turn until it says true; lag: core seconds that the first user has
+  // had less than the job's, and the user's first group less than the job's; infinite at a lower priority.
+  // True if some visit said so.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
   // The job is the one that was chosen: later comers begin where it stood.

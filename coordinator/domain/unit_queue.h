@@ -1,10 +1,11 @@
 // The units of a job that wait for a worker. Each tile has its own end, since tiles of an adaptive job stop
 // after different numbers of rounds. Of a tile wait all rounds from `next` to its end, and those before it
 // that came back. Lower rounds go first, so that a whole picture is there early. Of a job whose tiles stop by
-// their errors some rounds are only probably wanted: they go behind all that surely are, in the order in which the
-// stop rule would come to want them (adaptive_stop.h).
+// their errors some rounds are only probably wanted: they go behind all that surely are, in the order in
+// which the stop rule would come to want them (adaptive_stop.h).
 //
-// Every operation costs O(log tiles) at most, amortised; 20 bytes a tile, 60 where something is only probably wanted.
+// Every operation costs O(log tiles) at most, amortised; 20 bytes a tile, 60 where something is only probably
+// wanted.
 #pragma once
 
 #include <algorithm>
@@ -51,11 +52,13 @@ class UnitQueue {
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // Rounds of the tile before `before` are surely wanted, later ones the sooner the more each takes off the error per
-  // sample: `variance` (of the tile's pixels, per sample; NaN: unknown) over the samples before it and with it.
+  // Rounds of the tile before `before` are surely wanted, later ones the sooner the more each takes off the
+  // error per sample: `variance` (of the tile's pixels, per sample; NaN: unknown) over the samples before it
+  // and with it.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
-    const float weight = std::isnan(variance) ? std::numeric_limits<float>::infinity() : static_cast<float>(variance);
+    const float weight =
+        std::isnan(variance) ? std::numeric_limits<float>::infinity() : static_cast<float>(variance);
     if (wanted_[tile].before == before && wanted_[tile].weight == weight) return;
     const bool was_wanted = wanted(unit_code(next_[tile], tile));
     sort_returned(tile, wanted_[tile].before, before);
@@ -87,8 +90,8 @@ class UnitQueue {
     offer(tile);
   }
 
-  // The first waiting unit for which `excluded` is false; exclusion applies to units that came back only. Those go first
-  // among the surely wanted, and among the others.
+  // The first waiting unit for which `excluded` is false; exclusion applies to units that came back only.
+  // Those go first among the surely wanted, and among the others.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -114,7 +117,8 @@ class UnitQueue {
   }
   // A lent unit waits again.
   void put_back(UnitCode code) {
-    if (plans(code) && round_of(code) < next_[tile_of(code)]) (wanted(code) ? returned_ : returned_perhaps_).insert(code);
+    if (plans(code) && round_of(code) < next_[tile_of(code)])
+      (wanted(code) ? returned_ : returned_perhaps_).insert(code);
   }
   // A late result came for a unit that may be waiting.
   void forget(UnitCode code) {
@@ -145,8 +149,9 @@ class UnitQueue {
   float gain(UnitCode code) const {
     const RoundIndex round = round_of(code);
     if (round == 0) return std::numeric_limits<float>::infinity();
-    return static_cast<float>(static_cast<double>(wanted_[tile_of(code)].weight) /
-                              (static_cast<double>(round_range(round - 1).s1) * static_cast<double>(round_range(round).s1)));
+    return static_cast<float>(
+        static_cast<double>(wanted_[tile_of(code)].weight) /
+        (static_cast<double>(round_range(round - 1).s1) * static_cast<double>(round_range(round).s1)));
   }
   std::uint64_t surely(TileIndex t) const {
     const RoundIndex before = std::min({end_[t], window_[t], wanted_before(t)});
@@ -158,7 +163,8 @@ class UnitQueue {
     change();
     surely_ += surely(t);
   }
-  // heads_ and perhaps_ together hold the next unit of every open tile, and dead ones among them, which head() drops.
+  // heads_ and perhaps_ together hold the next unit of every open tile, and dead ones among them, which
+  // head() drops.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);
@@ -178,7 +184,9 @@ class UnitQueue {
   std::optional<UnitCode> head() {
     while (!heads_.empty() && !(waits(heads_.top()) && wanted(heads_.top()))) heads_.pop();
     if (!heads_.empty()) return heads_.top();
-    const auto alive = [&](const Perhaps& p) { return waits(p.code) && !wanted(p.code) && p.gain == gain(p.code); };
+    const auto alive = [&](const Perhaps& p) {
+      return waits(p.code) && !wanted(p.code) && p.gain == gain(p.code);
+    };
     while (!perhaps_.empty() && !alive(perhaps_.top())) perhaps_.pop();
     return perhaps_.empty() ? std::nullopt : std::optional(perhaps_.top().code);
   }

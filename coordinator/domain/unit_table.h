@@ -44,8 +44,8 @@ class UnitTable {
   // Forgets all of the tile, accepted and folded. Returns the units that were accepted, ascending.
   std::vector<UnitCode> void_tile(TileIndex tile);
   std::vector<TileIndex> tiles_of(WorkerIndex worker) const;  // of which it has an accepted result; ascending
-  void mark_workers(std::vector<bool>& used) const;  // those that accepted results name
-  void forget_results();          // of a job that failed: frees the memory, keeps the fold counts
+  void mark_workers(std::vector<bool>& used) const;           // those that accepted results name
+  void forget_results();  // of a job that failed: frees the memory, keeps the fold counts
 
   // ---- folding ----
   // The tile's next round if it is accepted, below `end` and at most `limit`; it counts as issued from now

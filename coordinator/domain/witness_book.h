@@ -1,6 +1,7 @@
-// Who was lent a unit that another one's result came first of, or that was taken back from it: what such a worker still
-// says of the unit it was asked for, so that its word counts where results differ (farm_trust.cpp). Bounded; of too many
-// those of the earliest rounds are forgotten, and what is then said of them is a claim like any other.
+// Who was lent a unit that another one's result came first of, or that was taken back from it: what such a
+// worker still says of the unit it was asked for, so that its word counts where results differ
+// (farm_trust.cpp). Bounded; of too many those of the earliest rounds are forgotten, and what is then said of
+// them is a claim like any other.
 #pragma once
 
 #include <cstddef>

@@ -63,9 +63,7 @@ struct Worker {
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
     return leases.size() < kLeasesPerWorker && seconds_until_free() < kLeasesPerWorker * kLeaseSeconds;
   }
-  bool available() const {
-    return connected && !draining && pause == Pause::none && !sick_since && !barred;
-  }
+  bool available() const { return connected && !draining && pause == Pause::none && !sick_since && !barred; }
   WorkerState state() const {
     if (!connected) return WorkerState::lost;
     if (draining) return WorkerState::draining;
@@ -82,10 +80,12 @@ class WorkerBook {
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
   WorkerIndex index_of(const WorkerId& id);  // for workers that are only named in a record
   void forget(Worker& worker);
-  // Names outlive their workers, since results name them; of preemptible workers there come new ones every hour.
+  // Names outlive their workers, since results name them; of preemptible workers there come new ones every
+  // hour.
   bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
   std::size_t names() const { return index_.size(); }
-  // Forgets all names but those of known workers and of indices that are true here. Their indices are given to others.
+  // Forgets all names but those of known workers and of indices that are true here. Their indices are given
+  // to others.
   void keep_names(std::vector<bool> used);
   std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
@@ -120,7 +120,8 @@ std::uint64_t head_of(const Digest& digest);
 // Has the job's world, or at least its files.
 bool holds(const Job& job, const Worker& worker);
 
-// Of the job's numeric class, with its tags, with memory enough, and trusted; leaves aside what the worker is doing.
+// Of the job's numeric class, with its tags, with memory enough, and trusted; leaves aside what the worker is
+// doing.
 bool fits(const Job& job, const Worker& worker);
 // And may take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);

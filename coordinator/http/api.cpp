@@ -86,7 +86,8 @@ Response options_response(const std::string& allow) {
 
 }  // namespace
 
-Api::Api(coordinator::Coordinator& coordinator, TokenBook& tokens, Limits limits, StaticFiles files, bool secure)
+Api::Api(coordinator::Coordinator& coordinator, TokenBook& tokens, Limits limits, StaticFiles files,
+         bool secure)
     : coordinator_(coordinator),
       tokens_(tokens),
       auth_(tokens, {{limits.requests_per_second, std::max(1.0, 2 * limits.requests_per_second)},

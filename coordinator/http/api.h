@@ -45,8 +45,8 @@ class Api {
   BodyKind body_kind(const Route& route, const Request& request) const;
   // Runs the route's handler; no exception leaves it.
   Response handle(const Match& match, const Request& request);
-  // Whether a 404 may be because another coordinator has the job. Then ask_elsewhere(), which may wait for a second,
-  // says so, or gives the answer back as it was.
+  // Whether a 404 may be because another coordinator has the job. Then ask_elsewhere(), which may wait for a
+  // second, says so, or gives the answer back as it was.
   bool may_be_elsewhere(const Match& match, const Response& response) const;
   Response ask_elsewhere(const Match& match, const Request& request, Response response);
   // For bodies that are streamed: BodyKind::blob and archive.

@@ -49,7 +49,8 @@ std::variant<Caller, Response> Auth::identify(const Request& request) {
   const std::string_view authorization = request.header("authorization");
   if (!authorization.empty()) {
     constexpr std::string_view kWrong =
-        "the bearer token is none that this coordinator knows (the admin's is in its data folder, file 'token')";
+        "the bearer token is none that this coordinator knows (the admin's is in its data folder, file "
+        "'token')";
     std::string_view token = authorization;
     if (!iequals_prefix(token, "bearer ")) return problem(401, kWrong);
     token.remove_prefix(7);
@@ -84,8 +85,7 @@ std::variant<Caller, Response> Auth::caller_of_token(const Request& request, std
     return problem(401, wrong);
   }
   throttle_.succeeded(address, caller->token_id, now);
-  if (caller->role == Role::join)
-    return problem(403, "this is a worker's join token: it opens nothing here");
+  if (caller->role == Role::join) return problem(403, "this is a worker's join token: it opens nothing here");
   return std::move(*caller);
 }
 
@@ -101,7 +101,8 @@ bool Auth::still_valid(const Caller& caller) const { return book_.by_id(caller.t
 
 std::variant<std::string, Response> Auth::open_session(const Request& request, std::string_view token) {
   auto caller = caller_of_token(
-      request, token, "this is no token of this coordinator (the admin's is in its data folder, file 'token')");
+      request, token,
+      "this is no token of this coordinator (the admin's is in its data folder, file 'token')");
   if (auto* refused = std::get_if<Response>(&caller)) return std::move(*refused);
   std::array<unsigned char, 16> nonce{};
   CHECK(RAND_bytes(nonce.data(), static_cast<int>(nonce.size())) == 1, "the system's random numbers failed");

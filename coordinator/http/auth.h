@@ -28,15 +28,15 @@ UnixClock system_unix_clock();
 class Auth {
  public:
   struct Options {
-    Pace requests{};        // of one token, or of one address without any
-    Pace failures{};        // wrong tokens of one address
-    bool secure = false;    // over TLS: the cookie is for it alone
+    Pace requests{};      // of one token, or of one address without any
+    Pace failures{};      // wrong tokens of one address
+    bool secure = false;  // over TLS: the cookie is for it alone
   };
   // `book` outlives this.
   Auth(const TokenBook& book, Options options, UnixClock now = system_unix_clock());
 
-  // Who asks, else the 401, 403 or 429. A cookie counts for an unsafe method only if the browser says that the
-  // request comes from our own pages.
+  // Who asks, else the 401, 403 or 429. A cookie counts for an unsafe method only if the browser says that
+  // the request comes from our own pages.
   std::variant<Caller, Response> identify(const Request& request);
 
   // 429 if this one, or (without a caller) this address, asks too often.

@@ -129,7 +129,9 @@ net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match,
 net::awaitable<Response> Connection::handle_on_lane(const Match& match, const Request& request) {
   const Lane lane = match.route->lane;
   if (lane == Lane::here) co_return shared_.api.handle(match, request);
-  net::thread_pool& pool = lane == Lane::quick ? shared_.quick : lane == Lane::slow ? shared_.slow : shared_.away;
+  net::thread_pool& pool = lane == Lane::quick  ? shared_.quick
+                           : lane == Lane::slow ? shared_.slow
+                                                : shared_.away;
   bool elsewhere = false;
   auto work = [this, &match, &request, &elsewhere] {
     Response answer = shared_.api.handle(match, request);

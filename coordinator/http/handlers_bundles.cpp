@@ -16,7 +16,11 @@ namespace {
 class BundleSink final : public BodySink {
  public:
   BundleSink(Api& api, Spool spool, ArchiveKind kind, Fields query, Caller caller)
-      : api_(api), spool_(std::move(spool)), kind_(kind), query_(std::move(query)), caller_(std::move(caller)) {}
+      : api_(api),
+        spool_(std::move(spool)),
+        kind_(kind),
+        query_(std::move(query)),
+        caller_(std::move(caller)) {}
 
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     if (bytes.size() > api_.limits().bundle_bytes - spool_.size())

@@ -105,7 +105,6 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
   return change;
 }
 
-
 template <class Body>
 Response file_response(std::string content_type, Body bytes, const std::string& name) {
   Response response;
@@ -163,7 +162,8 @@ Response get_image_exr(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());
   if (const auto path = api.coordinator().final_file(*id, "image.exr"); !path.empty())
-    if (auto file = open_file_body(path)) return file_response("image/x-exr", std::move(*file), id->value + ".exr");
+    if (auto file = open_file_body(path))
+      return file_response("image/x-exr", std::move(*file), id->value + ".exr");
   auto image = api.coordinator().image_exr(*id);
   return image ? file_response("image/x-exr", std::move(*image), id->value + ".exr") : problem(image.error());
 }

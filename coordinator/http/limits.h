@@ -38,8 +38,8 @@ inline constexpr std::size_t kBodyChunk = 256u << 10;   // handed to the disk at
 inline constexpr std::size_t kWriteSlice = 256u << 10;  // between two looks at the clock
 inline constexpr std::uint64_t kMaxBuffered = 256u
                                               << 20;  // request bodies in memory, all connections together
-// Bodies of answers in memory, of all connections together; what is larger goes when nothing else does, and what lies
-// in a file is not counted.
+// Bodies of answers in memory, of all connections together; what is larger goes when nothing else does, and
+// what lies in a file is not counted.
 inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
 inline constexpr std::uint64_t kSmallAnswer = 64u << 10;  // is never refused, nor counted
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;  // read and thrown away after an early refusal
@@ -66,14 +66,15 @@ struct Limits {
   double min_rate = 8u << 10;     // bytes per second
   double heartbeat_seconds = 15;  // comments on a silent event stream
   double linger_seconds = 3;      // reading on after an early refusal, so that the answer arrives
-  double requests_per_second = 500;  // of one token, or of one address without any; 0: no limit. Twice as many at once
+  double requests_per_second =
+      500;  // of one token, or of one address without any; 0: no limit. Twice as many at once
   double wrong_tokens_per_minute = 20;  // of one address, as many at once; then 429; 0: no limit
-  double stop_seconds = 5;        // for requests under way when the coordinator stops
-  int quick_threads = 2;          // for answers out of memory
-  int away_threads = 8;           // for questions to other machines: stores of blobs, other coordinators
-  int user_priority = 0;          // the highest that a job of a submit token may have
-  int slow_threads = 4;           // for reading scenes, writing images and blobs
-  int bundle_threads = 2;         // for unpacking bundles, so that they never fill the slow ones
+  double stop_seconds = 5;              // for requests under way when the coordinator stops
+  int quick_threads = 2;                // for answers out of memory
+  int away_threads = 8;         // for questions to other machines: stores of blobs, other coordinators
+  int user_priority = 0;        // the highest that a job of a submit token may have
+  int slow_threads = 4;         // for reading scenes, writing images and blobs
+  int bundle_threads = 2;       // for unpacking bundles, so that they never fill the slow ones
   std::filesystem::path spool;  // where bundles lie while they are read; empty: the system's temporary folder
 };
 

@@ -135,7 +135,8 @@ void write_webhooks(std::string& out, const WebhookFigures& w) {
                  "lightshaft_webhook_sendings_total{{result=\"taken\"}} {}\n"
                  "lightshaft_webhook_sendings_total{{result=\"failed\"}} {}\n",
                  w.delivered, w.failed_attempts);
-  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.", w.given_up);
+  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.",
+         w.given_up);
   single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
 }
 

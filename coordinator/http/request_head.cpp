@@ -23,9 +23,9 @@ std::string lower_case(std::string_view text) {
 }
 
 // Of these a second one would let two readers of a request disagree.
-constexpr std::string_view kOnce[] = {
-    "host", "authorization", "content-type", "content-length", "transfer-encoding", "origin", "expect",
-    "content-range"};
+constexpr std::string_view kOnce[] = {"host",           "authorization",     "content-type",
+                                      "content-length", "transfer-encoding", "origin",
+                                      "expect",         "content-range"};
 
 std::optional<Response> refuse_header(const Header& header) {
   for (const std::string_view name : kOnce)

@@ -48,7 +48,8 @@ constexpr std::array kRoutes = {
     Route{Method::get, "/api/v1/jobs/{id}/events", kToken, Lane::quick, kNone, 0, get_job_events},
     Route{Method::get, "/api/v1/events", kToken, Lane::quick, kNone, 0, get_events},
     Route{Method::get, "/api/v1/tokens", Access::admin, Lane::quick, kNone, 0, get_tokens},
-    Route{Method::post, "/api/v1/tokens", Access::admin, Lane::slow, kWhole, kMaxControlJson, post_token, kJson},
+    Route{Method::post, "/api/v1/tokens", Access::admin, Lane::slow, kWhole, kMaxControlJson, post_token,
+          kJson},
     Route{Method::del, "/api/v1/tokens/{token}", Access::admin, Lane::slow, kNone, 0, delete_token},
     Route{Method::get, "/api/v1/workers", kToken, Lane::quick, kNone, 0, get_workers},
     Route{Method::post, "/api/v1/blobs/missing", kToken, Lane::away, kWhole, kMaxDigestList,
@@ -95,11 +96,16 @@ std::span<const Route> routes() { return kRoutes; }
 
 std::string_view to_string(Access access) {
   switch (access) {
-    case Access::open: return "anybody";
-    case Access::token: return "submit, read, admin";
-    case Access::submit: return "submit, admin";
-    case Access::see: return "read, admin";
-    case Access::admin: return "admin";
+    case Access::open:
+      return "anybody";
+    case Access::token:
+      return "submit, read, admin";
+    case Access::submit:
+      return "submit, admin";
+    case Access::see:
+      return "read, admin";
+    case Access::admin:
+      return "admin";
   }
   return "";
 }

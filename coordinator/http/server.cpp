@@ -166,7 +166,8 @@ void Server::start(Api& api, std::shared_ptr<const TlsIdentity> tls) {
   s.slow = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().slow_threads));
   s.bundles = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().bundle_threads));
   s.away = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().away_threads));
-  s.shared = std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, *s.bundles, *s.away, api, {}, 0, 0, 0, false});
+  s.shared =
+      std::make_unique<Shared>(Shared{s.io, *s.quick, *s.slow, *s.bundles, *s.away, api, {}, 0, 0, 0, false});
   net::co_spawn(s.io, s.accept_loop(), net::detached);
   s.thread = std::thread([&s] { s.io.run(); });
 }

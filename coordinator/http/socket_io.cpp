@@ -74,11 +74,13 @@ net::awaitable<bool> Connection::write_file(std::string_view head, const FileBod
   for (std::uint64_t offset = 0; offset < file.size;) {
     disarm();  // the disk has its time; the reader's is counted while it is written to
     auto work = [&slice, &file, offset] {
-      return read_slice(file, offset, std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
+      return read_slice(file, offset,
+                        std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
     };
     const std::size_t n = co_await run_on(shared_.slow, shared_.io, std::move(work));
     if (n == 0) co_return false;
-    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began, sent))
+    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began,
+                              sent))
       co_return false;
     offset += n;
   }

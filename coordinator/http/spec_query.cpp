@@ -55,7 +55,8 @@ std::optional<Result<Json>> parse_value(std::string_view key, std::string_view t
   if (key == "target_error" || key == "time") return parse_number<double>(key, text, "a number");
   if (key == "priority") return parse_number<int>(key, text, "a whole number");
   if (key == "size") return parse_size(text);
-  if (key == "integrator" || key == "frames" || key == "reference") return Result<Json>(Json(std::string(text)));
+  if (key == "integrator" || key == "frames" || key == "reference")
+    return Result<Json>(Json(std::string(text)));
   if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
   if (key == "float") {
     if (text == "true" || text == "1") return Result<Json>(Json(true));

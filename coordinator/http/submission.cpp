@@ -24,9 +24,10 @@ Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
 
 std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority) {
   if (caller.role != Role::submit || priority <= api.limits().user_priority) return std::nullopt;
-  return problem(403, fmt::format("priority {} goes before other users' jobs: with a token of the role 'submit' at most "
-                                  "{} is possible; ask the administrator (--user-priority)",
-                                  priority, api.limits().user_priority));
+  return problem(
+      403, fmt::format("priority {} goes before other users' jobs: with a token of the role 'submit' at most "
+                       "{} is possible; ask the administrator (--user-priority)",
+                       priority, api.limits().user_priority));
 }
 
 Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller) {

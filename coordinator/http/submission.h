@@ -11,7 +11,8 @@ Result<std::string> read_scene_blob(Api& api, const Digest& digest);
 // Submits and answers: 201 {id, url, warnings}, or why not, with the scene's diagnostics.
 Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller);
 
-// 403 where a user asks for more than Limits::user_priority: higher ones go before all lower ones, also of others.
+// 403 where a user asks for more than Limits::user_priority: higher ones go before all lower ones, also of
+// others.
 std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority);
 
 }  // namespace ls::http

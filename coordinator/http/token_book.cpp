@@ -90,7 +90,8 @@ Result<void> TokenBook::read_all() const {
     ++number;
     if (const auto done = read_line(rest.substr(0, end)); !done) {
       entries_ = std::move(before);
-      return fail(Errc::failed_precondition, fmt::format("{}:{}: {}", file_.string(), number, done.error().message));
+      return fail(Errc::failed_precondition,
+                  fmt::format("{}:{}: {}", file_.string(), number, done.error().message));
     }
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }

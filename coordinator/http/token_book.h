@@ -1,6 +1,7 @@
 // The tokens that are known: DATA/token (admin) and DATA/join-token in the clear, all others by their SHA-256
-// alone in DATA/tokens, one a line: `ROLE USER SHA256`, USER `-` where there is none. Several coordinators may have one
-// folder (--secrets): what one of them writes the others read with the next token that they are shown.
+// alone in DATA/tokens, one a line: `ROLE USER SHA256`, USER `-` where there is none. Several coordinators
+// may have one folder (--secrets): what one of them writes the others read with the next token that they are
+// shown.
 #pragma once
 
 #include <filesystem>

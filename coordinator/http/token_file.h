@@ -31,8 +31,8 @@ struct FileState {
 };
 FileState file_state(const std::filesystem::path& file);
 
-// Keeps other processes out of a folder's secrets while it lives; waits for them. Best effort: in a folder where no file
-// can be made nothing will be written either. An empty path: nothing.
+// Keeps other processes out of a folder's secrets while it lives; waits for them. Best effort: in a folder
+// where no file can be made nothing will be written either. An empty path: nothing.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

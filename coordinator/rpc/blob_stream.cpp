@@ -35,7 +35,8 @@ void BlobStream::open() {
   const auto digest = wire::digest_from(request_.digest(), "digest");
   if (!digest) return Finish(to_status(digest.error()));
   digest_ = *digest;
-  if (const auto right = blobs_.prove(digest_, request_.arrived_wrong()); !right) return refuse(right.error());
+  if (const auto right = blobs_.prove(digest_, request_.arrived_wrong()); !right)
+    return refuse(right.error());
   const auto size = blobs_.size(digest_);
   if (!size) return refuse(size.error());
   size_ = *size;
@@ -60,7 +61,8 @@ void BlobStream::next() {
 
 // Told first, so that the jobs that need it wait before the worker gives its units back.
 void BlobStream::refuse(const Error& why) {
-  if (why.code == Errc::not_found || why.code == Errc::failed_precondition) coordinator_.blob_lacking(digest_, why);
+  if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
+    coordinator_.blob_lacking(digest_, why);
   Finish(to_status(why));
 }
 

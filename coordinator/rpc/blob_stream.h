@@ -1,5 +1,5 @@
-// One FetchBlob: chunks of a blob, read as the worker takes them, on threads of its own: a blob that must be fetched
-// first may take minutes, and gRPC's few threads are those that listen to workers.
+// One FetchBlob: chunks of a blob, read as the worker takes them, on threads of its own: a blob that must be
+// fetched first may take minutes, and gRPC's few threads are those that listen to workers.
 #pragma once
 
 #include <functional>
@@ -17,7 +17,8 @@ class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::B
  public:
   BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::FetchBlobRequest& request,
              const JoinCheck& may_join, RunOn run, std::function<void()> on_gone);
-  void begin(const JoinGuard& guard, const std::string& address);  // starts the first write, or ends with what is wrong
+  void begin(const JoinGuard& guard,
+             const std::string& address);  // starts the first write, or ends with what is wrong
 
   void OnWriteDone(bool ok) override;
   void OnDone() override;

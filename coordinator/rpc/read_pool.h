@@ -1,5 +1,5 @@
-// Threads that read blobs for FetchBlob streams: such a read may wait for another machine, and gRPC's own few threads
-// are those that listen to workers.
+// Threads that read blobs for FetchBlob streams: such a read may wait for another machine, and gRPC's own few
+// threads are those that listen to workers.
 #pragma once
 
 #include <condition_variable>

@@ -13,8 +13,8 @@ namespace ls::coordinator {
 
 class GrpcServer {
  public:
-  struct Tls {            // PEM
-    std::string ca;       // whose certificates workers must show
+  struct Tls {       // PEM
+    std::string ca;  // whose certificates workers must show
     std::string cert, key;
   };
   // `may_join`: what FetchBlob asks (the hello is checked by the Coordinator).

@@ -30,8 +30,8 @@ void Outlet::close() {
   stream_->pump_locked();
 }
 
-WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context,
-                       const JoinGuard& guard, TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
+WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
+                       TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
     : coordinator_(coordinator),
       context_(context),
       guard_(guard),
@@ -105,10 +105,11 @@ void WorkStream::greet(FromWorker message) {
     return refuse({Errc::invalid_argument, "bad message: the first one on a stream must be the hello"},
                   false);
   if (hello->protocol != kProtocolVersion) {
-    const Error other{Errc::failed_precondition,
-                      fmt::format("this worker speaks protocol {}, the coordinator speaks {}: install the same "
-                                  "version on both",
-                                  hello->protocol, kProtocolVersion)};
+    const Error other{
+        Errc::failed_precondition,
+        fmt::format("this worker speaks protocol {}, the coordinator speaks {}: install the same "
+                    "version on both",
+                    hello->protocol, kProtocolVersion)};
     log_warn(fmt::format("peer={} worker={} build={}", context_->peer(), log_value(hello->name),
                          log_value(hello->build)),
              "refused: " + other.message);

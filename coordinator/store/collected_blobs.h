@@ -22,8 +22,10 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // keep: nothing: blobs stay for good, and unfinished uploads, which are this coordinator's alone, for a day.
-  CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock, std::optional<Duration> keep)
+  // keep: nothing: blobs stay for good, and unfinished uploads, which are this coordinator's alone, for a
+  // day.
+  CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
+                 std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
 
   struct Swept {

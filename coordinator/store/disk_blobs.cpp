@@ -116,14 +116,15 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return stamp->bytes;
 }
 
-// What is read whole is hashed every time; of a larger file, which is read in pieces, all of it before the first.
+// What is read whole is hashed every time; of a larger file, which is read in pieces, all of it before the
+// first.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
   const auto seen = look_at(digest);
   if (!seen) return tl::unexpected(seen.error());
   if (offset > seen->bytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("blob {} has {} bytes; byte {} was asked for", digest.hex(), seen->bytes, offset));
+    return fail(Errc::invalid_argument, fmt::format("blob {} has {} bytes; byte {} was asked for",
+                                                    digest.hex(), seen->bytes, offset));
   const std::uint64_t n = std::min({length, seen->bytes - offset, limits::kMaxBlobRead});
   const bool whole = n == seen->bytes;
   if (!whole)
@@ -153,22 +154,25 @@ Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
   return {};
 }
 
-tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const {
+tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp& seen,
+                                           const Digest& got) const {
   const auto from = path(digest), to = damaged(from);
   const std::lock_guard lock(placing_);
   if (stamp_of(from) != seen)
     return fail(Errc::unavailable, fmt::format("{} changed while it was read; try again", from.string()));
   proofs_.forget(digest);
-  const std::string what =
-      fmt::format("blob {} is damaged: the bytes in {} have the SHA-256 {}", digest.hex(), from.string(), got.hex());
+  const std::string what = fmt::format("blob {} is damaged: the bytes in {} have the SHA-256 {}",
+                                       digest.hex(), from.string(), got.hex());
   if (::rename(from.c_str(), to.c_str()) != 0)
-    return fail(Errc::unavailable,
-                fmt::format("{}; {}; remove the file and upload it again", what, errno_error("move it aside to", to).message));
+    return fail(Errc::unavailable, fmt::format("{}; {}; remove the file and upload it again", what,
+                                               errno_error("move it aside to", to).message));
   log_error("blob=" + digest.hex(), fmt::format("damaged, moved aside to {}; check this disk", to.string()));
-  return fail(Errc::failed_precondition,
-              fmt::format("{}; it is out of the way now ({}) and counts as missing: upload the file again, or hand in "
-                          "the same scene again with `lightshaft submit`",
-                          what, to.filename().string()));
+  return fail(
+      Errc::failed_precondition,
+      fmt::format(
+          "{}; it is out of the way now ({}) and counts as missing: upload the file again, or hand in "
+          "the same scene again with `lightshaft submit`",
+          what, to.filename().string()));
 }
 
 Result<void> DiskBlobs::place(const Digest& digest, const std::filesystem::path& from) {
@@ -213,10 +217,12 @@ Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
   std::vector<Digest> all;
   std::error_code error;
   const std::filesystem::directory_iterator end;
-  for (std::filesystem::directory_iterator group(folder_, error); !error && group != end; group.increment(error)) {
+  for (std::filesystem::directory_iterator group(folder_, error); !error && group != end;
+       group.increment(error)) {
     if (group->path().filename().string().size() != 2) continue;
     std::error_code gone;
-    for (std::filesystem::directory_iterator file(group->path(), gone); !gone && file != end; file.increment(gone))
+    for (std::filesystem::directory_iterator file(group->path(), gone); !gone && file != end;
+         file.increment(gone))
       if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
   }
   if (error)

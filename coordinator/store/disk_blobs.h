@@ -1,6 +1,6 @@
 // Blobs as files: DIR/ab/<64 hex digits>, written under WORK/tmp, or in parts under WORK/unfinished, and
-// renamed when digest and bytes are proven and synced. A file that no longer has its digest is found when it is
-// read, and moved aside to <64 hex digits>.damaged until the right bytes come: it counts as missing.
+// renamed when digest and bytes are proven and synced. A file that no longer has its digest is found when it
+// is read, and moved aside to <64 hex digits>.damaged until the right bytes come: it counts as missing.
 #pragma once
 
 #include <filesystem>

@@ -119,7 +119,9 @@ AtomicFile::~AtomicFile() {
   if (file_) ::unlink(temporary_.c_str());
 }
 
-Result<void> AtomicFile::write(std::span<const std::byte> bytes) { return write_all(file_, bytes, temporary_); }
+Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
+  return write_all(file_, bytes, temporary_);
+}
 
 Result<void> AtomicFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -144,7 +146,8 @@ Result<void> AtomicFile::commit() {
 }
 
 Result<void> AtomicFile::commit_unsynced() {
-  if (::rename(temporary_.c_str(), path_.c_str()) != 0) return tl::unexpected(errno_error("rename to", path_));
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0)
+    return tl::unexpected(errno_error("rename to", path_));
   file_ = File();
   return {};
 }

@@ -46,8 +46,8 @@ Result<void> sync_folder(const std::filesystem::path& folder);
 // whole.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-// The same of what is too large for memory at once: written piece by piece to PATH + `suffix`, and whole at its place
-// only after commit(). One that is not committed leaves nothing.
+// The same of what is too large for memory at once: written piece by piece to PATH + `suffix`, and whole at
+// its place only after commit(). One that is not committed leaves nothing.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");
@@ -57,8 +57,9 @@ class AtomicFile {
   Result<void> write(std::span<const std::byte> bytes);  // behind what is there
   Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   Result<void> sync();
-  Result<void> commit();   // with sync()
-  // Without: after a power failure the old or no content may stand there, after a crash of this process the new one.
+  Result<void> commit();  // with sync()
+  // Without: after a power failure the old or no content may stand there, after a crash of this process the
+  // new one.
   Result<void> commit_unsynced();
 
  private:

@@ -66,7 +66,7 @@ struct StoredJob {
   std::set<Digest> awaited;    // blobs that are missing or damaged: it is paused until they are here again
   std::uint64_t revision = 0;  // number of the change, where a store counts them (Redis)
   std::uint64_t fence = 0;     // number of its owner, where several coordinators share a store
-  bool damaged = false;  // its record can't be read: id, `failed` and `error` are all that is known
+  bool damaged = false;        // its record can't be read: id, `failed` and `error` are all that is known
   bool operator==(const StoredJob&) const = default;
 };
 std::string to_json(const StoredJob& job);

@@ -1,4 +1,5 @@
-// Figures in records. JSON knows no infinity: it would be written as null, and the record could not be read again.
+// Figures in records. JSON knows no infinity: it would be written as null, and the record could not be read
+// again.
 #pragma once
 
 #include <cmath>
@@ -11,7 +12,8 @@ namespace ls::coordinator {
 inline double finite(double value) { return std::isfinite(value) ? value : 0; }
 // null: written by a version that did not know that.
 inline double number_of(const nlohmann::json& j) { return j.is_null() ? 0 : j.get<double>(); }
-// Throws for anything but an integer from 0 to 2^64 - 1: the library would convert 1e20, which no integer can hold.
+// Throws for anything but an integer from 0 to 2^64 - 1: the library would convert 1e20, which no integer can
+// hold.
 inline std::uint64_t count_of(const nlohmann::json& j) {
   if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
   return j.get<std::uint64_t>();

@@ -1,5 +1,5 @@
-// Which copies on this machine, of blobs that a store elsewhere has, give way to newer ones: those not read for the longest
-// time. Thread-safe; removes nothing itself.
+// Which copies on this machine, of blobs that a store elsewhere has, give way to newer ones: those not read
+// for the longest time. Thread-safe; removes nothing itself.
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,8 @@ std::uint64_t header_check(const RawHeader& raw) {
   return check_of(std::as_bytes(std::span(&raw, 1)).first(offsetof(RawHeader, header_check)));
 }
 
-RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr, std::span<const std::byte> health) {
+RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr,
+               std::span<const std::byte> health) {
   RawHeader raw;
   raw.bytes = static_cast<std::uint32_t>(exr.size());
   raw.tile = record.tile;
@@ -58,7 +59,8 @@ std::vector<std::byte> pack_index(std::span<const RawHeader> headers) {
   return out;
 }
 
-std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes, std::uint64_t segment_bytes) {
+std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
+                                                   std::uint64_t segment_bytes) {
   const std::size_t end = sizeof(Digest::bytes);
   if (bytes.size() < end || (bytes.size() - end) % sizeof(RawHeader) != 0) return std::nullopt;
   const auto raw = bytes.first(bytes.size() - end);

@@ -11,8 +11,9 @@
 
 namespace ls::coordinator {
 
-inline constexpr std::uint32_t kPartialMagic = 0x3250534c;     // "LSP2"
-inline constexpr std::uint32_t kOldPartialMagic = 0x3150534c;  // "LSP1": with three counters instead of a text
+inline constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
+inline constexpr std::uint32_t kOldPartialMagic =
+    0x3150534c;  // "LSP1": with three counters instead of a text
 
 // Little endian like every machine we run on.
 struct RawHeader {
@@ -33,13 +34,15 @@ static_assert(sizeof(RawHeader) == 184);
 
 std::uint64_t check_of(std::span<const std::byte> bytes);  // the first 8 bytes of their SHA-256
 std::uint64_t header_check(const RawHeader& raw);
-RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr, std::span<const std::byte> health);
+RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr,
+               std::span<const std::byte> health);
 PartialRecord unpack(const RawHeader& raw, Health health);
 
-// The heads of a full segment, one after the other and closed by a SHA-256, so that a restart need not look for them
-// in 64 MiB. The file can be lost: then it does.
+// The heads of a full segment, one after the other and closed by a SHA-256, so that a restart need not look
+// for them in 64 MiB. The file can be lost: then it does.
 std::vector<std::byte> pack_index(std::span<const RawHeader> headers);
 // Nothing: damaged, or not of a segment of so many bytes.
-std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes, std::uint64_t segment_bytes);
+std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
+                                                   std::uint64_t segment_bytes);
 
 }  // namespace ls::coordinator

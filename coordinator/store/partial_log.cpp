@@ -30,7 +30,8 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   if (!bytes) return std::nullopt;
   RawHeader raw;
   std::memcpy(&raw, bytes->data(), sizeof raw);
-  if ((raw.magic != kPartialMagic && raw.magic != kOldPartialMagic) || raw.header_check != header_check(raw)) return std::nullopt;
+  if ((raw.magic != kPartialMagic && raw.magic != kOldPartialMagic) || raw.header_check != header_check(raw))
+    return std::nullopt;
   if (raw.bytes > ls::limits::kPartialBytes || raw.text_bytes() > kHealthBytes ||
       raw.bytes + raw.text_bytes() > size - offset - sizeof raw)
     return std::nullopt;
@@ -118,8 +119,8 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
     }
     auto health = health_at(*file, at + sizeof(RawHeader) + raw->bytes, *raw, path);
     if (!health) break;
-    found_.push_back(
-        {unpack(*raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
+    found_.push_back({unpack(*raw, std::move(*health)),
+                      {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
     if (last) headers_.push_back(*raw);
     at += raw->record_bytes();
   }
@@ -149,8 +150,8 @@ Result<void> PartialLog::start_segment(std::uint32_t segment) {
   return {};
 }
 
-// Best effort: a restart that does not find it looks through the segment. One that was given up after a failed write
-// or sync gets none.
+// Best effort: a restart that does not find it looks through the segment. One that was given up after a
+// failed write or sync gets none.
 void PartialLog::finish_segment() {
   std::uint64_t bytes = 0;
   for (const RawHeader& header : headers_) bytes += header.record_bytes();

@@ -1,7 +1,7 @@
 // Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed
-// size, closed by a checksum, the EXR bytes, and the unit's health as text where it isn't clean. What stood in a file when sync() returned survives kill -9
-// and power loss; a torn record behind it is found at open() and cut. Beside a full segment stands an index of its
-// headers, partials-NNN.idx.
+// size, closed by a checksum, the EXR bytes, and the unit's health as text where it isn't clean. What stood
+// in a file when sync() returned survives kill -9 and power loss; a torn record behind it is found at open()
+// and cut. Beside a full segment stands an index of its headers, partials-NNN.idx.
 //
 // append() and sync() from one thread; read() from any.
 #pragma once
@@ -81,7 +81,7 @@ class PartialLog {
   std::uint32_t segment_ = 0;
   std::uint64_t size_ = 0;  // of the current segment
   bool unsynced_ = false;
-  std::optional<Error> lost_;  // of a full segment that could not be synced: told by the next sync()
+  std::optional<Error> lost_;       // of a full segment that could not be synced: told by the next sync()
   std::vector<RawHeader> headers_;  // of the current segment
   std::vector<Entry> found_;
   std::uint64_t cut_bytes_ = 0;

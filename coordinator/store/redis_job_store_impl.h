@@ -78,20 +78,24 @@ class RedisJobStore final : public JobStore {
   }
 
   Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
-    return note(job, [&] { return local_->add_point(job, point); }, [](Due& due) { due.points = true; });
+    return note(
+        job, [&] { return local_->add_point(job, point); }, [](Due& due) { due.points = true; });
   }
   Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
-    return note(job, [&] { return local_->set_truth(job, spp, truth); }, [](Due& due) { due.points = true; });
+    return note(
+        job, [&] { return local_->set_truth(job, spp, truth); }, [](Due& due) { due.points = true; });
   }
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     return local_->points(job);
   }
   Result<void> remove_points(const JobId& job) override {
-    return note(job, [&] { return local_->remove_points(job); }, [](Due& due) { due.points = true; });
+    return note(
+        job, [&] { return local_->remove_points(job); }, [](Due& due) { due.points = true; });
   }
 
   Result<void> add_log(const JobId& job, const LogLine& line) override {
-    return note(job, [&] { return local_->add_log(job, line); }, [](Due& due) { due.log = true; });
+    return note(
+        job, [&] { return local_->add_log(job, line); }, [](Due& due) { due.log = true; });
   }
   Result<std::vector<LogLine>> log(const JobId& job) const override { return local_->log(job); }
 
@@ -118,7 +122,8 @@ class RedisJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     std::string trouble = trouble_.empty() ? not_kept_ : trouble_;
     if (trouble.empty() && members_) trouble = members_->stranded();
-    return {options_.address.shown(), std::move(trouble), due_.size() + telling_ + (all_due_ ? revisions_.size() : 0)};
+    return {options_.address.shown(), std::move(trouble),
+            due_.size() + telling_ + (all_due_ ? revisions_.size() : 0)};
   }
 
   Moved moved() override {
@@ -168,7 +173,8 @@ class RedisJobStore final : public JobStore {
     for (const BarredWorker& worker : workers) {
       const std::lock_guard lock(mutex_);
       if (barred_.contains(worker.worker)) continue;
-      if (auto kept = local_->bar(worker); !kept) {  // heeded all the same, and asked for again after a restart
+      if (auto kept = local_->bar(worker);
+          !kept) {  // heeded all the same, and asked for again after a restart
         log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
       }
       barred_[worker.worker] = worker.evidence;
@@ -273,11 +279,11 @@ class RedisJobStore final : public JobStore {
   Moved moved_;                               // what the service has not been told yet
   std::map<JobId, Due> due_;
   std::size_t telling_ = 0;  // jobs on their way to Redis: not due, and not there yet
-  JobId told_last_;  // of those that are due: after it the next ones' turn begins
+  JobId told_last_;          // of those that are due: after it the next ones' turn begins
   std::map<std::string, std::uint64_t> counters_;
   std::map<WorkerId, std::string> barred_;  // all there are
   std::set<WorkerId> barred_due_;
-  std::string not_kept_;  // why a job that was taken over is not here yet
+  std::string not_kept_;             // why a job that was taken over is not here yet
   std::unique_ptr<RedisLink> link_;  // this and the next one are the teller's
   std::string memory_;               // empty: not known yet
   bool all_due_ = true;

@@ -118,7 +118,8 @@ Result<void> RedisJobStore::tell_barred() {
   {
     const std::lock_guard lock(mutex_);
     due.swap(barred_due_);
-    for (const WorkerId& worker : due) commands.push_back({"HSETNX", kRedisBarred, worker.value, barred_.at(worker)});
+    for (const WorkerId& worker : due)
+      commands.push_back({"HSETNX", kRedisBarred, worker.value, barred_.at(worker)});
   }
   if (due.empty()) return {};
   auto replies = link_->run_all(commands);

@@ -239,7 +239,8 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   // First whether it can be read: it would be this node's and nobody's.
   auto before = link_->run({"HGETALL", redis_job_key(id)});
   if (!before) return tl::unexpected(before.error());
-  if (!readable(id, parse_redis_job(*before), "it stays with the coordinator that is gone")) return std::nullopt;
+  if (!readable(id, parse_redis_job(*before), "it stays with the coordinator that is gone"))
+    return std::nullopt;
   const auto frame = frame_of(id);
   own_unclear_ = true;
   auto fields = link_->run(

@@ -8,9 +8,9 @@
 // All times of life and death are Redis's own (PX), so that clocks of machines need not agree.
 //
 // Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash, the same for good),
-// lightshaft:barred (hash: worker -> evidence), lightshaft:owned:NODE (set of jobs), lightshaft:lost:NODE (list of jobs), lightshaft:heir:NODE (who takes
-// its jobs), lightshaft:sequences (hash: sequence -> owner), and `owner`, `from` (who
-// had it before), `fence` and `state` in lightshaft:job:ID.
+// lightshaft:barred (hash: worker -> evidence), lightshaft:owned:NODE (set of jobs), lightshaft:lost:NODE
+// (list of jobs), lightshaft:heir:NODE (who takes its jobs), lightshaft:sequences (hash: sequence -> owner),
+// and `owner`, `from` (who had it before), `fence` and `state` in lightshaft:job:ID.
 #pragma once
 
 #include <functional>
@@ -60,7 +60,8 @@ class RedisMembers {
   struct Told {  // on the members' own thread; the same loss may be told twice
     std::function<void(std::vector<TakenJob>)> taken;
     std::function<void(const std::vector<LostJob>&)> lost;
-    // Workers that one of the coordinators has found to lie: all of them, whenever there are more. Before what is taken.
+    // Workers that one of the coordinators has found to lie: all of them, whenever there are more. Before
+    // what is taken.
     std::function<void(const std::vector<BarredWorker>&)> barred = {};
     // Of jobs that Redis says are this node's, those that it does not have. Without it nobody looks.
     std::function<std::vector<JobId>(std::vector<JobId>)> unknown = {};
@@ -75,8 +76,9 @@ class RedisMembers {
   // Who has a job, or a sequence; nothing: nobody. Waits for Redis, a second at most.
   Result<std::optional<Member>> owner_of(const JobId& id);
 
-  // Says that it lives, drops what was lost, looks at the others, and takes over what the dead left; also what it took
-  // before without learning of it, since Redis's answer was lost, and what it could not keep then.
+  // Says that it lives, drops what was lost, looks at the others, and takes over what the dead left; also
+  // what it took before without learning of it, since Redis's answer was lost, and what it could not keep
+  // then.
   Result<void> beat();
   // A job that is this node's and cannot be read; empty: there is none.
   std::string stranded() const;

@@ -11,7 +11,6 @@
 namespace ls::coordinator {
 namespace {
 
-
 // What Redis may have lost of a counter with its last writes: ids taken from far fewer than a million
 // reservations a second never come twice.
 constexpr std::uint64_t kCountsLost = 1'000'000;

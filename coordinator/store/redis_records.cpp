@@ -69,7 +69,8 @@ std::vector<ConvergencePoint> parse_points(const std::string& text) {
   std::vector<ConvergencePoint> points;
   for (const json& p : json::parse(text)) {
     ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)), number_of(p.at(6))};
-    if (p.size() > 9) error.rmse_lo = number_of(p.at(8)), error.rmse_hi = number_of(p.at(9));  // not in earlier records
+    if (p.size() > 9)
+      error.rmse_lo = number_of(p.at(8)), error.rmse_hi = number_of(p.at(9));  // not in earlier records
     points.push_back({number_of(p.at(0)), number_of(p.at(1)), number_of(p.at(2)), error, truth_of(p.at(7))});
   }
   return points;

@@ -35,7 +35,8 @@ tl::unexpected<Error> wrong(std::string_view url, std::string_view why) {
 std::optional<std::uint64_t> mebibytes(std::string_view text, std::uint64_t least, std::uint64_t most) {
   std::uint64_t value = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (read.ec != std::errc() || read.ptr != text.data() + text.size() || value < least || value > most) return {};
+  if (read.ec != std::errc() || read.ptr != text.data() + text.size() || value < least || value > most)
+    return {};
   return value << 20;
 }
 

@@ -93,7 +93,8 @@ Result<std::uint64_t> S3Blobs::size(const Digest& digest) const {
 
 Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t offset,
                                              std::uint64_t length) const {
-  // Between being fetched and being read it may have had to go for others; and a damaged copy is out of the way.
+  // Between being fetched and being read it may have had to go for others; and a damaged copy is out of the
+  // way.
   for (int tries = 1;; ++tries) {
     if (!local_->has(digest))
       if (auto fetched = fetch(digest); !fetched) return tl::unexpected(fetched.error());
@@ -165,10 +166,12 @@ Error S3Blobs::note_damaged(const Digest& digest, const Error& why) const {
   const std::lock_guard lock(mutex_);
   there_.erase(digest);
   if (object) damaged_[digest] = object->etag;
-  return {Errc::failed_precondition,
-          fmt::format("what {} has for blob {} is damaged ({}) and counts as missing: upload the file again, or hand in "
-                      "the same scene again with `lightshaft submit`",
-                      link_.shown(), digest.hex(), why.message)};
+  return {
+      Errc::failed_precondition,
+      fmt::format(
+          "what {} has for blob {} is damaged ({}) and counts as missing: upload the file again, or hand in "
+          "the same scene again with `lightshaft submit`",
+          link_.shown(), digest.hex(), why.message)};
 }
 
 Result<void> S3Blobs::send(const Digest& digest) {

@@ -1,6 +1,7 @@
 // Blobs in an S3-compatible store, so that they outlive this machine and others reach them: PREFIX/ab/<64 hex
 // digits>. A folder on this machine takes what arrives until it is whole and proven, and keeps what was read
-// (as much as S3Address::copies_bytes says): each object comes once, and its digest is checked. A blob counts as there when the store has it, undamaged.
+// (as much as S3Address::copies_bytes says): each object comes once, and its digest is checked. A blob counts
+// as there when the store has it, undamaged.
 #pragma once
 
 #include <condition_variable>
@@ -41,7 +42,7 @@ class S3Blobs final : public BlobStore {
   class Passed;
   S3Blobs(const S3Options& options, std::unique_ptr<DiskBlobs> local)
       : link_(options), local_(std::move(local)), copies_(options.address.copies_bytes) {}
-  Result<void> send(const Digest& digest);         // from the folder to the store
+  Result<void> send(const Digest& digest);  // from the folder to the store
   // The other way. Who asks while it is on its way waits for the same.
   Result<void> fetch(const Digest& digest) const;
   Result<void> fetch_now(const Digest& digest) const;
@@ -56,7 +57,8 @@ class S3Blobs final : public BlobStore {
   mutable LocalCopies copies_;
   mutable std::mutex mutex_;
   mutable std::set<Digest> there_;  // known to be in the store
-  // Damaged in the store, and what the store calls the object (ETag): it counts as missing until that changes.
+  // Damaged in the store, and what the store calls the object (ETag): it counts as missing until that
+  // changes.
   mutable std::map<Digest, std::string> damaged_;
   struct Flight {
     std::condition_variable landed;

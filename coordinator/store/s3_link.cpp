@@ -97,8 +97,10 @@ std::size_t receive_header(char* data, std::size_t size, std::size_t count, void
   constexpr std::string_view kName = "etag:";
   const std::string_view line(data, size * count);
   if (line.size() > kName.size() && ::strncasecmp(line.data(), kName.data(), kName.size()) == 0) {
-    const std::size_t begin = line.find_first_not_of(" \t", kName.size()), end = line.find_last_not_of(" \t\r\n");
-    if (begin <= end && end != std::string_view::npos) *static_cast<std::string*>(etag) = line.substr(begin, end + 1 - begin);
+    const std::size_t begin = line.find_first_not_of(" \t", kName.size()),
+                      end = line.find_last_not_of(" \t\r\n");
+    if (begin <= end && end != std::string_view::npos)
+      *static_cast<std::string*>(etag) = line.substr(begin, end + 1 - begin);
   }
   return line.size();
 }

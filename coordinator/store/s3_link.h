@@ -18,15 +18,16 @@
 
 namespace ls::coordinator {
 
-// s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come from the environment, as for other tools:
-// AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if they are short-lived, AWS_SESSION_TOKEN; AWS_REGION where
-// the address names none. Without an endpoint: Amazon's of the region.
+// s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come from the
+// environment, as for other tools: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if they are short-lived,
+// AWS_SESSION_TOKEN; AWS_REGION where the address names none. Without an endpoint: Amazon's of the region.
 struct S3Address {
   std::string bucket, prefix;  // the prefix without slashes at its ends; may be empty
   std::string endpoint, region;
-  std::uint64_t part_bytes = std::uint64_t{64} << 20;  // larger files go in parts of this size; 5 MiB to 5 GiB
-  std::uint64_t copies_bytes = 0;                      // that stay on this machine; 0: all
-  std::string shown() const;  // for people and logs
+  std::uint64_t part_bytes = std::uint64_t{64}
+                             << 20;  // larger files go in parts of this size; 5 MiB to 5 GiB
+  std::uint64_t copies_bytes = 0;    // that stay on this machine; 0: all
+  std::string shown() const;         // for people and logs
 };
 Result<S3Address> parse_s3_url(std::string_view url);
 
@@ -58,7 +59,8 @@ class S3Link {
   // All of it, in order. `restart` is called before the bytes come from the start again.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
-  // The bytes of a file, whose digest the store checks: in one request or, if it is large, in parts (s3_parts.cpp).
+  // The bytes of a file, whose digest the store checks: in one request or, if it is large, in parts
+  // (s3_parts.cpp).
   Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                    const Digest& digest) const;
   Result<void> remove(const std::string& key) const;  // of a missing one: success
@@ -69,10 +71,11 @@ class S3Link {
  private:
   struct Request;
   struct Answer;
-  Result<void> put_parts(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes) const;
+  Result<void> put_parts(const std::string& key, const std::filesystem::path& file,
+                         std::uint64_t bytes) const;
   Result<std::string> begin_parts(const std::string& key) const;  // the upload's name
-  Result<void> send_parts(const std::string& key, const std::string& upload, const std::filesystem::path& file,
-                          std::uint64_t bytes) const;
+  Result<void> send_parts(const std::string& key, const std::string& upload,
+                          const std::filesystem::path& file, std::uint64_t bytes) const;
   void give_up_parts(const std::string& key, const std::string& upload) const;
   Result<Answer> ask(const Request& request) const;
   Result<Answer> ask_once(const Request& request) const;

@@ -1,4 +1,5 @@
-// A large file as one object, sent in parts: each has a digest that the store checks, and is tried again by itself.
+// A large file as one object, sent in parts: each has a digest that the store checks, and is tried again by
+// itself.
 #include <fcntl.h>
 #include <fmt/format.h>
 
@@ -28,7 +29,8 @@ Result<Digest> digest_of(const std::filesystem::path& path, std::uint64_t offset
 
 }  // namespace
 
-Result<void> S3Link::put_parts(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes) const {
+Result<void> S3Link::put_parts(const std::string& key, const std::filesystem::path& file,
+                               std::uint64_t bytes) const {
   auto upload = begin_parts(key);
   if (!upload) return tl::unexpected(upload.error());
   auto done = send_parts(key, *upload, file, bytes);
@@ -45,13 +47,19 @@ Result<std::string> S3Link::begin_parts(const std::string& key) const {
   return id;
 }
 
-Result<void> S3Link::send_parts(const std::string& key, const std::string& upload, const std::filesystem::path& file,
-                                std::uint64_t bytes) const {
-  const std::uint64_t part_bytes = std::max(options_.address.part_bytes, (bytes + kMostParts - 1) / kMostParts);
-  Request end{.method = "POST", .key = key, .query = "uploadId=" + query_value(upload), .body = "<CompleteMultipartUpload>"};
+Result<void> S3Link::send_parts(const std::string& key, const std::string& upload,
+                                const std::filesystem::path& file, std::uint64_t bytes) const {
+  const std::uint64_t part_bytes =
+      std::max(options_.address.part_bytes, (bytes + kMostParts - 1) / kMostParts);
+  Request end{.method = "POST",
+              .key = key,
+              .query = "uploadId=" + query_value(upload),
+              .body = "<CompleteMultipartUpload>"};
   int number = 1;
   for (std::uint64_t offset = 0; offset < bytes; offset += part_bytes, ++number) {
-    Request part{.method = "PUT", .key = key, .query = fmt::format("partNumber={}&uploadId={}", number, query_value(upload))};
+    Request part{.method = "PUT",
+                 .key = key,
+                 .query = fmt::format("partNumber={}&uploadId={}", number, query_value(upload))};
     part.file = file;
     part.offset = offset;
     part.bytes = std::min(part_bytes, bytes - offset);

@@ -9,8 +9,8 @@ inline constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e
 
 struct S3Link::Request {
   const char* method = "GET";
-  std::string key;    // empty: the bucket
-  std::string query;  // sorted and escaped, as it is signed; each name with '='
+  std::string key;                  // empty: the bucket
+  std::string query;                // sorted and escaped, as it is signed; each name with '='
   std::filesystem::path file = {};  // of a PUT: `bytes` of it from `offset` on
   std::uint64_t offset = 0, bytes = 0;
   std::string body = {};           // of a POST
@@ -27,8 +27,8 @@ struct S3Link::Answer {
   std::optional<Error> refused;  // by the sink
 };
 
-// The text of the first element of this name, from *at on, which is set behind it (npos: there is none); enough of XML for
-// what S3 answers.
+// The text of the first element of this name, from *at on, which is set behind it (npos: there is none);
+// enough of XML for what S3 answers.
 std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
 // As a value in a query.
 std::string query_value(std::string_view text);

@@ -88,7 +88,9 @@ class Statement {
   }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
   bool null(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
-  std::optional<double> known(int column) const { return null(column) ? std::nullopt : std::optional(real(column)); }
+  std::optional<double> known(int column) const {
+    return null(column) ? std::nullopt : std::optional(real(column));
+  }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 
  private:
@@ -147,8 +149,8 @@ class SqliteJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     return all_or_nothing("remove a job", [&]() -> Result<void> {
       for (const JobId& job : jobs)
-        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?",
-                                "DELETE FROM log WHERE job = ?"})
+        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
+                                "DELETE FROM truths WHERE job = ?", "DELETE FROM log WHERE job = ?"})
           if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) return done;
       return {};
     });
@@ -179,7 +181,10 @@ class SqliteJobStore final : public JobStore {
                   "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
                   "VALUES(?, ?, ?, ?, ?, ?, ?)");
     put.bind(job.value).bind(spp).bind(truth.rmse).bind(truth.relmse);
-    return put.bind(truth.flip).bind(truth.mse_stderr).bind(truth.relmse_stderr).run("store a comparison with the reference");
+    return put.bind(truth.flip)
+        .bind(truth.mse_stderr)
+        .bind(truth.relmse_stderr)
+        .run("store a comparison with the reference");
   }
 
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
@@ -197,7 +202,8 @@ class SqliteJobStore final : public JobStore {
                      rows.real(2),
                      {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}});
       if (!rows.null(7))
-        all.back().truth = TrueFigures{rows.real(7), rows.real(8), rows.known(9), rows.known(12), rows.known(13)};
+        all.back().truth =
+            TrueFigures{rows.real(7), rows.real(8), rows.known(9), rows.known(12), rows.known(13)};
     }
     if (!row) return tl::unexpected(row.error());
     return all;
@@ -207,7 +213,9 @@ class SqliteJobStore final : public JobStore {
     const std::lock_guard lock(mutex_);
     return all_or_nothing("remove the convergence of a job", [&]() -> Result<void> {
       for (const char* sql : {"DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?"})
-        if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove the convergence of a job"); !done) return done;
+        if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove the convergence of a job");
+            !done)
+          return done;
       return {};
     });
   }
@@ -256,7 +264,8 @@ class SqliteJobStore final : public JobStore {
     std::vector<BarredWorker> all;
     Statement rows(db_.get(), "SELECT worker, evidence FROM barred ORDER BY worker");
     auto row = rows.step("read the barred workers");
-    for (; row && *row; row = rows.step("read the barred workers")) all.push_back({{rows.text(0)}, rows.text(1)});
+    for (; row && *row; row = rows.step("read the barred workers"))
+      all.push_back({{rows.text(0)}, rows.text(1)});
     if (!row) return tl::unexpected(row.error());
     return all;
   }
@@ -302,13 +311,17 @@ class SqliteJobStore final : public JobStore {
 
 // To a database of an earlier version, which goes on being able to read it.
 Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
-  for (const auto& [table, column] : {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"),
-                                      std::pair("truths", "mse_stderr"), std::pair("truths", "relmse_stderr")}) {
+  for (const auto& [table, column] :
+       {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"), std::pair("truths", "mse_stderr"),
+        std::pair("truths", "relmse_stderr")}) {
     Statement known(db, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?");
     const auto found = known.bind(std::string_view(table)).bind(std::string_view(column)).step(what);
     if (!found) return tl::unexpected(found.error());
     if (*found) continue;
-    if (auto done = execute(db, fmt::format("ALTER TABLE {} ADD COLUMN {} REAL", table, column).c_str(), what); !done) return done;
+    if (auto done =
+            execute(db, fmt::format("ALTER TABLE {} ADD COLUMN {} REAL", table, column).c_str(), what);
+        !done)
+      return done;
   }
   return {};
 }

@@ -60,12 +60,12 @@ JobTotals totals_of(const json& j) {
   t.health = health_of(j);
   const json time = j.value("time", json::object());  // not in records of earlier versions
   for (const TimePart& part : kTimeParts)
-    if (const auto found = time.find(part.name); found != time.end()) t.time.*part.seconds = number_of(*found);
+    if (const auto found = time.find(part.name); found != time.end())
+      t.time.*part.seconds = number_of(*found);
   t.began_unix = j.value("began_unix", 0.0);
   t.ended_unix = j.value("ended_unix", 0.0);
   t.doubt = j.value("doubt", std::string());
-  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null())
-    t.few_hits = count_of(*few);
+  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null()) t.few_hits = count_of(*few);
   return t;
 }
 

@@ -163,7 +163,8 @@ void UploadParts::remove(const Digest& digest) {
 Result<std::vector<Digest>> UploadParts::list() const {
   std::vector<Digest> all;
   std::error_code error;
-  for (std::filesystem::directory_iterator file(folder_, error), end; !error && file != end; file.increment(error))
+  for (std::filesystem::directory_iterator file(folder_, error), end; !error && file != end;
+       file.increment(error))
     if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
   if (error)
     return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));

@@ -21,8 +21,8 @@ class UploadParts {
   ~UploadParts();
 
   std::uint64_t received(const Digest& digest) const;
-  // As BlobStore::resume_upload(). Of more than limits::kMaxUnfinishedUploads the one goes that has not grown for the
-  // longest time.
+  // As BlobStore::resume_upload(). Of more than limits::kMaxUnfinishedUploads the one goes that has not grown
+  // for the longest time.
   Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
   void remove(const Digest& digest);  // one that is being written goes on, and is refused its next bytes
   Result<std::vector<Digest>> list() const;

@@ -43,7 +43,8 @@ Result<std::string> read_pem(const fs::path& file, bool secret) {
   struct stat info {};
   if (in.fd < 0 || ::fstat(in.fd, &info) != 0)
     return wrong(file, fmt::format("cannot be read: {}", std::strerror(errno)));
-  if (secret && !kept_secret(info.st_uid, info.st_mode, ::geteuid())) return wrong(file, "is a key that others may read: chmod 600 it");
+  if (secret && !kept_secret(info.st_uid, info.st_mode, ::geteuid()))
+    return wrong(file, "is a key that others may read: chmod 600 it");
   std::string text;
   std::array<char, 4096> buffer{};
   while (true) {

@@ -20,8 +20,8 @@ struct Texts {       // PEM
 Result<Texts> read_files(const std::filesystem::path& ca, const std::filesystem::path& cert,
                          const std::filesystem::path& key);
 
-// Whether the mode of a key's file lets nobody read it but `reader`. What root owns it may be shown through its group:
-// so secrets are mounted in a cluster.
+// Whether the mode of a key's file lets nobody read it but `reader`. What root owns it may be shown through
+// its group: so secrets are mounted in a cluster.
 bool kept_secret(unsigned owner, unsigned mode, unsigned reader);
 
 // Of a farm with an authority of its own, in `folder` (0700): ca.pem and ca.key are made once, server.pem and

@@ -23,7 +23,8 @@ using webhooks::Delivery;
 using webhooks::Line;
 
 bool ended(const std::string& state) {
-  return state == "done" || state == "failed" || state == "cancelled" || state == "removed" || state == "moved";
+  return state == "done" || state == "failed" || state == "cancelled" || state == "removed" ||
+         state == "moved";
 }
 
 class Teller final : public Webhooks {

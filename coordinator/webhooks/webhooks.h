@@ -4,8 +4,10 @@
 //
 //   POST URL
 //   Content-Type: application/json
-//   Lightshaft-Event: job.done                         job.STATE, as in GET /api/v1/jobs/ID; job.removed; job.moved:
-//                                                      another coordinator goes on with it, and tells the rest
+//   Lightshaft-Event: job.done                         job.STATE, as in GET /api/v1/jobs/ID; job.removed;
+//   job.moved:
+//                                                      another coordinator goes on with it, and tells the
+//                                                      rest
 //   Lightshaft-Delivery: j-1f/done/4711                the same when it is sent again
 //   Lightshaft-Signature: t=UNIX,v1=HEX                HEX = HMAC-SHA-256(secret, "UNIX." + body), UNIX =
 //   time of sending

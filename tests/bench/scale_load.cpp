@@ -1,12 +1,14 @@
-// Many workers in one process, to load a coordinator: each has its own connection and stream, takes leases, and after
-// the time that a unit shall take hands in a partial of the right form with plain pixels.
-//   scale_load --coordinator HOST:PORT --workers N --seconds S [--unit-ms D] [--units U]   (LIGHTSHAFT_JOIN_TOKEN)
-// Prints JSON: units handed in and acknowledged, how long it took until they were durable and acknowledged (ack),
-// from the result that made room until another lease came (dispatch), and how long workers stood without a unit (gap).
-// docs/scale.md is made with it by tests/bench/scale.py.
+// Many workers in one process, to load a coordinator: each has its own connection and stream, takes leases,
+// and after the time that a unit shall take hands in a partial of the right form with plain pixels.
+//   scale_load --coordinator HOST:PORT --workers N --seconds S [--unit-ms D] [--units U]
+//   (LIGHTSHAFT_JOIN_TOKEN)
+// Prints JSON: units handed in and acknowledged, how long it took until they were durable and acknowledged
+// (ack), from the result that made room until another lease came (dispatch), and how long workers stood
+// without a unit (gap). docs/scale.md is made with it by tests/bench/scale.py.
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -16,7 +18,6 @@
 #include <mutex>
 #include <queue>
 #include <thread>
-#include <CLI/CLI.hpp>
 
 #include "common/base/overloaded.h"
 #include "common/image/partial.h"
@@ -139,8 +140,8 @@ void Worker::begin_locked(Instant now) {
   load_.due_in_a_unit(*this, now);
 }
 
-// A lease came: for the last result, since results make room, though not each (a worker holds some seconds of work).
-// Units take far longer than this, so that the last result is the one. The first leases are for none.
+// A lease came: for the last result, since results make room, though not each (a worker holds some seconds of
+// work). Units take far longer than this, so that the last result is the one. The first leases are for none.
 void Worker::replaced_locked(Instant now) {
   if (!room_since_) return;
   const std::lock_guard measuring(load_.measured.mutex);
@@ -151,37 +152,37 @@ void Worker::replaced_locked(Instant now) {
 void Worker::received(ToWorker message) {
   const Instant now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
-  std::visit(overloaded{[&](const Welcome&) {
-                          const std::lock_guard measuring(load_.measured.mutex);
-                          ++load_.measured.welcomed;
-                        },
-                        [&](const Refused& m) {
-                          fmt::print(stderr, "refused: {}\n", m.error.message);
-                          std::exit(1);
-                        },
-                        [&](const AssignLease& m) {
-                          if (m.brief) briefs_[m.lease.job] = *m.brief;
-                          for (const LeaseUnit& unit : m.lease.units) queue_.push_back({m.lease.job, m.lease.id, unit});
-                          replaced_locked(now);
-                          begin_locked(now);
-                        },
-                        [&](const ResultAck& m) {
-                          const auto sent = unacknowledged_.find(m.unit);
-                          if (sent == unacknowledged_.end()) return;
-                          const std::lock_guard measuring(load_.measured.mutex);
-                          ++load_.measured.acknowledged;
-                          load_.measured.refused += m.refused.has_value();
-                          load_.measured.ack.push_back(static_cast<float>(seconds_between(sent->second, now)));
-                          unacknowledged_.erase(sent);
-                        },
-                        [&](const CancelLease& m) {
-                          std::erase_if(queue_, [&](const Work& w) { return w.lease == m.lease; });
-                        },
-                        [&](const CancelJob& m) {
-                          std::erase_if(queue_, [&](const Work& w) { return w.job == m.job; });
-                        },
-                        [](const DrainNow&) {}},
-             message);
+  std::visit(
+      overloaded{
+          [&](const Welcome&) {
+            const std::lock_guard measuring(load_.measured.mutex);
+            ++load_.measured.welcomed;
+          },
+          [&](const Refused& m) {
+            fmt::print(stderr, "refused: {}\n", m.error.message);
+            std::exit(1);
+          },
+          [&](const AssignLease& m) {
+            if (m.brief) briefs_[m.lease.job] = *m.brief;
+            for (const LeaseUnit& unit : m.lease.units) queue_.push_back({m.lease.job, m.lease.id, unit});
+            replaced_locked(now);
+            begin_locked(now);
+          },
+          [&](const ResultAck& m) {
+            const auto sent = unacknowledged_.find(m.unit);
+            if (sent == unacknowledged_.end()) return;
+            const std::lock_guard measuring(load_.measured.mutex);
+            ++load_.measured.acknowledged;
+            load_.measured.refused += m.refused.has_value();
+            load_.measured.ack.push_back(static_cast<float>(seconds_between(sent->second, now)));
+            unacknowledged_.erase(sent);
+          },
+          [&](const CancelLease& m) {
+            std::erase_if(queue_, [&](const Work& w) { return w.lease == m.lease; });
+          },
+          [&](const CancelJob& m) { std::erase_if(queue_, [&](const Work& w) { return w.job == m.job; }); },
+          [](const DrainNow&) {}},
+      message);
 }
 
 void Worker::lost(Error) {
@@ -194,12 +195,14 @@ void Worker::finish() {
   const Work work = std::move(*in_hand_);
   in_hand_.reset();
   const JobBrief& brief = briefs_.at(work.job);
-  Partial partial{{brief.scene, brief.settings_digest, worker::fake_numeric_class(), work.unit.rect, work.unit.samples},
-                  {},
-                  {}};
+  Partial partial{
+      {brief.scene, brief.settings_digest, worker::fake_numeric_class(), work.unit.rect, work.unit.samples},
+      {},
+      {}};
   const auto half = static_cast<float>(work.unit.samples.count() / 2);
   partial.sums.resize(static_cast<std::size_t>(work.unit.rect.pixels()) * kPartialChannels);
-  for (std::size_t i = 0; i < partial.sums.size(); ++i) partial.sums[i] = half * (1.f + static_cast<float>(i & 7) / 64);
+  for (std::size_t i = 0; i < partial.sums.size(); ++i)
+    partial.sums[i] = half * (1.f + static_cast<float>(i & 7) / 64);
   UnitResult result;
   result.unit = {work.job, work.unit.tile, work.unit.round};
   result.lease = work.lease;
@@ -232,15 +235,19 @@ void print(Measured& m, double seconds, double cpu) {
                        quantile(v, .9), quantile(v, .99));
   };
   fmt::print(
-      "{{\"seconds\":{:.3f},\"sent\":{},\"acknowledged\":{},\"refused\":{},\"lost\":{},\"cpu_seconds\":{:.3f},"
+      "{{\"seconds\":{:.3f},\"sent\":{},\"acknowledged\":{},\"refused\":{},\"lost\":{},\"cpu_seconds\":{:.3f}"
+      ","
       "\"ack\":{},\"dispatch\":{},\"gap\":{}}}\n",
-      seconds, m.sent, m.acknowledged, m.refused, m.lost, cpu, figures(m.ack), figures(m.dispatch), figures(m.gap));
+      seconds, m.sent, m.acknowledged, m.refused, m.lost, cpu, figures(m.ack), figures(m.dispatch),
+      figures(m.gap));
 }
 
 double cpu_seconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
-  const auto of = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  const auto of = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return of(usage.ru_utime) + of(usage.ru_stime);
 }
 

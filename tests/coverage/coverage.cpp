@@ -47,8 +47,7 @@ std::vector<CoverageJob> run_jobs(int jobs, int threads, const std::function<Cov
   std::vector<CoverageJob> out(static_cast<std::size_t>(jobs));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i; (i = next++) < out.size();)
-      out[i] = run(i);
+    for (std::size_t i; (i = next++) < out.size();) out[i] = run(i);
   };
   std::vector<std::jthread> pool;
   for (int i = 0; i < threads; ++i) pool.emplace_back(work);
@@ -82,7 +81,8 @@ struct Realised {
 // `own`: the job is one of those that the truth was made of.
 Realised realised(const CoverageJob& job, const Truth& truth, std::size_t jobs, bool own) {
   Realised out;
-  const auto others = static_cast<double>(own ? jobs - 1 : jobs), values = static_cast<double>(job.image.size());
+  const auto others = static_cast<double>(own ? jobs - 1 : jobs),
+             values = static_cast<double>(job.image.size());
   for (std::size_t i = 0; i < job.image.size(); ++i) {
     const double right = (truth.sum[i] - (own ? job.image[i] : 0)) / others, d = job.image[i] - right;
     const double square = d * d - truth.variance[i] / others;
@@ -162,7 +162,8 @@ bool as_promised(const CoverageScene& scene, const Coverage& c) {
   if (scene.fireflies) return c.heavy_tail >= .95;
   const auto covered = [](double share) { return share >= .93 && share <= .97; };
   const auto right = [](const Ratio& r) { return std::abs(r.value - 1) <= .03; };
-  return covered(c.rmse) && covered(c.relmse) && right(c.mse_ratio) && right(c.relmse_ratio) && c.heavy_tail <= kWronglyDoubted;
+  return covered(c.rmse) && covered(c.relmse) && right(c.mse_ratio) && right(c.relmse_ratio) &&
+         c.heavy_tail <= kWronglyDoubted;
 }
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c) {

@@ -4,8 +4,8 @@
 // The right answer is the mean of all other jobs' images. It is independent of a job's image x, and its own
 // noise is known: with n others its variance is v / n, v the variance among jobs, and is subtracted:
 //   e^2 = (x - mean of others)^2 - v / n.
-// Of jobs that stop at a target it is the mean of as many uniform images with other seeds: what the stop rule might do to
-// all of its images alike would be part of their mean.
+// Of jobs that stop at a target it is the mean of as many uniform images with other seeds: what the stop rule
+// might do to all of its images alike would be part of their mean.
 #pragma once
 
 #include <cstdint>
@@ -46,8 +46,8 @@ struct Coverage {
 Coverage measure_coverage(const CoverageScene& scene, int jobs, int threads, std::uint64_t first = 1);
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c);  // for tables
-// Whether what docs/error.md promises holds: 93 to 97 % covered and ratios within 3 %; of fireflies that 95 % of the
-// jobs say so. Fewer jobs than 1,000 are held to it as they are.
+// Whether what docs/error.md promises holds: 93 to 97 % covered and ratios within 3 %; of fireflies that 95 %
+// of the jobs say so. Fewer jobs than 1,000 are held to it as they are.
 bool as_promised(const CoverageScene& scene, const Coverage& c);
 
 }  // namespace ls::test

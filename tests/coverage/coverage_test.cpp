@@ -39,7 +39,8 @@ TEST_P(ShortCoverage, TheIntervalHoldsTheTrueErrorAndTheEstimateIsRightInTheMean
   EXPECT_NEAR(c.mse_ratio.value, 1, kRatio + 4 * c.mse_ratio.sigma);
   EXPECT_NEAR(c.relmse_ratio.value, 1, kRatio + 4 * c.relmse_ratio.sigma);
   EXPECT_LT(c.mse_ratio.sigma, .05);  // or the bounds would say nothing
-  // "Don't trust yet" is for others: of n jobs that each say it with probability .05, four deviations more once in 16,000.
+  // "Don't trust yet" is for others: of n jobs that each say it with probability .05, four deviations more
+  // once in 16,000.
   EXPECT_LE(c.heavy_tail, .05 + 4 * std::sqrt(.05 * .95 / kJobs));
 }
 
@@ -51,8 +52,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ShortCoverage,
                            return name;
                          });
 
-// Jobs that stop at a target choose how long they go on by the very noise that they measure. Few jobs: it is the ratios
-// that would tell; of 40 shares four standard deviations are .14.
+// Jobs that stop at a target choose how long they go on by the very noise that they measure. Few jobs: it is
+// the ratios that would tell; of 40 shares four standard deviations are .14.
 TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
   CoverageScene scene = scene_of("surfaces, smooth", 4096);
   scene.target = 4e-4;

@@ -1,5 +1,6 @@
 // error_coverage [JOBS] [THREADS] [NAME] [SEED]: the tables of docs/error.md, or those rows of the first
-// whose name begins so; with JOBS seeds from SEED on (1). Exit code 1: a row is not what docs/error.md promises.
+// whose name begins so; with JOBS seeds from SEED on (1). Exit code 1: a row is not what docs/error.md
+// promises.
 #include <fmt/format.h>
 
 #include <cstdio>

@@ -48,8 +48,7 @@ void check(const LsVdbGrid& grid) {
   must(grid.channels == 1 || grid.channels == 3, "a grid has 1 or 3 channels");
   const auto nodes = static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2];
   for (std::uint64_t i = 0; i < nodes * static_cast<std::uint64_t>(grid.channels); ++i)
-    must(std::isfinite(grid.values[i]) && grid.values[i] >= 0,
-         "a grid's values are finite and not negative");
+    must(std::isfinite(grid.values[i]) && grid.values[i] >= 0, "a grid's values are finite and not negative");
 }
 
 std::string jpeg() {
@@ -278,7 +277,7 @@ void volume(Bytes input) {
 Seeds volume_seeds() {
   test::NvdbKit packed;
   packed.codec = 1;
-  Seeds seeds{"v" + vol(1, 1, 4), "v" + vol(1, 3, 4), "v" + vol(2, 1, 2), "v" + vol(3, 3, 1),
+  Seeds seeds{"v" + vol(1, 1, 4), "v" + vol(1, 3, 4), "v" + vol(2, 1, 2),  "v" + vol(3, 3, 1),
               "x" + raw_grid(),   "z" + raw_grid(),   "n" + packed.file(), "r" + vdb_reply_seed()};
   for (char i = 0; i < 6; ++i) seeds.push_back(std::string("b") + i), seeds.push_back(std::string("f") + i);
   std::string patches = std::string("b") + '\0';

@@ -51,8 +51,8 @@ std::string packed(const std::vector<std::string>& inputs) {
   put_size(pack, all.size());
   uLongf size = compressBound(all.size());
   pack.resize(4 + size);
-  compress2(reinterpret_cast<Bytef*>(pack.data() + 4), &size, reinterpret_cast<const Bytef*>(all.data()), all.size(),
-            Z_BEST_COMPRESSION);
+  compress2(reinterpret_cast<Bytef*>(pack.data() + 4), &size, reinterpret_cast<const Bytef*>(all.data()),
+            all.size(), Z_BEST_COMPRESSION);
   pack.resize(4 + size);
   return pack;
 }

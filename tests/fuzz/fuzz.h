@@ -37,8 +37,8 @@ void must(bool kept, std::string_view promise);
 std::vector<Bytes> parts_of(Bytes input, std::size_t most);
 std::string with_length(std::string_view part);
 
-// Many inputs in one file: the size of all, four bytes, little endian, and then by zlib each after its length, likewise.
-// Of a file that is no such there is none.
+// Many inputs in one file: the size of all, four bytes, little endian, and then by zlib each after its
+// length, likewise. Of a file that is no such there is none.
 std::string packed(const std::vector<std::string>& inputs);
 std::vector<std::string> unpacked(std::string_view pack);
 

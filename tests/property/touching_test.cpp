@@ -1,4 +1,5 @@
-// What must not change an image where surfaces lie on each other: a twin that nobody sees, a hair between them, a cut.
+// What must not change an image where surfaces lie on each other: a twin that nobody sees, a hair between
+// them, a cut.
 #include "tests/property/metamorphic.h"
 
 namespace ls::test {
@@ -40,7 +41,8 @@ SceneKit fog_in_a_corner(const Cuts& cuts, bool grid, const std::string& integra
   std::vector<float> values(6 * 6 * 6);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 11) / 8;
   const MediumIndex fog =
-      grid ? kit.heterogeneous(kit.grid({6, 6, 6}, values, translate({-1, -1, -1}) * scale(2)), {.9, .8, .5}, .75, .5)
+      grid ? kit.heterogeneous(kit.grid({6, 6, 6}, values, translate({-1, -1, -1}) * scale(2)), {.9, .8, .5},
+                               .75, .5)
            : kit.homogeneous({.25, .5, 1}, {.9, .8, .5}, .5);
   const BsdfIndex null = kit.null();
   for (std::size_t i = 1; i < cuts.x.size(); ++i)
@@ -68,9 +70,10 @@ void expect_same_fog(const std::vector<Cuts>& others) {
   for (const bool grid : {false, true})
     for (const char* integrator : {"volpath", "volpath_distant_mis"})
       for (const Cuts& other : others) {
-        const Comparison c = look(fog_in_a_corner({}, grid, integrator), fog_in_a_corner(other, grid, integrator),
-                                  seed += 10, level, {256, 4096});
-        EXPECT_EQ(c.verdict, Verdict::alike) << integrator << (grid ? ", grid: " : ", homogeneous: ") << c.told;
+        const Comparison c = look(fog_in_a_corner({}, grid, integrator),
+                                  fog_in_a_corner(other, grid, integrator), seed += 10, level, {256, 4096});
+        EXPECT_EQ(c.verdict, Verdict::alike)
+            << integrator << (grid ? ", grid: " : ", homogeneous: ") << c.told;
       }
 }
 
@@ -78,8 +81,8 @@ TEST(Touching, BoxesThatShareFacesAreOneBox) {
   expect_same_fog({{{-1, .25, 1}, {-1, 1}, {-1, 1}}, {{-1, 0, 1}, {-1, -.5, 1}, {-1, .125, .75, 1}}});
 }
 
-// A hair takes 1.2e-4 of the fog from each face, in place of which light may come through: some 4e-4 of the image. The
-// standard error of a second look is 1e-3 of it or more.
+// A hair takes 1.2e-4 of the fog from each face, in place of which light may come through: some 4e-4 of the
+// image. The standard error of a second look is 1e-3 of it or more.
 TEST(Touching, AHairBetweenFogAndWallsChangesNothing) {
   constexpr double kHair = 0x1p-13;
   expect_same_fog({{{-1, 1 - kHair}, {-1, 1 - kHair}, {-1 + kHair, 1}}});

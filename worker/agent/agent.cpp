@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "common/base/log.h"
-#include "common/base/step.h"
 #include "common/base/overloaded.h"
+#include "common/base/step.h"
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 

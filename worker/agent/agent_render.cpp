@@ -6,8 +6,8 @@
 #include <new>
 #include <utility>
 
-#include "common/protocol/limits.h"
 #include "common/base/step.h"
+#include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {

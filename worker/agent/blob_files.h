@@ -23,9 +23,9 @@ class BlobFiles {
  public:
   virtual ~BlobFiles() = default;
   // Blocks while it fetches. unavailable: the transfer was cut, try again later (what came is kept).
-  // resource_exhausted, internal: trouble of this machine or its coordinator (a full disk, the cache limit, a blob
-  // that the coordinator lacks) that says nothing about the job and may pass. Other errors are final: not_found of
-  // files that can come from nowhere.
+  // resource_exhausted, internal: trouble of this machine or its coordinator (a full disk, the cache limit, a
+  // blob that the coordinator lacks) that says nothing about the job and may pass. Other errors are final:
+  // not_found of files that can come from nowhere.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
   // For the hello: at most `limit`, the most recently used first.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;

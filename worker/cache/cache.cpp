@@ -37,7 +37,8 @@ tl::unexpected<Error> io_error(const char* what, const fs::path& path) {
   return fail(Errc::internal, fmt::format("{} {}: {}", what, path.string(), std::strerror(errno)));
 }
 
-// What the coordinator cannot give now, as it is missing there, damaged or refused to this worker, it may give later.
+// What the coordinator cannot give now, as it is missing there, damaged or refused to this worker, it may
+// give later.
 Error passing(Error error) {
   const bool says_so = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!says_so) error.code = Errc::internal;
@@ -77,8 +78,7 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) 
   }
   auto file = open_verified(blob.digest);
   if (!file || *file) return file;
-  return fail(Errc::internal,
-              fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
+  return fail(Errc::internal, fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
 }
 
 // Null if it is not here, or is not what its name says (then it is removed). An error if this machine cannot

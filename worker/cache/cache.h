@@ -2,8 +2,8 @@
 //
 // A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone
 // on with. A file that no longer has its digest (bad disk, meddling) is found when it is first used by this
-// process, thrown away and fetched again. One that arrives wrong is complained of, and tried again: no error of a
-// transfer is ever the job's fault. Above the limit, which counts what is on its way too, the least
+// process, thrown away and fetched again. One that arrives wrong is complained of, and tried again: no error
+// of a transfer is ever the job's fault. Above the limit, which counts what is on its way too, the least
 // recently used go first, never one in use: the file is held by a shared flock while a BlobFile lives, also
 // against other workers that use the same folder. Only files of the cache's own names at their own places are
 // ever removed; CACHEDIR.TAG tells backups to pass by.
@@ -28,7 +28,8 @@ class PartialFile;
 class BlobCache final : public BlobFiles {
  public:
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  using Fetch = std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
+  using Fetch =
+      std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
 
   // limit_bytes 0: none. Makes the folder.
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,

@@ -29,7 +29,8 @@ struct ChildOptions {
   Duration prepare_limit = std::chrono::minutes(30);  // to build one world
   Duration forget_limit = std::chrono::minutes(1);    // to free one
   Duration start_limit = std::chrono::minutes(2);     // until the child says hello (its numeric battery)
-  // Before a new child takes the place of one that ended by itself before it was ready; twice as long each time.
+  // Before a new child takes the place of one that ended by itself before it was ready; twice as long each
+  // time.
   Duration respawn_pause = std::chrono::seconds(1);
 };
 

@@ -52,8 +52,9 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  std::uint32_t text_bytes = 0;  // the reason, when it failed; of a rendered unit its health, if it isn't clean
-  Digest numeric_class;          // hello
+  std::uint32_t text_bytes =
+      0;                 // the reason, when it failed; of a rendered unit its health, if it isn't clean
+  Digest numeric_class;  // hello
   double cpu_seconds = 0, wall_seconds = 0;
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);

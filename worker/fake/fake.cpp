@@ -46,8 +46,10 @@ class FakeBackend final : public LocalBackend {
     }
     const bool faulty = matches(brief.settings.seed, unit);
     if (faulty) misbehave(stop);
-    const double work = options_.sample_seconds * static_cast<double>(unit.rect.pixels()) * static_cast<double>(unit.samples.count());
-    if (!pause(options_.delay + from_seconds(work), stop)) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
+    const double work = options_.sample_seconds * static_cast<double>(unit.rect.pixels()) *
+                        static_cast<double>(unit.samples.count());
+    if (!pause(options_.delay + from_seconds(work), stop))
+      return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
     RenderedUnit out;
     out.partial =
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples},

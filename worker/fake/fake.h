@@ -26,8 +26,9 @@ Result<FakeFault> parse_fake_fault(std::string_view text);
 Digest fake_numeric_class();  // SHA-256 of "fake"
 
 struct FakeOptions {
-  Duration delay{};           // of each unit; waited for
-  double sample_seconds = 0;  // that each sample of a pixel takes, besides; told as CPU time, as if it were worked
+  Duration delay{};  // of each unit; waited for
+  double sample_seconds =
+      0;  // that each sample of a pixel takes, besides; told as CPU time, as if it were worked
   FakeFault fault;
   Digest numeric_class = fake_numeric_class();  // another one, to stand for another kind of machine
 };

@@ -1,4 +1,5 @@
-// Part of accel.cpp: what Embree calls back for spheres, disks and cylinders, and for all that lies in a place.
+// Part of accel.cpp: what Embree calls back for spheres, disks and cylinders, and for all that lies in a
+// place.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -45,8 +46,8 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
   *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
 }
 
-// What a callback knows of the ray: Embree's context, and the ray as it is in the world. In an instance Embree
-// hands over one that it has taken to the group's space in float32.
+// What a callback knows of the ray: Embree's context, and the ray as it is in the world. In an instance
+// Embree hands over one that it has taken to the group's space in float32.
 struct Tracing {
   RTCIntersectContext context;
   const V3 *o, *d;
@@ -57,7 +58,8 @@ struct Tracing {
 };
 
 template <class Shape>
-double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context, const RTCRay& ray) {
+double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context,
+                      const RTCRay& ray) {
   LS_COUNT(user_geometry);
   const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
   const Shape& s = set.shapes[prim];

@@ -29,8 +29,8 @@ void MediaState::enter(const Body& b, bool sheet) {
 }
 
 // A path that was never seen to enter began inside: then the background stood for the interior. And what a
-// boundary says of its outside holds, if nothing else accounts for it: not where it was entered from somewhere
-// that has a medium.
+// boundary says of its outside holds, if nothing else accounts for it: not where it was entered from
+// somewhere that has a medium.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;
@@ -40,7 +40,8 @@ void MediaState::leave(const Body& b, bool through) {
   } else if (through && b.interior != kNone && background_ == b.interior) {
     background_ = b.exterior;
   }
-  if (!known && b.exterior != kNone && count_of(b.exterior) <= 0 && (through || count_ == 0)) background_ = b.exterior;
+  if (!known && b.exterior != kNone && count_of(b.exterior) <= 0 && (through || count_ == 0))
+    background_ = b.exterior;
 }
 
 int MediaState::count_of(std::uint32_t medium) const {

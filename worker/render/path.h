@@ -116,9 +116,9 @@ class PathTracer {
     beta_ *= f.weight;
     if constexpr (F.chromatic) density_ *= f.density;
   }
-  // What a point that lies so from a point of a surface lacks of the offset that keeps it clear of it. Beyond the
-  // surface it lacks more than all of it: a line that is nearly parallel to a curved surface leaves it before the line
-  // from the moved start does, along which the way was measured.
+  // What a point that lies so from a point of a surface lacks of the offset that keeps it clear of it. Beyond
+  // the surface it lacks more than all of it: a line that is nearly parallel to a curved surface leaves it
+  // before the line from the moved start does, along which the way was measured.
   static V3 clear_of(const V3& offset, const V3& from_surface) {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);

@@ -39,7 +39,7 @@ struct Breadcrumb {
 struct TileResult {
   std::vector<float> sums;  // planes, see common/image/partial.h: six, and those of the settings' AOVs
   Health health;            // of the samples, by cause and pixel; not of the inputs
-  bool stopped = false;  // `stop` was seen: sums are not valid
+  bool stopped = false;     // `stop` was seen: sums are not valid
 };
 
 // Renders the sample range of a tile, on the calling thread. A pure function of (world, tile, samples).

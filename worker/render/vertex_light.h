@@ -36,8 +36,8 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Stre
   }
 }
 
-// e / f, both of one spot. The means of macro cells may take f to 0 where flights still get to: then it is the
-// largest ratio, for all strategies alike.
+// e / f, both of one spot. The means of macro cells may take f to 0 where flights still get to: then it is
+// the largest ratio, for all strategies alike.
 inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
 
 template <Features F>

@@ -37,10 +37,10 @@ class World {
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;
-  scene::Needs needs;       // of the scene; `need` follows from it
-  bool overlaps = false;    // media may lie within or across each other: paths keep a MediaState,
-  MediaState camera_media;  // which begins as this
-  bool coincident = false;  // surfaces lie on each other, one of them null (coincident.h)
+  scene::Needs needs;             // of the scene; `need` follows from it
+  bool overlaps = false;          // media may lie within or across each other: paths keep a MediaState,
+  MediaState camera_media;        // which begins as this
+  bool coincident = false;        // surfaces lie on each other, one of them null (coincident.h)
   bool lights_on_others = false;  // null ones that shine are among them
   Features need;
   bool use_media = true;     // false: the integrator `path`, which sees no media

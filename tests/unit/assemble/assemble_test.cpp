@@ -148,7 +148,9 @@ TEST(Assembly, ASnapshotOfAnEarlierProgramIsRead) {
   Assembly assembly(kGrid, false);
   for (TileIndex t = 0; t < kGrid.count(); ++t) ASSERT_TRUE(assembly.fold(t, 0, waiting(t, {0, 2})));
   std::vector<std::byte> old;
-  const auto put = [&](std::span<const std::byte> bytes) { old.insert(old.end(), bytes.begin(), bytes.end()); };
+  const auto put = [&](std::span<const std::byte> bytes) {
+    old.insert(old.end(), bytes.begin(), bytes.end());
+  };
   const auto part = [&](std::span<const std::byte> bytes) {
     const std::uint64_t length = bytes.size();
     put(std::as_bytes(std::span(&length, 1)));
@@ -183,7 +185,8 @@ TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {
       w.place = on_disk;
       (r % 2 == 0 ? one : other).hold(0, r, std::move(w));
     }
-    for (RoundIndex r = 0; r < 4000; ++r) kept += (r % 2 == 0 ? one : other).take(0, r, {0, 2})->partial.has_value();
+    for (RoundIndex r = 0; r < 4000; ++r)
+      kept += (r % 2 == 0 ? one : other).take(0, r, {0, 2})->partial.has_value();
     EXPECT_EQ(kept, (limits::kMaxPendingPartials - before) / kEach);
     WaitingPartial nowhere = waiting(0, {0, 2});  // what is on no disk is kept in any case
     one.hold(0, 0, std::move(nowhere));

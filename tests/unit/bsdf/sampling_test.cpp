@@ -38,7 +38,8 @@ void add_more(std::vector<Named>& all) {
   const auto wide = [&](std::string name, Scene s) {
     all.push_back({std::move(name), bench(std::move(s)), true});
   };
-  one_sided("gold that scatters often", with_compensation(rough_metal(Microfacet::ggx, .6, .6, kGoldEta, kGoldK)));
+  one_sided("gold that scatters often",
+            with_compensation(rough_metal(Microfacet::ggx, .6, .6, kGoldEta, kGoldK)));
   one_sided("plastic that scatters often",
             with_compensation(rough_plastic(Microfacet::beckmann, .4, 1.5, 1, true, {.5, .4, .3})));
   wide("glass that scatters often", with_compensation(rough_glass(Microfacet::ggx, .5, .5, 1.5, 1)));

@@ -102,7 +102,8 @@ TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
   source_.lie = "wrong";
 
   EXPECT_EQ(content(open()->acquire(blob).value()->path()), "right");
-  EXPECT_THAT(source_.complaints, testing::ElementsAre(false, true)) << "so that the coordinator looks at its own";
+  EXPECT_THAT(source_.complaints, testing::ElementsAre(false, true))
+      << "so that the coordinator looks at its own";
 }
 
 TEST_F(Cache, WhatKeepsArrivingWrongIsTroubleThatMayPassAndNotTheJobsFault) {

@@ -129,13 +129,15 @@ TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
   for (const bool grid : {false, true}) {
     const std::string id = grid ? "mine/grid/volpath" : "mine/homogeneous/volpath";
     Table t;
-    t.mean(id, "N0", "", [=] { return nothing(grid); }, grey(1));
+    t.mean(
+        id, "N0", "", [=] { return nothing(grid); }, grey(1));
     t.exact(id, "N0", "", [=](const Bench& b) { return every_value(b, nothing(grid), 4, grey(1), 0); });
     for (const cli::ValidateCase& line : run_cases(t, {}))
       EXPECT_NE(line.why.find("asks nothing of media"), std::string::npos) << id << ": " << line.why;
   }
   Table other;
-  other.exact("mine", "N0", "", [=](const Bench& b) { return every_value(b, nothing(false), 4, grey(1), 0); });
+  other.exact("mine", "N0", "",
+              [=](const Bench& b) { return every_value(b, nothing(false), 4, grey(1), 0); });
   EXPECT_TRUE(run_cases(other, {}).at(0).passed());
 }
 
@@ -164,19 +166,21 @@ TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
 // Eight digits of the fluence of a point, by quadrature of its Fourier transform: a way of its own.
 TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
   constexpr double kRadii[] = {.25, 1, 2, 5};
-  const std::map<double, std::array<double, 4>> known = {{.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
-                                                         {.5, {1.2648813, .058695138, .0079276237, 1.2913241e-4}},
-                                                         {.8, {1.5188779, .10741259, .022065806, 9.5217959e-4}},
-                                                         {.9, {1.6393113, .14328386, .037126399, .0029151251}},
-                                                         {.99, {1.8031446, .22019457, .084976895, .019841736}},
-                                                         {.999, {1.8404525, .24795726, .10858551, .036265014}}};
+  const std::map<double, std::array<double, 4>> known = {
+      {.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
+      {.5, {1.2648813, .058695138, .0079276237, 1.2913241e-4}},
+      {.8, {1.5188779, .10741259, .022065806, 9.5217959e-4}},
+      {.9, {1.6393113, .14328386, .037126399, .0029151251}},
+      {.99, {1.8031446, .22019457, .084976895, .019841736}},
+      {.999, {1.8404525, .24795726, .10858551, .036265014}}};
   for (const auto& [c, phi] : known)
     for (std::size_t i = 0; i < 4; ++i)  // digits given: half of the last of eight is 5e-8 at most
       EXPECT_NEAR(endless_fluence(c, kRadii[i], 0), phi[i], 6e-8 * phi[i]) << c << ' ' << kRadii[i];
 }
 
-// Over a ball: the mean of points' fluence, here along the ball's shells (midpoints; the angle in closed form would be
-// what is tested). 40 x 40 midpoints of a function that curves by about 1 per unit of each: off by h^2 = 6e-4 of it.
+// Over a ball: the mean of points' fluence, here along the ball's shells (midpoints; the angle in closed form
+// would be what is tested). 40 x 40 midpoints of a function that curves by about 1 per unit of each: off by
+// h^2 = 6e-4 of it.
 TEST(EndlessMedium, FluenceOfABallIsTheMeanOfItsPoints) {
   constexpr double kRadius = .5, kDistance = 1, kAlbedo = .8;
   constexpr int kSteps = 40;

@@ -45,9 +45,10 @@ TEST(ProgressLine, OfAJobInDoubtPromisesNothing) {
   ProgressFigures figures = kForecast;
   figures.doubtful = true;
 
-  EXPECT_EQ(progress_line(figures, 200),
-            " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123 (don't trust yet), target 0.001  "
-            "at least 4:12 left, 1:06 with 8 more");
+  EXPECT_EQ(
+      progress_line(figures, 200),
+      " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123 (don't trust yet), target 0.001  "
+      "at least 4:12 left, 1:06 with 8 more");
   EXPECT_EQ(progress_line(figures, 70),
             " 42 % 27.2 spp  relMSE 0.0123 (don't trust yet)  at least 4:12 left");
 }

@@ -19,7 +19,8 @@ using testing::Not;
 constexpr const char* kWords = "don't trust yet: few pixels carry the error (like 16 of 76800)";
 
 json some_job() {
-  return json::parse(R"({"id": "j-1", "name": "bath.xml", "state": "running", "progress": 0.4, "size": [320, 240],
+  return json::parse(
+      R"({"id": "j-1", "name": "bath.xml", "state": "running", "progress": 0.4, "size": [320, 240],
     "spp": 512, "spp_asked": 512, "spp_done": 215, "rmse": 0.031, "rmse_ci95": [0.0301, 0.032], "relmse": 0.00418,
     "relmse_ci95": [0.0039, 0.00448], "target_error": 0.001, "eta_seconds": 252, "eta_ci95": [186, 330],
     "eta_with_8_more": 66, "eta_with_8_more_ci95": [50, 90], "elapsed_seconds": 187, "core_seconds": 742,
@@ -68,10 +69,10 @@ TEST(ShownJob, TellsAllOfItsErrorsFigures) {
   const std::string shown = job_text(job);
 
   for (const char* row :
-       {"relMSE +0.00418 \\(0.0039 to 0.00448\\)", "RMSE +0.031 \\(0.0301 to 0.032\\)", "target relMSE +0.001",
-        "true relMSE +0.00443", "true RMSE +0.0319", "FLIP +0.0271", "verdict +converging as expected",
-        "few hits +12 pixels", "slope +-0.98 \\(-1.06 to -0.9\\)", "efficiency +0.322 ",
-        "left +4:12 \\(3:06 to 5:30\\)", "not reached yet +4,096 pixels"})
+       {"relMSE +0.00418 \\(0.0039 to 0.00448\\)", "RMSE +0.031 \\(0.0301 to 0.032\\)",
+        "target relMSE +0.001", "true relMSE +0.00443", "true RMSE +0.0319", "FLIP +0.0271",
+        "verdict +converging as expected", "few hits +12 pixels", "slope +-0.98 \\(-1.06 to -0.9\\)",
+        "efficiency +0.322 ", "left +4:12 \\(3:06 to 5:30\\)", "not reached yet +4,096 pixels"})
     EXPECT_THAT(shown, ContainsRegex(row));
 }
 
@@ -85,13 +86,15 @@ TEST(ShownJob, NeverTellsNoughtOfWhatAReferenceCannotTell) {
 
   EXPECT_THAT(below, ContainsRegex("true relMSE +below the reference's noise"));
   EXPECT_THAT(below, ContainsRegex("true RMSE +below the reference's noise"));
-  EXPECT_THAT(same, ContainsRegex("true relMSE +0 \\(not to be trusted: the reference has this job's seed\\)"));
+  EXPECT_THAT(same,
+              ContainsRegex("true relMSE +0 \\(not to be trusted: the reference has this job's seed\\)"));
 }
 
 TEST(ShownJob, LeavesOutWhatIsNotKnown) {
   const std::string shown = job_text({{"id", "j-1"}, {"reference", nullptr}, {"few_hits", nullptr}});
 
-  for (const char* row : {"true", "FLIP", "verdict", "few hits", "slope", "efficiency", "not reached", "target"})
+  for (const char* row :
+       {"true", "FLIP", "verdict", "few hits", "slope", "efficiency", "not reached", "target"})
     EXPECT_THAT(shown, Not(HasSubstr(row)));
 }
 
@@ -173,9 +176,10 @@ TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
     "trusted": false, "verdict_kind": "early", "verdict": "no sample has found light",
     "forecast": {"target": 0.2, "core_seconds": 60, "core_seconds_ci95": [50, 80]}})");
 
-  EXPECT_THAT(report_summary(report.dump()),
-              HasSubstr(", relMSE 0.39: don't trust yet: no sample has found light; 0.2 would cost at least 1:00 "
-                        "more on one core"));
+  EXPECT_THAT(
+      report_summary(report.dump()),
+      HasSubstr(", relMSE 0.39: don't trust yet: no sample has found light; 0.2 would cost at least 1:00 "
+                "more on one core"));
   EXPECT_THAT(report_summary(report.dump()), Not(HasSubstr("0.8")));
   report["trusted"] = true;
   EXPECT_THAT(report_summary(report.dump()), HasSubstr("relMSE 0.39 (0.2 to 0.8); 0.2 would cost 1:00 more"));

@@ -81,9 +81,10 @@ TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
   }
 }
 
-// What is only probably wanted is lent when a thread would have nothing to do, two units a thread at most, and what the
-// rule would want next goes first: so with these errors only that is in vain which is out when the last level is reached, or
-// came just before. Errors that fall faster than as 1/n, as those of low-discrepancy samples do, make the rule foresee too much.
+// What is only probably wanted is lent when a thread would have nothing to do, two units a thread at most,
+// and what the rule would want next goes first: so with these errors only that is in vain which is out when
+// the last level is reached, or came just before. Errors that fall faster than as 1/n, as those of
+// low-discrepancy samples do, make the rule foresee too much.
 TEST(Adaptive, FewUnitsAreRenderedInVain) {
   for (const auto [workers, threads] : {std::pair(1, 1), {1, 4}, {4, 1}, {3, 4}}) {
     Rig rig;
@@ -99,8 +100,8 @@ TEST(Adaptive, FewUnitsAreRenderedInVain) {
   }
 }
 
-// Waiting for the worker to have next to nothing is no reason to pass a job over: leases of others in between would keep
-// it from that.
+// Waiting for the worker to have next to nothing is no reason to pass a job over: leases of others in between
+// would keep it from that.
 TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
   Rig rig;
   rig.rel_error = uneven_error;

@@ -18,11 +18,11 @@ class Clockwork {
 
   Rig rig;
   std::function<double(const UnitKey&)> cost = [](const UnitKey&) { return 0.5; };  // core seconds
-  std::map<std::string, double> slow;  // factors of workers that are slower than others
+  std::map<std::string, double> slow;     // factors of workers that are slower than others
   std::map<std::string, double> seconds;  // that each job has had
   std::map<std::string, std::map<std::string, std::uint64_t>> units;  // by job and worker
-  std::map<UnitKey, Digest> accepted, arrived;  // the first result that came
-  std::map<std::string, double> finished;       // when
+  std::map<UnitKey, Digest> accepted, arrived;                        // the first result that came
+  std::map<std::string, double> finished;                             // when
   std::function<Digest(const std::string& worker, const UnitKey&, const SampleRange&)> pixels =
       [](const std::string&, const UnitKey& unit, const SampleRange& range) { return honest(unit, range); };
   std::vector<Effect> effects;  // all but folds and assignments
@@ -59,7 +59,9 @@ class Clockwork {
   }
   bool idle() const {
     for (const JobId& job : rig.farm.jobs())
-      if (const auto f = rig.farm.job(job); f->state == JobState::running && rig.farm.why_waiting(job).empty()) return false;
+      if (const auto f = rig.farm.job(job);
+          f->state == JobState::running && rig.farm.why_waiting(job).empty())
+        return false;
     return true;
   }
   template <class T>
@@ -104,8 +106,10 @@ class Clockwork {
       if (const auto* r = std::get_if<RecordUnit>(&e)) accepted[r->unit] = r->digest;
       if (const auto* f = std::get_if<JobFinished>(&e)) finished[f->job.value] = now();
       if (const auto* d = std::get_if<TileDiscarded>(&e))
-        std::erase_if(accepted, [&](const auto& a) { return a.first.job == d->job && a.first.tile == d->tile; });
-      if (!std::holds_alternative<Fold>(e) && !std::holds_alternative<Send>(e)) effects.push_back(std::move(e));
+        std::erase_if(accepted,
+                      [&](const auto& a) { return a.first.job == d->job && a.first.tile == d->tile; });
+      if (!std::holds_alternative<Fold>(e) && !std::holds_alternative<Send>(e))
+        effects.push_back(std::move(e));
     }
   }
 

@@ -117,8 +117,12 @@ class Rig {
     return result(name, unit);
   }
   std::vector<Effect> result(const std::string& name, const Held& unit) {
-    return send(UnitAccepted{
-        unit.key(), unit.unit.samples, honest(unit.key(), unit.unit.samples), {name}, cpu_seconds, wait_seconds});
+    return send(UnitAccepted{unit.key(),
+                             unit.unit.samples,
+                             honest(unit.key(), unit.unit.samples),
+                             {name},
+                             cpu_seconds,
+                             wait_seconds});
   }
   std::vector<Effect> fail(const std::string& name, bool scene_at_fault = false) {
     const Held unit = take(name);

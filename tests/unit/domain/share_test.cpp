@@ -13,8 +13,8 @@ JobPlan plan_for(const std::string& owner, const std::string& id, int tiles = 40
   return plan;
 }
 
-// Of a farm of four workers with two threads: what one lease and the unit that ends it can be too much, for each
-// of them, and what the farm may prefer worlds that are loaded for.
+// Of a farm of four workers with two threads: what one lease and the unit that ends it can be too much, for
+// each of them, and what the farm may prefer worlds that are loaded for.
 constexpr double kThreads = 8;
 constexpr double kBound = kThreads * (kLeasesPerWorker * kLeaseSeconds + 1) + kThreads * kLocalitySeconds;
 
@@ -60,7 +60,8 @@ TEST(Shares, WhoComesLateBeginsEvenAndNobodyPaysForHavingBeenAlone) {
   work.run(200);
 
   EXPECT_NEAR(work.seconds["first"] - before, work.seconds["second"], kBound);
-  EXPECT_GT(work.seconds["first"] - before, 50 * kThreads) << "ann is not made to wait until bob has had as much";
+  EXPECT_GT(work.seconds["first"] - before, 50 * kThreads)
+      << "ann is not made to wait until bob has had as much";
 }
 
 TEST(Shares, WhoWaitsPausedSavesUpNoTurns) {
@@ -90,8 +91,8 @@ TEST(Shares, CountWithinAPriorityOnly) {
   EXPECT_GT(work.seconds["urgent"], 20 * kThreads - 2 * kThreads * kLeasesPerWorker * kLeaseSeconds);
 }
 
-// Users with any number of jobs of any cost, workers that come and go: who has work all the time has had as much as
-// any other such user, but for a lease each and the preference for loaded worlds.
+// Users with any number of jobs of any cost, workers that come and go: who has work all the time has had as
+// much as any other such user, but for a lease each and the preference for loaded worlds.
 TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed) {
     std::mt19937_64 random(seed);
@@ -111,7 +112,8 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
     const std::uint64_t workers = 3 + pick(4);
     const auto name = [&](std::uint64_t i) { return "w" + std::to_string(i); };
     double threads = 0;
-    for (std::uint64_t i = 0; i < workers; ++i) work.join(name(i), 1 + static_cast<int>(i % 3)), threads += 1 + static_cast<double>(i % 3);
+    for (std::uint64_t i = 0; i < workers; ++i)
+      work.join(name(i), 1 + static_cast<int>(i % 3)), threads += 1 + static_cast<double>(i % 3);
     for (int turn = 0; turn < 8; ++turn) {
       const std::uint64_t i = pick(workers);
       chance_of(random, 50) ? work.lose(name(i)) : work.join(name(i), 1 + static_cast<int>(i % 3));
@@ -120,8 +122,11 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
     ASSERT_EQ(work.rig.farm.audit(), "") << "seed " << seed;
     std::map<std::string, double> had;
     for (const auto& [id, owner] : owners) had[owner] += work.seconds[id];
-    const auto [least, most] = std::minmax_element(had.begin(), had.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    EXPECT_LE(most->second - least->second, threads * (kLeasesPerWorker * kLeaseSeconds + 2 + kLocalitySeconds)) << "seed " << seed;
+    const auto [least, most] = std::minmax_element(
+        had.begin(), had.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    EXPECT_LE(most->second - least->second,
+              threads * (kLeasesPerWorker * kLeaseSeconds + 2 + kLocalitySeconds))
+        << "seed " << seed;
   }
 }
 
@@ -252,9 +257,10 @@ TEST(Memory, AJobTooLargeForEveryWorkerSaysSo) {
 
   rig.submit(plan);
 
-  EXPECT_EQ(rig.farm.why_waiting({"j"}),
-            "a has 4.0 GiB of memory and the job needs at least 8.0 GiB; b has 900 MiB of memory and the job needs "
-            "at least 8.0 GiB");
+  EXPECT_EQ(
+      rig.farm.why_waiting({"j"}),
+      "a has 4.0 GiB of memory and the job needs at least 8.0 GiB; b has 900 MiB of memory and the job needs "
+      "at least 8.0 GiB");
   rig.join("c", 1, 1, {}, 8ull << 30);
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
 }

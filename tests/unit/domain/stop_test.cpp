@@ -264,7 +264,8 @@ TEST(StopByTime, AWorkerThatSharesItsCoresEndsInTimeToo) {
   render_all_of_w(rig, kWall);
 
   EXPECT_EQ(rig.job().stopped, StopReason::time);
-  EXPECT_NEAR(seconds(rig.now.time_since_epoch()), 30, 3 * kWall) << "a lease of two CPU seconds would take 24";
+  EXPECT_NEAR(seconds(rig.now.time_since_epoch()), 30, 3 * kWall)
+      << "a lease of two CPU seconds would take 24";
 }
 
 TEST(StopByTime, EveryTileGetsItsFirstRound) {

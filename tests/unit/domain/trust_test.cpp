@@ -19,8 +19,9 @@ bool all_honest(const Clockwork& work, const JobPlan& plan) {
 // Renders each unit that `who` says wrong.
 auto liars(std::set<std::string> who) {
   return [who = std::move(who)](const std::string& worker, const UnitKey& unit, const SampleRange& range) {
-    return who.contains(worker) ? digest_number(std::hash<std::string>{}(worker) ^ range.s1 ^ (unit.tile << 8))
-                                : honest(unit, range);
+    return who.contains(worker)
+               ? digest_number(std::hash<std::string>{}(worker) ^ range.s1 ^ (unit.tile << 8))
+               : honest(unit, range);
   };
 }
 
@@ -78,7 +79,8 @@ TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
   EXPECT_GT(work.rig.farm.audits().dropped, 0u);
 }
 
-// One result of `a` is accepted, and being rendered again, when the coordinator dies; what it comes back with.
+// One result of `a` is accepted, and being rendered again, when the coordinator dies; what it comes back
+// with.
 JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
   JobRestored event;
   event.plan = plan_of("j", tiles, 2);
@@ -369,7 +371,8 @@ TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
   EXPECT_EQ(rig.farm.audit(), "");
 }
 
-// Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin again.
+// Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin
+// again.
 TEST(Liar, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
   const auto ends = [](bool with_liar) {
     Clockwork work(audited_farm(with_liar ? .05 : 0));

@@ -45,10 +45,11 @@ TEST(UnitQueue, WhatIsSurelyWantedGoesFirstThenWhatGainsMost) {
 
   ASSERT_EQ(order.size(), 27u);
   order.erase(order.begin(), order.begin() + 18);  // rounds 0 to 5
-  EXPECT_EQ(order, (std::vector<UnitCode>{unit_code(6, 1), unit_code(7, 1),                    // wanted
-                                          unit_code(6, 0), unit_code(6, 2), unit_code(7, 0),   // .0110 .0049 .0037
-                                          unit_code(8, 0), unit_code(7, 2), unit_code(8, 2),   // .0018 .0016 .0008
-                                          unit_code(8, 1)}));                                  // 0
+  EXPECT_EQ(order,
+            (std::vector<UnitCode>{unit_code(6, 1), unit_code(7, 1),                   // wanted
+                                   unit_code(6, 0), unit_code(6, 2), unit_code(7, 0),  // .0110 .0049 .0037
+                                   unit_code(8, 0), unit_code(7, 2), unit_code(8, 2),  // .0018 .0016 .0008
+                                   unit_code(8, 1)}));                                 // 0
 }
 
 TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
@@ -86,7 +87,8 @@ struct Oracle {
   double gain(UnitCode code) const {
     const RoundIndex r = round_of(code);
     if (wanted(code)) return std::numeric_limits<double>::infinity();
-    return variance[tile_of(code)] / (static_cast<double>(round_range(r - 1).s1) * static_cast<double>(round_range(r).s1));
+    return variance[tile_of(code)] /
+           (static_cast<double>(round_range(r - 1).s1) * static_cast<double>(round_range(r).s1));
   }
   std::optional<UnitCode> front() const {
     std::optional<UnitCode> best;
@@ -104,7 +106,8 @@ struct Oracle {
     return best;
   }
   std::uint64_t surely() const {
-    auto n = static_cast<std::uint64_t>(std::count_if(returned.begin(), returned.end(), [&](UnitCode c) { return wanted(c); }));
+    auto n = static_cast<std::uint64_t>(
+        std::count_if(returned.begin(), returned.end(), [&](UnitCode c) { return wanted(c); }));
     for (TileIndex t = 0; t < next.size(); ++t) {
       const RoundIndex last = std::min({end[t], window[t], all ? end[t] : before[t]});
       n += last - std::min(last, next[t]);
@@ -179,7 +182,9 @@ TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
   for (const UnitCode code : out)
     if (code != unit_code(9'999, 1)) queue.put_back(code);
   int looked_at = 0;
-  const auto none_of_tile_1 = [&](UnitCode code) { return ++looked_at, tile_of(code) == 1 && round_of(code) > 0; };
+  const auto none_of_tile_1 = [&](UnitCode code) {
+    return ++looked_at, tile_of(code) == 1 && round_of(code) > 0;
+  };
   EXPECT_EQ(queue.front(units, none_of_tile_1), unit_code(0, 1));
   EXPECT_EQ(looked_at, 1);
   queue.set_wanted(0, 1, 1);  // one more is wanted

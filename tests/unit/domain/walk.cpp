@@ -6,7 +6,9 @@ namespace ls::coordinator {
 
 // Half of the histories have limits, a third audits, and half of those a liar.
 Walk::Walk(std::uint64_t seed) : random_(seed), farm_(Farm::Options{"r0"}) {
-  const auto some = [&](int most) { return chance(50) ? 0 : 1 + static_cast<std::uint32_t>(pick(static_cast<std::uint64_t>(most))); };
+  const auto some = [&](int most) {
+    return chance(50) ? 0 : 1 + static_cast<std::uint32_t>(pick(static_cast<std::uint64_t>(most)));
+  };
   if (chance(50)) limits_ = {some(4), some(12), some(4), some(16)};
   if (chance(33)) audit_rate_ = chance(50) ? 1 : .2;
   if (audit_rate_ > 0 && chance(50)) liar_ = "w" + std::to_string(1 + pick(3));
@@ -141,8 +143,10 @@ void Walk::join(const std::string& name) {
   std::vector<std::string> tags;
   if ((name.back() - '0') % 2 == 0) tags = {"even"};
   // w0 and w4 do not say what memory they have; w1 has too little for some jobs.
-  const std::uint64_t memory = std::array<std::uint64_t, 5>{0, 4, 16, 16, 0}[static_cast<std::size_t>(name.back() - '0')];
-  send(WorkerJoined{{name}, ++worker.epoch, name, digest_number(worker.numeric_class), worker.threads, tags, memory, {}});
+  const std::uint64_t memory =
+      std::array<std::uint64_t, 5>{0, 4, 16, 16, 0}[static_cast<std::size_t>(name.back() - '0')];
+  send(WorkerJoined{
+      {name}, ++worker.epoch, name, digest_number(worker.numeric_class), worker.threads, tags, memory, {}});
 }
 
 void Walk::worker_acts() {

@@ -1,8 +1,8 @@
 // A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect
-// and bring results late; in some histories one that renders wrong pixels; an assembler that folds later; users with
-// limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After every event the
-// farm audits itself and the walk compares it with its own books; at its end a job's film must be what honest
-// workers alone would have made.
+// and bring results late; in some histories one that renders wrong pixels; an assembler that folds later;
+// users with limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After
+// every event the farm audits itself and the walk compares it with its own books; at its end a job's film
+// must be what honest workers alone would have made.
 #pragma once
 
 #include <deque>
@@ -33,10 +33,10 @@ class Walk {
   };
   struct StoredJob {  // what the service would have stored
     JobPlan plan;
-    std::uint64_t errors = 0;  // seed of its tiles' errors
-    bool disturbed = false;    // extended or stopped: where it ends is not foreseen here
-    bool reopened = false;     // ended, and then given a smaller target
-    bool discarded = false;    // some of it was void
+    std::uint64_t errors = 0;               // seed of its tiles' errors
+    bool disturbed = false;                 // extended or stopped: where it ends is not foreseen here
+    bool reopened = false;                  // ended, and then given a smaller target
+    bool discarded = false;                 // some of it was void
     std::vector<std::vector<Digest>> film;  // of each tile, round by round
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> fold_asked, folded;

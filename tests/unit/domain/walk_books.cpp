@@ -6,36 +6,36 @@
 namespace ls::coordinator {
 
 void Walk::see(const Effect& effect) {
-  std::visit(
-      overloaded{[&](const Send& e) { see(e); },
-                 [&](const RecordUnit& e) {
-                   auto& accepted = jobs_[e.unit.job].accepted;
-                   const bool once = accepted.try_emplace({e.unit.tile, e.unit.round}, e).second;
-                   if (!once && accepted[{e.unit.tile, e.unit.round}].samples == e.samples) {
-                     // Beyond a stop acceptances are forgotten and may be made again after an extension.
-                     if (!jobs_[e.unit.job].disturbed && !jobs_[e.unit.job].reopened)
-                       blame("a unit was accepted twice");
-                   }
-                   accepted[{e.unit.tile, e.unit.round}] = e;
-                 },
-                 [&](const Fold& e) { see_fold(e); },
-                 [&](const ReopenRound& e) {
-                   StoredJob& job = jobs_[e.job];
-                   for (TileIndex t = 0; t < job.fold_asked.size(); ++t) {
-                     job.fold_asked[t] = std::min(job.fold_asked[t], e.round);
-                     job.folded[t] = std::min(job.folded[t], e.round);
-                     job.accepted.erase({t, e.round});
-                     job.film[t].resize(std::min<std::size_t>(job.film[t].size(), e.round));
-                   }
-                   job.done_seen = 0;
-                 },
-                 [&](const JobFinished& e) { see_end(e.job, e.stopped); },
-                 [&](const DigestMismatch&) {
-                   if (liar_.empty()) blame("a mismatch without a liar");
-                 },
-                 [&](const WorkerDistrusted& e) { see_liar(e); },
-                 [&](const TileDiscarded& e) { see_discard(e); }, [](const auto&) {}},
-      effect);
+  std::visit(overloaded{[&](const Send& e) { see(e); },
+                        [&](const RecordUnit& e) {
+                          auto& accepted = jobs_[e.unit.job].accepted;
+                          const bool once = accepted.try_emplace({e.unit.tile, e.unit.round}, e).second;
+                          if (!once && accepted[{e.unit.tile, e.unit.round}].samples == e.samples) {
+                            // Beyond a stop acceptances are forgotten and may be made again after an
+                            // extension.
+                            if (!jobs_[e.unit.job].disturbed && !jobs_[e.unit.job].reopened)
+                              blame("a unit was accepted twice");
+                          }
+                          accepted[{e.unit.tile, e.unit.round}] = e;
+                        },
+                        [&](const Fold& e) { see_fold(e); },
+                        [&](const ReopenRound& e) {
+                          StoredJob& job = jobs_[e.job];
+                          for (TileIndex t = 0; t < job.fold_asked.size(); ++t) {
+                            job.fold_asked[t] = std::min(job.fold_asked[t], e.round);
+                            job.folded[t] = std::min(job.folded[t], e.round);
+                            job.accepted.erase({t, e.round});
+                            job.film[t].resize(std::min<std::size_t>(job.film[t].size(), e.round));
+                          }
+                          job.done_seen = 0;
+                        },
+                        [&](const JobFinished& e) { see_end(e.job, e.stopped); },
+                        [&](const DigestMismatch&) {
+                          if (liar_.empty()) blame("a mismatch without a liar");
+                        },
+                        [&](const WorkerDistrusted& e) { see_liar(e); },
+                        [&](const TileDiscarded& e) { see_discard(e); }, [](const auto&) {}},
+             effect);
 }
 
 void Walk::see_liar(const WorkerDistrusted& found) {
@@ -66,7 +66,8 @@ void Walk::see_film(const JobId& id) {
     if (job.film[t].size() != job.folded[t]) return blame("a tile has another number of rounds than folds");
     for (RoundIndex k = 0; k < job.film[t].size(); ++k) {
       const auto it = job.accepted.find({t, k});
-      if (found_ && it != job.accepted.end() && it->second.worker.value == liar_ && !ended_before_.contains(id))
+      if (found_ && it != job.accepted.end() && it->second.worker.value == liar_ &&
+          !ended_before_.contains(id))
         blame("something of the barred worker's is in an image");
       if (liar_.empty() && job.film[t][k] != honest({id, t, k}, cut_range(k, spp))) blame("a wrong image");
     }

@@ -92,7 +92,8 @@ TEST_F(ServerTest, AnswersInMemoryAreBoundedAndLaterOnesAreToldToComeAgain) {
   EXPECT_EQ(ask(kGet), 200);
   readers.clear();
   EXPECT_TRUE(eventually([&] {
-    return ask("GET /api/v1/jobs/j-1/image.exr HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + kAuth + "\r\n") == 200;
+    return ask("GET /api/v1/jobs/j-1/image.exr HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + kAuth +
+               "\r\n") == 200;
   }));
 }
 

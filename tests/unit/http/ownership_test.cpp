@@ -74,8 +74,8 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
 
   const std::string id = submit_as(anna);
   const auto patch = [&](const std::string& token, int priority) {
-    return ask_as(token, Method::patch, "/api/v1/jobs/" + id, "{\"priority\":" + std::to_string(priority) + "}",
-                  "application/json")
+    return ask_as(token, Method::patch, "/api/v1/jobs/" + id,
+                  "{\"priority\":" + std::to_string(priority) + "}", "application/json")
         .status;
   };
   EXPECT_EQ(patch(anna, 1), 403);
@@ -85,8 +85,8 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
 }
 
 TEST(Visible, AWorkerWithoutAJobMayNotSayWhatItDidOfOthers) {
-  const coordinator::StreamEvent barred{3, "worker", R"({"job":null,"activity":"barred: it rendered tile 3 of job j-1"})",
-                                        "", ""};
+  const coordinator::StreamEvent barred{
+      3, "worker", R"({"job":null,"activity":"barred: it rendered tile 3 of job j-1"})", "", ""};
   const auto hidden = visible(barred, {Role::submit, "anna", "a"});
   ASSERT_TRUE(hidden);
   EXPECT_EQ(json::parse(hidden->data)["activity"], "");

@@ -285,8 +285,9 @@ TEST(ExrWrite, APictureInBandsIsTheFileOfTheWholePicture) {
   whole.strings = {{"lightshaft:test", "hello"}};
   Memory sink;
 
-  const auto written =
-      write_exr({{7, 50}, whole.strings, [](int band) { return rows_of(13 * band, std::min(13, 50 - 13 * band)); }}, sink);
+  const auto written = write_exr(
+      {{7, 50}, whole.strings, [](int band) { return rows_of(13 * band, std::min(13, 50 - 13 * band)); }},
+      sink);
 
   ASSERT_TRUE(written) << written.error().message;
   EXPECT_EQ(sink.bytes, write_exr(whole).value());

@@ -18,8 +18,8 @@ constexpr std::size_t kPixels = std::size_t{kWidth} * kWidth, kValues = 3 * kPix
 
 double brightness(std::size_t pixel) { return .5 + static_cast<double>(pixel % kWidth) / kWidth; }
 
-// An image in the making: grey Gaussian noise of `spread` times the pixel's brightness a sample, and `bias`, which no
-// sample takes away.
+// An image in the making: grey Gaussian noise of `spread` times the pixel's brightness a sample, and `bias`,
+// which no sample takes away.
 class Render {
  public:
   Render(std::uint64_t seed, double spread, double bias = 0) : spread_(spread), bias_(bias), random_(seed) {}
@@ -27,7 +27,8 @@ class Render {
   void to(std::uint64_t spp) {
     const double more = std::sqrt(static_cast<double>(spp - spp_) / 2);
     for (std::vector<double>* half : {&a_, &b_})
-      for (std::size_t p = 0; p < kPixels; ++p) (*half)[p] += more * spread_ * brightness(p) * normal_(random_);
+      for (std::size_t p = 0; p < kPixels; ++p)
+        (*half)[p] += more * spread_ * brightness(p) * normal_(random_);
     spp_ = spp;
   }
   double mean(const std::vector<double>& half, std::size_t p) const {
@@ -35,7 +36,8 @@ class Render {
   }
   std::vector<float> image() const {
     std::vector<float> out;
-    for (std::size_t p = 0; p < kPixels; ++p) out.insert(out.end(), 3, static_cast<float>((mean(a_, p) + mean(b_, p)) / 2));
+    for (std::size_t p = 0; p < kPixels; ++p)
+      out.insert(out.end(), 3, static_cast<float>((mean(a_, p) + mean(b_, p)) / 2));
     return out;
   }
   Reference reference() const {
@@ -92,13 +94,14 @@ TEST(NoisyReference, IsNoBiasFloor) {
   EXPECT_LE(floors(200, 64, 0), 1);
 }
 
-// A bias of .05 beside noise of .5: of 256 samples the squared error is a thousandth, of the bias 2.5 of them. What a
-// reference of 64 samples leaves has a standard error of about 2 * .004 / sqrt(1024) = .00025.
+// A bias of .05 beside noise of .5: of 256 samples the squared error is a thousandth, of the bias 2.5 of
+// them. What a reference of 64 samples leaves has a standard error of about 2 * .004 / sqrt(1024) = .00025.
 TEST(NoisyReference, DoesNotHideAFloor) { EXPECT_EQ(floors(50, 64, .05), 50); }
 
-// A reference with a quarter of the samples: its noise r is four times the squared error of the image, and r / m^2 is
-// .0625 / 8 = .0078 for a pixel m. One figure strays by 2 sqrt(4 + 16) / sqrt(1024) = 28 % (reference.h), their mean by
-// .6 %. What the derivation there leaves out is of second order: 60 (r / m^2)^2 = .4 %.
+// A reference with a quarter of the samples: its noise r is four times the squared error of the image, and r
+// / m^2 is .0625 / 8 = .0078 for a pixel m. One figure strays by 2 sqrt(4 + 16) / sqrt(1024) = 28 %
+// (reference.h), their mean by .6 %. What the derivation there leaves out is of second order: 60 (r / m^2)^2
+// = .4 %.
 TEST(NoisyReference, DoesNotBiasTheRelativeError) {
   constexpr int kTrials = 2000;
   double sum = 0, squares = 0;
@@ -114,8 +117,8 @@ TEST(NoisyReference, DoesNotBiasTheRelativeError) {
   EXPECT_LT(sigma, .008);  // or the bound would say nothing
 }
 
-// Its standard error, told of each reference, against how far the figures of many references stray. Grey noise: right,
-// to 1 / sqrt(2 * 2000) = 1.6 %, one standard deviation, and the mean of what is told to less.
+// Its standard error, told of each reference, against how far the figures of many references stray. Grey
+// noise: right, to 1 / sqrt(2 * 2000) = 1.6 %, one standard deviation, and the mean of what is told to less.
 TEST(NoisyReference, TellsTheStandardErrorOfWhatItLeaves) {
   constexpr int kTrials = 2000;
   double sum = 0, squares = 0, variance = 0;
@@ -134,10 +137,12 @@ TEST(NoisyReference, TellsTheStandardErrorOfWhatItLeaves) {
 TEST(NoisyReference, OfTheSameErrorLeavesNothingAboveItsNoise) {
   Render right(1, .25), exact(2, .25), job(3, .25);
   right.to(8), exact.to(2048), job.to(2048);
-  const TrueError noisy = true_error(right.reference(), job.image()), told = true_error(exact.reference(), job.image());
+  const TrueError noisy = true_error(right.reference(), job.image()),
+                  told = true_error(exact.reference(), job.image());
   EXPECT_TRUE(below_noise(noisy.relmse, noisy.relmse_stderr));
   EXPECT_TRUE(below_noise(noisy.rmse * noisy.rmse, noisy.mse_stderr));
-  EXPECT_FALSE(below_noise(told.relmse, told.relmse_stderr));  // its standard error is sqrt(8 / 1024) of it, 9 %
+  EXPECT_FALSE(
+      below_noise(told.relmse, told.relmse_stderr));  // its standard error is sqrt(8 / 1024) of it, 9 %
   EXPECT_FALSE(below_noise(told.rmse * told.rmse, told.mse_stderr));
   EXPECT_TRUE(below_noise(0, 0.));
   EXPECT_FALSE(below_noise(0, std::nullopt));

@@ -22,7 +22,8 @@ constexpr std::size_t kReferenceValues = std::size_t{3} * 16 * 12;
 
 ExrPicture picture(float level) {
   ExrPicture p{kSize, {}, {}};
-  for (const char* c : {"R", "G", "B"}) p.channels[c] = ExrFloat{std::vector<float>(kReferenceValues / 3, level)};
+  for (const char* c : {"R", "G", "B"})
+    p.channels[c] = ExrFloat{std::vector<float>(kReferenceValues / 3, level)};
   return p;
 }
 

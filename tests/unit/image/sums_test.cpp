@@ -40,9 +40,10 @@ TEST(Sums, OfTenthsDriftByNoMoreThanTheirRounding) {
   EXPECT_NEAR(film.pixels(0).mean[0], .1, .1 * 0x1p-24);
 }
 
-// A film of one pixel that has `rounds` rounds of 64 samples of float32's .1 behind it, without the hours that folding
-// them takes: a saved tile's count and sums are put in its place (film_bytes.cpp says where). The sums are what folding
-// gives, exactly: 24 bits times a count below 2^29, no step of which a double rounds.
+// A film of one pixel that has `rounds` rounds of 64 samples of float32's .1 behind it, without the hours
+// that folding them takes: a saved tile's count and sums are put in its place (film_bytes.cpp says where).
+// The sums are what folding gives, exactly: 24 bits times a count below 2^29, no step of which a double
+// rounds.
 constexpr std::size_t kRoundsAt = 12, kSumsAt = 104, kChecksum = 32;
 Film long_ago(std::uint64_t samples) {
   Film film = alike(.1, 6);
@@ -63,7 +64,8 @@ Film long_ago(std::uint64_t samples) {
 void fold_tenths(Film& film, int rounds) {
   for (int i = 0; i < rounds; ++i) {
     const RoundIndex k = film.full_rounds(0);
-    Partial p{{name_of("scene"), name_of("settings"), name_of("class"), film.grid().rect(0), round_range(k)}, {}};
+    Partial p{{name_of("scene"), name_of("settings"), name_of("class"), film.grid().rect(0), round_range(k)},
+              {}};
     p.sums.assign(kPartialChannels, .1f * 32);
     ASSERT_TRUE(film.fold(0, k, p));
   }
@@ -75,8 +77,8 @@ TEST(Sums, OfABillionTenthsAreExactToTheLastSample) {
 
   fold_tenths(film, kMore);
 
-  // A sum that no longer took on what is folded into it (float32's did not from 2^24 times a round on) would be off by
-  // 64 in a million here.
+  // A sum that no longer took on what is folded into it (float32's did not from 2^24 times a round on) would
+  // be off by 64 in a million here.
   EXPECT_EQ(film.spp(0), 1'000'000'000u);
   EXPECT_NEAR(film.pixels(0).mean[0] / double{.1f}, 1, 1e-12);
   EXPECT_EQ(film.pixels(0).standard_error[0], 0);

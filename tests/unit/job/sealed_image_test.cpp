@@ -127,7 +127,8 @@ TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("no layer spp"));
   other.channels["spp"] = ExrUint{std::vector<std::uint32_t>(4, 2)};
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("no layer stderr.R"));
-  for (const char* c : {"stderr.R", "stderr.G", "stderr.B"}) other.channels[c] = ExrFloat{std::vector<float>(4)};
+  for (const char* c : {"stderr.R", "stderr.G", "stderr.B"})
+    other.channels[c] = ExrFloat{std::vector<float>(4)};
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("only images that Lightshaft has finished"));
 }
 

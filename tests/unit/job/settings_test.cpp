@@ -133,7 +133,8 @@ TEST(JobSpec, NamesTheKeyThatIsWrong) {
   EXPECT_THAT(spec_error(R"({"priority": 18446744073709551615})"), HasSubstr("'priority'"));
   EXPECT_THAT(spec_error(R"({"float": 1})"), HasSubstr("'float'"));
   EXPECT_THAT(spec_error(R"({"tags": [1]})"), HasSubstr("'tags'"));
-  EXPECT_THAT(spec_error(R"({"max_workers": 0})"), HasSubstr("'max_workers' must be a whole number from 1 to"));
+  EXPECT_THAT(spec_error(R"({"max_workers": 0})"),
+              HasSubstr("'max_workers' must be a whole number from 1 to"));
   EXPECT_THAT(spec_error(R"({"max_units": 1000001})"), HasSubstr("'max_units'"));
   EXPECT_THAT(spec_error(R"({"memory": "8G"})"), HasSubstr("'memory'"));
 }

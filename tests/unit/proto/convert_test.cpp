@@ -56,8 +56,13 @@ const std::vector<FromWorker> kFromWorker = {
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
     UnitResult{
         {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, unwell()},
-    UnitResult{
-        {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}}, digest_of_text("u"), 0.5, {}, {.5, 1.5, .25, .125, .0625}},
+    UnitResult{{JobId{"j"}, 1, 2},
+               LeaseId{"l"},
+               {std::byte{1}},
+               digest_of_text("u"),
+               0.5,
+               {},
+               {.5, 1.5, .25, .125, .0625}},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, true, "why", 11, std::pair{3, 4}, 99},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, false, "why", {}, {}, {}},
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}},

@@ -57,14 +57,15 @@ TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
   EXPECT_LT(e.standard_error[0], .02);
 }
 
-// A ray that enters a ball at so flat an angle that the line from its moved start leaves it farther on than the true
-// one does: a vertex between the two ends stands outside. Rays that are sent on from there must meet the ball; one
-// that does not has a medium without end ahead of it, which here gives off light: infinitely much.
+// A ray that enters a ball at so flat an angle that the line from its moved start leaves it farther on than
+// the true one does: a vertex between the two ends stands outside. Rays that are sent on from there must meet
+// the ball; one that does not has a medium without end ahead of it, which here gives off light: infinitely
+// much.
 TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
   SceneKit kit({32, 32});
-  const MediumIndex m =
-      kit.heterogeneous(kit.grid({7, 7, 7}, std::vector<float>(7 * 7 * 7, .5f), translate({-1, -1, -1}) * test::scale(2)),
-                        Rgb{.5, .5, .5}, 100);
+  const MediumIndex m = kit.heterogeneous(
+      kit.grid({7, 7, 7}, std::vector<float>(7 * 7 * 7, .5f), translate({-1, -1, -1}) * test::scale(2)),
+      Rgb{.5, .5, .5}, 100);
   kit.glow(m, {1, 1, 1});
   kit.container(SphereShape{}, {}, kit.null(), m);
   constexpr double kFromEdge = 1e-3;

@@ -64,10 +64,11 @@ std::vector<Coloured> media() {
   all.push_back(coloured("apart", .6f, [&](int c) {
     return unit_grid(kChannelsSize, scaled(values(c, c == 2), c == 0 ? 0.f : c == 1 ? .5f : 20.f));
   }));
-  all.push_back(
-      coloured("nearest", .3f, [&](int c) { return voxel_grid(kChannelsSize, values(c), kNearest, Wrap::clamp); }));
-  all.push_back(coloured("repeated", .3f,
-                         [&](int c) { return voxel_grid(kChannelsSize, values(c), kTrilinear, Wrap::repeat); }));
+  all.push_back(coloured("nearest", .3f,
+                         [&](int c) { return voxel_grid(kChannelsSize, values(c), kNearest, Wrap::clamp); }));
+  all.push_back(coloured("repeated", .3f, [&](int c) {
+    return voxel_grid(kChannelsSize, values(c), kTrilinear, Wrap::repeat);
+  }));
   return all;
 }
 

@@ -62,8 +62,8 @@ TEST(SegmentLightVertex, SharesAreNumbersAtTheEndsOfFloat32) {
             for (const float p_s : {1e-30f, 1.f, 1e15f})
               for (const float p_l : {0.f, kTiny, 1.f, 1e30f, kHuge}) {
                 const float share = p_s / (p_s + p_l * found);  // as PathTracer::add_emission
-                ASSERT_TRUE(share >= 0 && share <= 1)
-                    << by_depth << ' ' << depth_ratio << ' ' << flight << ' ' << pivot << ' ' << p_s << ' ' << p_l;
+                ASSERT_TRUE(share >= 0 && share <= 1) << by_depth << ' ' << depth_ratio << ' ' << flight
+                                                      << ' ' << pivot << ' ' << p_s << ' ' << p_l;
               }
           }
         }

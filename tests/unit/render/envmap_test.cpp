@@ -1,4 +1,5 @@
-// Environment maps: which direction each texel is, what is between them, what is refused, and scenes under them.
+// Environment maps: which direction each texel is, what is between them, what is refused, and scenes under
+// them.
 #include "worker/render/envmap.h"
 
 #include <gmock/gmock.h>

@@ -107,13 +107,16 @@ TEST(Health, TellsOfChangedInputsByCause) {
   EXPECT_EQ(changed_inputs(*test::world_of(kit)), expected);
 }
 
-// Denormal densities: units trace with such numbers as zeros, whatever their thread is set to, and leave it as it was. So
-// they cost what zeros cost. (Taken as numbers these would be an extinction of 8e-10, by their scale, and shine 16 along 2.)
+// Denormal densities: units trace with such numbers as zeros, whatever their thread is set to, and leave it
+// as it was. So they cost what zeros cost. (Taken as numbers these would be an extinction of 8e-10, by their
+// scale, and shine 16 along 2.)
 TEST(Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread) {
   SceneKit kit({4, 4});
-  const VolumeIndex grid = kit.grid({2, 1, 1}, {8e-39f, 8e-39f}, test::translate({-1, -1, -1}) * test::scale(2));
+  const VolumeIndex grid =
+      kit.grid({2, 1, 1}, {8e-39f, 8e-39f}, test::translate({-1, -1, -1}) * test::scale(2));
   const MediumIndex medium = kit.heterogeneous(grid, {0, 0, 0}, 1e29);
-  std::get<HeterogeneousMedium>(kit.scene.media[medium.value]).source_radiance = kit.constant({1e10, 1e10, 1e10});
+  std::get<HeterogeneousMedium>(kit.scene.media[medium.value]).source_radiance =
+      kit.constant({1e10, 1e10, 1e10});
   kit.container(CubeShape{}, {}, kit.null(), medium);
   kit.look({0, -5, 0}, {0, 0, 0}, 30);
   const auto world = test::world_of(kit);

@@ -133,7 +133,8 @@ TEST(Instances, WhatTheBvhFindsIsFoundAgain) {
       kit.shape(SphereShape{}, {}, kit.diffuse(.5));
     else
       kit.shape(CylinderShape{}, {}, kit.diffuse(.5));
-    kit = instanced(kit, {translate({.33, .1, .7}) * test::rotate_x(37) * test::rotate_y(15) * test::scale(.003)});
+    kit = instanced(kit,
+                    {translate({.33, .1, .7}) * test::rotate_x(37) * test::rotate_y(15) * test::scale(.003)});
     kit.shape(CubeShape{}, test::scale(10), kit.diffuse(.5));
     const auto w = test::world_of(kit);
     std::mt19937 rng(3);

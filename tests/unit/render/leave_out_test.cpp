@@ -191,7 +191,8 @@ TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
 }
 
 TEST(LeaveOutCounters, CountWhatIsUsed) {
-  const WorkCounters lens = counted(with(plain_room(), [](SceneKit& k) { k.scene.sensor.aperture_radius = .1; }));
+  const WorkCounters lens =
+      counted(with(plain_room(), [](SceneKit& k) { k.scene.sensor.aperture_radius = .1; }));
   EXPECT_EQ(lens.lens, 12u * 8 * 16);
   const WorkCounters lights = counted(with(plain_room(), [](SceneKit& k) {
     for (int i = 0; i < 40; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});

@@ -60,8 +60,8 @@ TEST(Rims, LetNoLightOutOfAClosedBody) {
   EXPECT_EQ(seen.mean[1], 0);
 }
 
-// Under a sky of 1 nothing is brighter than it, and no pixel of the ball is black: what is turned away is seen by
-// the true normal.
+// Under a sky of 1 nothing is brighter than it, and no pixel of the ball is black: what is turned away is
+// seen by the true normal.
 TEST(Rims, AreNotBlack) {
   const SceneKit kit = ball(false);
   const auto world = test::world_of(kit);

@@ -109,7 +109,8 @@ TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
   json report = some_report();
   for (json& p : report["convergence"]) p["true_relmse"] = .1234, p["true_relmse_below_noise"] = false;
   report["convergence"].back()["true_relmse_below_noise"] = true;
-  report["reference"] = {{"relmse", 0.}, {"rmse", 0.}, {"below_noise", true}, {"rmse_below_noise", true}, {"same_seed", false}};
+  report["reference"] = {
+      {"relmse", 0.}, {"rmse", 0.}, {"below_noise", true}, {"rmse_below_noise", true}, {"same_seed", false}};
 
   const std::string page = page_of(report);
   report["reference"]["same_seed"] = true;
@@ -186,9 +187,12 @@ TEST(JobPage, InDoubtTheCurveHasNoIntervals) {
   doubt(report);
   const std::string page = page_of(report);
 
-  for (const char* claim : {"class=\"band", "95 %", "0.0250 to 0.0375", "−0.99 to −0.83"}) expect_not(page, claim);
+  for (const char* claim : {"class=\"band", "95 %", "0.0250 to 0.0375", "−0.99 to −0.83"})
+    expect_not(page, claim);
   expect(page, "<title>0.0312 at 32 s</title>");
-  expect(page, "Slope <b>−0.91</b> (independent samples give −1). No intervals are shown: the estimate can&#39;t be trusted yet.");
+  expect(page,
+         "Slope <b>−0.91</b> (independent samples give −1). No intervals are shown: the estimate can&#39;t "
+         "be trusted yet.");
   const std::size_t names = times(page, "<th scope=\"col\">"), cells = times(page, "<td>0.300</td>");
   EXPECT_EQ(names, 5u) << "time, core time, samples, RMSE, relMSE";
   EXPECT_EQ(cells, report["convergence"].size());
@@ -260,15 +264,17 @@ TEST(JobPage, ATableThatIsCutSaysSo) {
 TEST(JobPage, SaysWhoseSecondsItCounts) {
   const std::string page = page_of(some_report());
 
-  for (const char* words : {"getting the files that the scene names", "reading them and building the world",
-                            "Seconds of threads: of <i>render</i> their CPU time, of the others by the clock.",
-                            "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
+  for (const char* words :
+       {"getting the files that the scene names", "reading them and building the world",
+        "Seconds of threads: of <i>render</i> their CPU time, of the others by the clock.",
+        "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
     expect(page, words);
 }
 
 TEST(JobPage, PartsOfTheTimeThatAreTooSmallToCountAreLessThanOnePercent) {
   json report = some_report();
-  report["time"] = {{"load", .0001}, {"build", 0}, {"render", 100}, {"transfer", .0001}, {"merge", .4}, {"idle", 0}};
+  report["time"] = {{"load", .0001},     {"build", 0},  {"render", 100},
+                    {"transfer", .0001}, {"merge", .4}, {"idle", 0}};
   const std::string page = page_of(report);
 
   EXPECT_EQ(times(page, "<td>&lt; 1 %</td>"), 3u);
@@ -279,10 +285,11 @@ TEST(JobPage, PartsOfTheTimeThatAreTooSmallToCountAreLessThanOnePercent) {
 TEST(JobPage, ProvenanceSaysWhatWasAskedFor) {
   json report = some_report();
   report.update(json::parse(R"({"max_depth": -1, "rr_depth": 5, "spp_asked": 4096, "time_asked": 90})"));
-  for (const char* row : {"<dt>Maximum depth</dt><dd><span>unlimited</span>",
-                          "<dt>Russian roulette</dt><dd><span>from depth 5</span>",
-                          "<dt>Samples asked</dt><dd><span>4,096 per pixel</span>",
-                          "<dt>Target relMSE</dt><dd><span>0.005</span>", "<dt>Time asked</dt><dd><span>90 s</span>"})
+  for (const char* row :
+       {"<dt>Maximum depth</dt><dd><span>unlimited</span>",
+        "<dt>Russian roulette</dt><dd><span>from depth 5</span>",
+        "<dt>Samples asked</dt><dd><span>4,096 per pixel</span>",
+        "<dt>Target relMSE</dt><dd><span>0.005</span>", "<dt>Time asked</dt><dd><span>90 s</span>"})
     expect(page_of(report), row);
   report["max_depth"] = 12;
   expect(page_of(report), "<dt>Maximum depth</dt><dd><span>12</span>");

@@ -26,7 +26,9 @@ pugi::xml_document parsed(const std::string& svg) {
   return document;
 }
 
-std::size_t count_of(const pugi::xml_document& svg, const char* path) { return svg.select_nodes(path).size(); }
+std::size_t count_of(const pugi::xml_document& svg, const char* path) {
+  return svg.select_nodes(path).size();
+}
 
 // Where the marks of a curve are.
 std::vector<std::pair<double, double>> marks(const pugi::xml_document& svg) {

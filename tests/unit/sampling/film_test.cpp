@@ -65,7 +65,8 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
     std::vector<double> expected, got(kCells, 0);
     const double all = integral(f, -f.radius, f.radius), width = 2 * f.radius / kCells;
     for (int i = 0; i < kCells; ++i)
-      expected.push_back(kFilmSamples * integral(f, -f.radius + i * width, -f.radius + (i + 1) * width) / all);
+      expected.push_back(kFilmSamples * integral(f, -f.radius + i * width, -f.radius + (i + 1) * width) /
+                         all);
     RandomStream r(51);
     const PixelFilter sampled(f.filter);
     for (int i = 0; i < kFilmSamples; ++i) {

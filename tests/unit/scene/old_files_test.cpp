@@ -280,8 +280,9 @@ TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
 }
 
 TEST(OldFiles, NormalsAreAsTheyAre) {
-  const std::string map = "<shape type=\"disk\"><bsdf type=\"normalmap\">{}<rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf "
-                          "type=\"diffuse\"/></bsdf></shape>";
+  const std::string map =
+      "<shape type=\"disk\"><bsdf type=\"normalmap\">{}<rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf "
+      "type=\"diffuse\"/></bsdf></shape>";
   const auto read_map = [](const Scene& s) { return std::get<NormalMapBsdf>(bsdf_of(s, 0)); };
   const auto plain = read_map(must_read(old(fmt::format(fmt::runtime(map), ""))));
   const auto asked = read_map(must_read(

@@ -72,7 +72,8 @@ TEST(Prune, ABlendOfWeight0Or1IsThatBranchAndTheOthersFilesGo) {
 }
 
 TEST(Prune, AWeightThatDiffersBetweenChannelsKeepsBothBranches) {
-  EXPECT_EQ(pruned_text(sphere(weighted("blendbsdf", "weight", "0, 0, 1", kMetal + kGreyMaterial))).scene.bsdfs.size(),
+  EXPECT_EQ(pruned_text(sphere(weighted("blendbsdf", "weight", "0, 0, 1", kMetal + kGreyMaterial)))
+                .scene.bsdfs.size(),
             3u);
 }
 
@@ -120,7 +121,7 @@ TEST(Prune, AGroupOfUnseenShapesGoesWithItsInstances) {
 TEST(Prune, LightsWithoutPowerGoWithTheirFiles) {
   const std::string dark = R"(<emitter type="area"><rgb name="radiance" value="0"/></emitter>)";
   const Pruned p = pruned_text(sphere(kGreyMaterial + dark) +
-                          R"(<emitter type="point"><rgb name="intensity" value="0"/></emitter>
+                               R"(<emitter type="point"><rgb name="intensity" value="0"/></emitter>
                              <emitter type="constant"><rgb name="radiance" value="0"/></emitter>
                              <emitter type="point"/>)");
   EXPECT_EQ(p.scene.emitters.size(), 1u);
@@ -135,7 +136,8 @@ TEST(Prune, LightsWithoutPowerGoWithTheirFiles) {
 }
 
 TEST(Prune, AMediumThatDoesNothingGoesWithItsGrid) {
-  const Pruned p = pruned_text(sphere(kNull + grid_medium(R"(<float name="scale" value="0"/>)")) + sphere(kGreyMaterial));
+  const Pruned p =
+      pruned_text(sphere(kNull + grid_medium(R"(<float name="scale" value="0"/>)")) + sphere(kGreyMaterial));
   EXPECT_TRUE(p.scene.media.empty());
   EXPECT_TRUE(p.scene.assets.empty());
   EXPECT_EQ(p.scene.shapes.size(), 1u);

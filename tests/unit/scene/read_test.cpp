@@ -260,8 +260,7 @@ TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
   const auto name = [](const std::string& type) {
     return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator;
   };
-  for (const char* type : {"volpath", "volpathmis", "volpath_simple"})
-    EXPECT_EQ(name(type).name, "volpath");
+  for (const char* type : {"volpath", "volpathmis", "volpath_simple"}) EXPECT_EQ(name(type).name, "volpath");
   // Whatever the table names, a scene may say.
   for (const auto& row : scene::integrators()) EXPECT_EQ(name(std::string(row.name)).name, row.ours);
   EXPECT_EQ(name("path").name, "path");

@@ -39,8 +39,8 @@ class MemoryAssets final : public AssetSource {
 inline const std::string kSensor =
     R"(<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>)";
 
-// Read without a word, but that the camera, which stands at the origin where nothing else is said, is inside of the
-// medium that the test is about.
+// Read without a word, but that the camera, which stands at the origin where nothing else is said, is inside
+// of the medium that the test is about.
 inline bool quiet(const ReadResult& r) {
   return std::all_of(r.diagnostics.begin(), r.diagnostics.end(), [](const Diagnostic& d) {
     return d.severity == Diagnostic::Severity::warning && d.text.starts_with("the camera is inside");

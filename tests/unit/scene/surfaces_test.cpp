@@ -30,7 +30,9 @@ template <class T>
 const T& at(const Scene& s, BsdfIndex i) {
   return std::get<T>(s.bsdfs.at(i.value));
 }
-Rgb texture_colour(const Scene& s, TextureIndex i) { return std::get<ConstantTexture>(s.textures.at(i.value)).value; }
+Rgb texture_colour(const Scene& s, TextureIndex i) {
+  return std::get<ConstantTexture>(s.textures.at(i.value)).value;
+}
 
 constexpr char kDiffuse[] = "<bsdf type=\"diffuse\"/>", kGlass[] = "<bsdf type=\"thindielectric\"/>";
 
@@ -91,8 +93,8 @@ TEST(Surfaces, BlendsAreOrderedByNameOrElseByPlace) {
   at<DiffuseBsdf>(placed, bsdf_of<BlendBsdf>(placed).second);
   const Scene named =
       scene_with_bsdf(fmt::format("<bsdf type=\"blendbsdf\">{}<bsdf type=\"plastic\" name=\"b\"/><bsdf "
-                            "type=\"diffuse\" name=\"a\"/></bsdf>",
-                            weight));
+                                  "type=\"diffuse\" name=\"a\"/></bsdf>",
+                                  weight));
   at<DiffuseBsdf>(named, bsdf_of<BlendBsdf>(named).first);
   at<PlasticBsdf>(named, bsdf_of<BlendBsdf>(named).second);
   EXPECT_EQ(deserialize_scene(serialize(named)).value(), named);

@@ -1,4 +1,5 @@
-// Jobs whose files are damaged or gone: they wait, cost nobody anything, and go on when the files are here again.
+// Jobs whose files are damaged or gone: they wait, cost nobody anything, and go on when the files are here
+// again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -68,8 +69,8 @@ TEST_F(Awaited, ADamagedFileHasTheJobWaitWithAnErrorThatSaysWhatToDo) {
 
   EXPECT_EQ(state(), JobState::paused);
   EXPECT_THAT(coordinator->job(job)->error,
-              AllOf(HasSubstr("wood.png"), HasSubstr(wood.hex()), HasSubstr("damaged"), HasSubstr("upload the file again"),
-                    HasSubstr("lightshaft submit")));
+              AllOf(HasSubstr("wood.png"), HasSubstr(wood.hex()), HasSubstr("damaged"),
+                    HasSubstr("upload the file again"), HasSubstr("lightshaft submit")));
 }
 
 TEST_F(Awaited, TheJobGoesOnByItselfWhenTheFileIsHereAgain) {

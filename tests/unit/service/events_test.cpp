@@ -134,8 +134,9 @@ TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
   v.id.value = "j-1";
   v.name = "bad \xff name";
   const auto j = nlohmann::json::parse(job_json(v));
-  for (const char* key : {"rmse", "rmse_ci95", "relmse", "relmse_ci95", "eta_seconds", "stopped", "error", "target_error",
-                          "verdict", "slope", "slope_ci95", "efficiency_per_core", "pixels_without_samples"})
+  for (const char* key :
+       {"rmse", "rmse_ci95", "relmse", "relmse_ci95", "eta_seconds", "stopped", "error", "target_error",
+        "verdict", "slope", "slope_ci95", "efficiency_per_core", "pixels_without_samples"})
     EXPECT_TRUE(j.at(key).is_null()) << key;
   EXPECT_EQ(j["state"], "queued");
   EXPECT_EQ(nlohmann::json::parse(jobs_json({v, v}))["jobs"].size(), 2u);
@@ -151,7 +152,8 @@ TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
 
   const auto j = nlohmann::json::parse(job_json(v));
 
-  EXPECT_EQ(j["verdict"], (nlohmann::json{{"kind", "early"}, {"words", "don't trust yet"}, {"trusted", false}}));
+  EXPECT_EQ(j["verdict"],
+            (nlohmann::json{{"kind", "early"}, {"words", "don't trust yet"}, {"trusted", false}}));
   EXPECT_EQ(j["rmse_ci95"], (nlohmann::json{.4, .6}));
   EXPECT_EQ(j["slope"], -1);
   EXPECT_EQ(j["slope_ci95"], (nlohmann::json{-1.5, -.5}));
@@ -164,8 +166,10 @@ TEST(Views, CsvHasOneLineForEachPoint) {
             "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,"
             "rmse_lo,rmse_hi\n"
             "1.5,3,4,0.5,0.25,0.125,0.375,,,,0.375,0.625\n");
-  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}}).ends_with(",2,4,0.5,0,0\n"));
-  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,,0,0\n"));
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}})
+                  .ends_with(",2,4,0.5,0,0\n"));
+  EXPECT_TRUE(
+      convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,,0,0\n"));
 }
 
 }  // namespace

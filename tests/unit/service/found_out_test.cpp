@@ -61,7 +61,8 @@ struct FoundOutLate : ::testing::TestWithParam<bool> {
 // A worker that holds back all but the first rounds.
 struct Slow {
   FakeFarm farm;
-  explicit Slow(Coordinator& coordinator, std::function<bool(const UnitKey&)> renders) : farm(coordinator, 1) {
+  explicit Slow(Coordinator& coordinator, std::function<bool(const UnitKey&)> renders)
+      : farm(coordinator, 1) {
     farm.tamper = [renders = std::move(renders)](UnitResult r) {
       return renders(r.unit) ? std::vector{std::move(r)} : std::vector<UnitResult>{};
     };

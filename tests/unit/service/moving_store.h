@@ -1,4 +1,5 @@
-// A store of jobs that tells the service what other coordinators have done, as a test says, and fails when it is told to.
+// A store of jobs that tells the service what other coordinators have done, as a test says, and fails when it
+// is told to.
 #pragma once
 
 #include <mutex>
@@ -10,7 +11,8 @@ namespace ls::coordinator {
 
 class MovingStore final : public JobStore {
  public:
-  explicit MovingStore(std::shared_ptr<JobStore> inner = make_memory_job_store()) : inner_(std::move(inner)) {}
+  explicit MovingStore(std::shared_ptr<JobStore> inner = make_memory_job_store())
+      : inner_(std::move(inner)) {}
 
   void will_tell(Moved moved) {
     const std::lock_guard lock(mutex_);
@@ -28,7 +30,9 @@ class MovingStore final : public JobStore {
   Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
     return inner_->set_truth(job, spp, truth);
   }
-  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override { return inner_->points(job); }
+  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
+    return inner_->points(job);
+  }
   Result<void> remove_points(const JobId& job) override { return inner_->remove_points(job); }
   Result<void> add_log(const JobId& job, const LogLine& line) override { return inner_->add_log(job, line); }
   Result<std::vector<LogLine>> log(const JobId& job) const override { return inner_->log(job); }
@@ -42,7 +46,8 @@ class MovingStore final : public JobStore {
   }
   Moved moved() override {
     const std::lock_guard lock(mutex_);
-    for (const BarredWorker& worker : next_.barred) (void)inner_->bar(worker);  // as a real one does before it tells
+    for (const BarredWorker& worker : next_.barred)
+      (void)inner_->bar(worker);  // as a real one does before it tells
     return std::exchange(next_, {});
   }
 

@@ -114,8 +114,8 @@ TEST(Outlook, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   EXPECT_FALSE(outlook_of(f, {}).with_more) << "all four are under way";
 }
 
-// By how many units a target is met is not known: threads wait at the end for the last one, and may have been busy with what is dropped
-// when it came: twice a unit's time at most. One thread waits for nobody.
+// By how many units a target is met is not known: threads wait at the end for the last one, and may have been
+// busy with what is dropped when it came: twice a unit's time at most. One thread waits for nobody.
 TEST(Outlook, OfATargetThreadsWaitForTheLastUnit) {
   OutlookFacts f = facts();
   f.cores = 4;

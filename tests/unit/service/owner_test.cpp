@@ -110,7 +110,9 @@ TEST(Owner, OfAWorkersEventIsThatOfTheJobThatItNames) {
   session->receive(progress);
 
   std::unique_lock lock(mutex);
-  const auto names_a_job = [](const StreamEvent& e) { return !nlohmann::json::parse(e.data)["job"].is_null(); };
+  const auto names_a_job = [](const StreamEvent& e) {
+    return !nlohmann::json::parse(e.data)["job"].is_null();
+  };
   ASSERT_TRUE(heard.wait_for(lock, std::chrono::seconds(20),
                              [&] { return std::any_of(told.begin(), told.end(), names_a_job); }));
   for (const StreamEvent& e : told)

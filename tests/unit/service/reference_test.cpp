@@ -66,8 +66,8 @@ TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
   EXPECT_EQ(rendered({}, 3), first);  // in memory
 }
 
-// Cancelled in the middle of a round: list, curve and report tell of one image, the one that is handed out, and
-// its true error is its own.
+// Cancelled in the middle of a round: list, curve and report tell of one image, the one that is handed out,
+// and its true error is its own.
 TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
@@ -75,11 +75,13 @@ TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
   {
     FakeFarm farm(*coordinator, 1);
     farm.reorder = [](auto& units) {
-      std::stable_sort(units.begin(), units.end(), [](const LeaseUnit& a, const LeaseUnit& b) { return a.round < b.round; });
+      std::stable_sort(units.begin(), units.end(),
+                       [](const LeaseUnit& a, const LeaseUnit& b) { return a.round < b.round; });
     };
     farm.stop_after = 5;  // two tiles: up to 2 and to 4 samples, and one tile of the third round
     farm.finish(job);
-    while (coordinator->job(job)->spp_done < 7) std::this_thread::yield();  // 7.2 as soon as all five are folded
+    while (coordinator->job(job)->spp_done < 7)
+      std::this_thread::yield();  // 7.2 as soon as all five are folded
     ASSERT_EQ(coordinator->convergence(job)->size(), 2u);
     ASSERT_TRUE(coordinator->cancel(job));
   }

@@ -183,7 +183,8 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
   ASSERT_TRUE(coordinator->remove(id));
   {
     std::unique_lock lock(mutex);
-    EXPECT_TRUE(heard.wait_for(lock, std::chrono::seconds(20), [&] { return last == job_removed_json(id); })) << last;
+    EXPECT_TRUE(heard.wait_for(lock, std::chrono::seconds(20), [&] { return last == job_removed_json(id); }))
+        << last;
   }
 
   EXPECT_TRUE(coordinator->jobs().empty());

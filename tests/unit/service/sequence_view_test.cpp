@@ -24,7 +24,8 @@ std::vector<JobView> with(std::initializer_list<JobState> states) {
 }
 
 JobView whole(const std::vector<JobView>& frames, double cores = 0) {
-  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, cores, 1}, frames);
+  return sequence_view({{"j-1"}, {1, static_cast<std::uint32_t>(frames.size()), 1}, {}, 12, cores, 1},
+                       frames);
 }
 
 TEST(SequenceView, HasTheStateOfItsFramesTogether) {

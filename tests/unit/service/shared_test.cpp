@@ -119,12 +119,14 @@ TEST_F(Shared, AFileThatIsNotThereIsToldAtOnceAndWaitedFor) {
   }));
 }
 
-// Its image begins with nothing: what was said of the one that is gone would be said of pixels that nobody has.
+// Its image begins with nothing: what was said of the one that is gone would be said of pixels that nobody
+// has.
 TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
   StoredJob job = foreign(32);
   job.spec.target_error = 1e-3;
   job.totals.few_hits = 7;
-  for (const double spp : {2., 4., 8.}) ASSERT_TRUE(store->add_point(job.id, {spp, spp, spp, {1, .1 / spp, .05 / spp, .2 / spp}}));
+  for (const double spp : {2., 4., 8.})
+    ASSERT_TRUE(store->add_point(job.id, {spp, spp, spp, {1, .1 / spp, .05 / spp, .2 / spp}}));
 
   inherit(job);
   ASSERT_TRUE(eventually([&] { return coordinator->job(job.id).has_value(); }));
@@ -136,7 +138,8 @@ TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
   EXPECT_TRUE(eventually([&] { return store->points(job.id)->empty(); }));
 }
 
-// What lies here of a job is from when this coordinator had it before; it may be of another numeric class, too.
+// What lies here of a job is from when this coordinator had it before; it may be of another numeric class,
+// too.
 TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
   const StoredJob job = foreign(32);
   {
@@ -187,7 +190,8 @@ TEST_F(Shared, AJobThatGoesToAnotherIsToldAsMovedNotAsCancelled) {
   coordinator->tick();
 
   std::unique_lock lock(mutex);
-  ASSERT_TRUE(heard.wait_for(lock, std::chrono::seconds(20), [&] { return !states.empty() && states.back() == "moved"; }));
+  ASSERT_TRUE(heard.wait_for(lock, std::chrono::seconds(20),
+                             [&] { return !states.empty() && states.back() == "moved"; }));
   EXPECT_THAT(states, testing::Not(testing::Contains("cancelled")));
   EXPECT_EQ(owners.back(), "anna");
   lock.unlock();

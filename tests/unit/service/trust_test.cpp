@@ -1,4 +1,5 @@
-// A worker that renders wrong pixels: found, barred, and nothing of it left in the image, also over a restart.
+// A worker that renders wrong pixels: found, barred, and nothing of it left in the image, also over a
+// restart.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -121,7 +122,9 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
     };
     // Nobody renders anything a second time, so that nobody finds out.
     std::set<UnitKey> seen;
-    farm.tamper = [&](UnitResult r) { return seen.insert(r.unit).second ? std::vector{r} : std::vector<UnitResult>{}; };
+    farm.tamper = [&](UnitResult r) {
+      return seen.insert(r.unit).second ? std::vector{r} : std::vector<UnitResult>{};
+    };
     ASSERT_TRUE(farm.run([&] { return lie && coordinator->audits().asked >= 3; }));
     ASSERT_EQ(coordinator->audits().workers_barred, 0u);
     ASSERT_TRUE(come_to_be_audited(folder.path() / "jobs" / job.value, *lie));
@@ -309,7 +312,8 @@ TEST(Trust, AJobTooLargeForEveryWorkerSaysSoInItsView) {
   hello.name = "small";
   hello.numeric_class = sha256("fake class");
   hello.memory_bytes = 2ull << 30;
-  const auto session = coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
+  const auto session =
+      coordinator->connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
 
   const JobView view = coordinator->job(job).value();
 

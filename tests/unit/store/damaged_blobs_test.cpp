@@ -32,7 +32,8 @@ struct DamagedBlobs : ::testing::Test {
   std::filesystem::path aside() const { return blobs->path(kName).string() + ".damaged"; }
   std::string read_back() const {
     const auto read = blobs->read(kName, 0, 100);
-    return read ? std::string(reinterpret_cast<const char*>(read->data()), read->size()) : read.error().message;
+    return read ? std::string(reinterpret_cast<const char*>(read->data()), read->size())
+                : read.error().message;
   }
 };
 

@@ -178,8 +178,9 @@ TEST(SqliteJobStore, AddsWhatADatabaseOfAnEarlierVersionLacks) {
   with_truth({.5, .25, .1, .01, .02});
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
-  for (const char* sql : {"ALTER TABLE truths DROP COLUMN mse_stderr", "ALTER TABLE truths DROP COLUMN relmse_stderr",
-                          "ALTER TABLE points DROP COLUMN rmse_lo"})
+  for (const char* sql :
+       {"ALTER TABLE truths DROP COLUMN mse_stderr", "ALTER TABLE truths DROP COLUMN relmse_stderr",
+        "ALTER TABLE points DROP COLUMN rmse_lo"})
     EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
   sqlite3_close(db);
 

@@ -56,8 +56,7 @@ TEST(PartialLog, KeepsTheHealthOfARecord) {
   TempFolder dir;
   {
     auto log = PartialLog::open(dir.path()).value();
-    for (std::uint32_t i = 0; i < 6; ++i)
-      ASSERT_TRUE(log->append(i % 2 ? unwell(i) : record(i), payload(i)));
+    for (std::uint32_t i = 0; i < 6; ++i) ASSERT_TRUE(log->append(i % 2 ? unwell(i) : record(i), payload(i)));
     ASSERT_TRUE(log->sync());
   }
   const auto log = PartialLog::open(dir.path()).value();

@@ -286,7 +286,8 @@ struct SharedStores : RedisStores {
   std::unique_ptr<JobStore> open_node(const std::string& node) {
     auto with = options();
     with.node = node;
-    return open_redis_job_store(open_sqlite_job_store(folder_.path() / (node + ".sqlite")).value(), with).value();
+    return open_redis_job_store(open_sqlite_job_store(folder_.path() / (node + ".sqlite")).value(), with)
+        .value();
   }
   // What another one would have done.
   void give(const std::string& job, const std::string& from, const std::string& to, int fence) {

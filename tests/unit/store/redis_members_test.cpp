@@ -52,20 +52,21 @@ class Members : public testing::Test {
     options.lease = std::chrono::hours(1);  // ends when a test says so
     options.looks = kLooks;
     one.members = std::make_unique<RedisMembers>(
-        options, RedisMembers::Told{[&one](std::vector<TakenJob> jobs) {
-                                      for (auto& job : jobs) {
-                                        if (one.keeps) one.known.insert(job.job.job.id);
-                                        one.taken.push_back(std::move(job));
-                                      }
-                                    },
-                                    [&one](const std::vector<LostJob>& jobs) {
-                                      one.lost.insert(one.lost.end(), jobs.begin(), jobs.end());
-                                    },
-                                    [&one](const std::vector<BarredWorker>& all) { one.barred.push_back(all); },
-                                    [&one](std::vector<JobId> ids) {
-                                      std::erase_if(ids, [&](const JobId& id) { return one.known.contains(id); });
-                                      return ids;
-                                    }});
+        options,
+        RedisMembers::Told{[&one](std::vector<TakenJob> jobs) {
+                             for (auto& job : jobs) {
+                               if (one.keeps) one.known.insert(job.job.job.id);
+                               one.taken.push_back(std::move(job));
+                             }
+                           },
+                           [&one](const std::vector<LostJob>& jobs) {
+                             one.lost.insert(one.lost.end(), jobs.begin(), jobs.end());
+                           },
+                           [&one](const std::vector<BarredWorker>& all) { one.barred.push_back(all); },
+                           [&one](std::vector<JobId> ids) {
+                             std::erase_if(ids, [&](const JobId& id) { return one.known.contains(id); });
+                             return ids;
+                           }});
     EXPECT_TRUE(one.members->join());
     return one;
   }

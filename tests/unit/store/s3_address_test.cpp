@@ -25,7 +25,8 @@ TEST(S3Address, WithoutAnEndpointIsAmazonsOfTheRegion) {
 }
 
 TEST(S3Address, SaysHowLargePartsAreAndHowMuchStaysHere) {
-  const auto plain = parse_s3_url("s3://farm/scenes"), told = parse_s3_url("s3://farm?part-mib=5&copies-mib=2048");
+  const auto plain = parse_s3_url("s3://farm/scenes"),
+             told = parse_s3_url("s3://farm?part-mib=5&copies-mib=2048");
   ASSERT_TRUE(plain && told);
   EXPECT_EQ(plain->part_bytes, 64u << 20);
   EXPECT_EQ(plain->copies_bytes, 0u);
@@ -37,8 +38,8 @@ TEST(S3Address, WhatCannotBeOneIsRefusedByName) {
   for (const char* url :
        {"s3:/farm", "s3://", "s3://x", "s3://farm//a", "s3://farm/a b", "s3://farm/../other",
         "s3://farm/a%2F", "s3://farm?endpoint=ftp://x", "s3://farm?endpoint=http://x\r\nHost: y",
-        "s3://farm?key=secret", "s3://farm?region=a/b", "s3://farm:80",
-        "s3://farm?part-mib=4", "s3://farm?part-mib=5121", "s3://farm?part-mib=-5", "s3://farm?part-mib=8x", "s3://farm?part-mib",
+        "s3://farm?key=secret", "s3://farm?region=a/b", "s3://farm:80", "s3://farm?part-mib=4",
+        "s3://farm?part-mib=5121", "s3://farm?part-mib=-5", "s3://farm?part-mib=8x", "s3://farm?part-mib",
         "s3://farm?copies-mib=0", "s3://farm?copies-mib=99999999999999999999"}) {
     const auto address = parse_s3_url(url);
     ASSERT_FALSE(address) << url;

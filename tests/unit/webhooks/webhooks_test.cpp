@@ -196,7 +196,8 @@ TEST_F(WebhooksTest, RefusesWhatIsNoWebAddress) {
 
 TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
   http::testing::FakeCoordinator farm;
-  const JobId ends = farm.submit({"a.xml", "<scene/>", {}, {}}).value(), stays = farm.submit({"b.xml", "<scene/>", {}, {}}).value();
+  const JobId ends = farm.submit({"a.xml", "<scene/>", {}, {}}).value(),
+              stays = farm.submit({"b.xml", "<scene/>", {}, {}}).value();
   Receiver receiver;
   auto webhooks = Webhooks::start(farm, {{"http://receiver/hook"},
                                          "the secret",
@@ -221,7 +222,8 @@ TEST_F(WebhooksTest, ASecondStartWritesNothingOfJobsThatAreKnownToBeOpen) {
   Receiver receiver;
   start(receiver).reset();
   const auto file = folder_ / "outbox" / "open" / job.value;
-  struct stat before {}, after {};
+  struct stat before {
+  }, after{};
   ASSERT_EQ(::stat(file.c_str(), &before), 0);
 
   start(receiver).reset();

@@ -9,14 +9,12 @@ namespace {
 using Material = BsdfTable::Material;
 
 // ---- diffuse
-// --------------------------------------------------------------------------------------------------------
 BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
   const float p = wi.z * kInvPi;
   return {reflectance * p, p};
 }
 
 // ---- conductors
-// -----------------------------------------------------------------------------------------------------
 struct Metal {
   C3 eta, k, tint;
   C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
@@ -44,7 +42,6 @@ std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microface
 }
 
 // ---- plastics
-// --------------------------------------------------------------------------------------------------
 float coat_reflectance(float cos, float ior) {
   return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
 }
