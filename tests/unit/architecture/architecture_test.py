@@ -90,7 +90,7 @@ class Rules(unittest.TestCase):
         self.assert_finds(architecture.headers_are_guarded, {"common/a.h": "int x;\n", "common/b.h": HEADER}, "common/a.h")
 
     def test_lengths(self):
-        self.assert_finds(architecture.short_files, {"web/a.js": "\n" * 401, "web/b.js": "\n" * 400}, "web/a.js has 401")
+        self.assert_finds(architecture.short_files, {"web/a.js": "\n" * 801, "web/b.js": "\n" * 800}, "web/a.js has 801")
 
     def test_unfinished(self):
         word = "TO" + "DO"
