@@ -59,38 +59,36 @@ Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   return {};
 }
 
-tl::unexpected<Error> wrong(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
-
 Result<void> take_programs(const CompareFlags& flags, CompareOptions& options) {
   for (const std::string& file : flags.programs) {
     auto adapter = race::read_adapter(file);
-    if (!adapter) return wrong("--program: " + adapter.error().message);
+    if (!adapter) return bad_argument("--program: " + adapter.error().message);
     options.programs.push_back(std::move(*adapter));
   }
   if (!options.programs.empty() && !options.defines.empty())
-    return wrong(
+    return bad_argument(
         "-D sets names in the scene that other programs read without it: leave out either -D or --program");
   if (options.programs.size() + std::max<std::size_t>(1, flags.integrators.size()) > report::kMostCurves)
-    return wrong(fmt::format("at most {} entrants in one race", report::kMostCurves));
+    return bad_argument(fmt::format("at most {} entrants in one race", report::kMostCurves));
   return {};
 }
 
 Result<void> take_reference(const CompareFlags& flags, CompareOptions& options) {
   if (flags.reference.size() > 2)
-    return wrong("--reference: one picture, or two that are independent of each other");
+    return bad_argument("--reference: one picture, or two that are independent of each other");
   if (!flags.reference.empty() && flags.scenes.size() > 1)
-    return wrong(
+    return bad_argument(
         "--reference is of one scene; for several: --references DIR with NAME.exr, or NAME.0.exr and "
         "NAME.1.exr");
   if (!flags.reference.empty() && !flags.references.empty())
-    return wrong("--reference and --references: give one of them");
+    return bad_argument("--reference and --references: give one of them");
   options.reference.assign(flags.reference.begin(), flags.reference.end());
   options.references = flags.references;
   std::error_code none;
   if (!flags.references.empty() && !std::filesystem::is_directory(options.references, none))
-    return wrong(fmt::format("--references: there is no folder {}", flags.references));
+    return bad_argument(fmt::format("--references: there is no folder {}", flags.references));
   if (options.reference.empty() && options.references.empty() && options.seeds < 2)
-    return wrong(
+    return bad_argument(
         "--seeds 1 needs a --reference: without one pictures are measured against those of other seeds");
   return {};
 }
@@ -98,7 +96,7 @@ Result<void> take_reference(const CompareFlags& flags, CompareOptions& options) 
 Result<void> make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return wrong(fmt::format("--report {}: {}", folder.string(), error.message()));
+  if (error) return bad_argument(fmt::format("--report {}: {}", folder.string(), error.message()));
   return check_folder("--report", folder);
 }
 

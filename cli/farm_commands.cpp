@@ -25,8 +25,6 @@ struct FarmFlags {
 };
 using Run = int (*)(FarmApi& api, const FarmFlags& flags);
 
-std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
-
 int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
                 std::string (*table)(const json&)) {
   if (!answer) return say_rejected(answer.error());

@@ -29,9 +29,9 @@ std::string times(std::uint64_t count, const std::string& what) {
 }
 
 // Columns of a list under its title; the last one runs free.
-class Table {
+class TextTable {
  public:
-  explicit Table(std::string title) : title_(std::move(title)) {}
+  explicit TextTable(std::string title) : title_(std::move(title)) {}
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
   std::string text() const {
     if (rows_.empty()) return "";
@@ -74,7 +74,7 @@ std::string head(const ordered_json& j) {
 }
 
 std::string parts(const ordered_json& j, bool used) {
-  Table table(used ? "uses, and the bytes of files that it reads" : "leaves out: no bytes");
+  TextTable table(used ? "uses, and the bytes of files that it reads" : "leaves out: no bytes");
   for (const auto& part : j.at("parts"))
     if (part.at("used") == used) {
       const std::uint64_t bytes = part.at("bytes");
@@ -97,7 +97,7 @@ std::string made_ready(const ordered_json& j) {
 }
 
 std::string pruned(const ordered_json& j) {
-  Table table("taken out of the scene, as no pixel depends on it");
+  TextTable table("taken out of the scene, as no pixel depends on it");
   for (const auto& x : j.at("pruned")) {
     const std::uint64_t bytes = x.at("bytes");
     table.add(
@@ -109,12 +109,13 @@ std::string pruned(const ordered_json& j) {
 std::string files(const ordered_json& j) {
   const auto& travel = j.at("assets");
   const auto& stay = j.at("files_left_out");
-  Table going(fmt::format("goes to workers: {} in {} files, and {} of scene",
-                          show_bytes(sum_of_bytes(travel)), travel.size(), show_bytes(j.at("scene_bytes"))));
+  TextTable going(fmt::format("goes to workers: {} in {} files, and {} of scene",
+                              show_bytes(sum_of_bytes(travel)), travel.size(),
+                              show_bytes(j.at("scene_bytes"))));
   for (const auto& file : travel)
     going.add({text_at(file, "name"), show_bytes(file.at("bytes")), text_at(file, "uses")});
-  Table staying(fmt::format("stays here: {} in {} files that nothing needed names",
-                            show_bytes(sum_of_bytes(stay)), stay.size()));
+  TextTable staying(fmt::format("stays here: {} in {} files that nothing needed names",
+                                show_bytes(sum_of_bytes(stay)), stay.size()));
   for (const auto& file : stay) staying.add({text_at(file, "name"), show_bytes(file.at("bytes"))});
   const std::string none =
       fmt::format("\ngoes to workers: {} of scene, no files\n", show_bytes(j.at("scene_bytes")));
@@ -133,7 +134,7 @@ std::string memory(const ordered_json& j) {
   const auto& all = j.at("structures");
   std::uint64_t largest = 0;
   for (const auto& s : all) largest = std::max(largest, s.at("bytes").get<std::uint64_t>());
-  Table table(fmt::format("in a worker's memory: {}", show_bytes(sum_of_bytes(all))));
+  TextTable table(fmt::format("in a worker's memory: {}", show_bytes(sum_of_bytes(all))));
   for (const auto& s : all) {
     const std::uint64_t bytes = s.at("bytes");
     table.add(
@@ -155,7 +156,7 @@ std::string instructions(const ordered_json& per_path, const ordered_json& cheap
 std::string variants(const ordered_json& j) {
   const auto& rendered = j.find("variant_bits");
   if (rendered == j.end()) return "";
-  Table table("every instantiation that covers the scene, on a small image");
+  TextTable table("every instantiation that covers the scene, on a small image");
   const auto& first = rendered->front().at("instructions_per_path");
   for (const auto& v : *rendered)
     table.add({text_at(v, "variant"), text_at(v, "sums_sha256"),
@@ -221,7 +222,7 @@ std::string inspection_text(const ordered_json& j) {
   std::string out = head(j) + parts(j, true) + parts(j, false) + made_ready(j) + pruned(j) + files(j) +
                     memory(j) + variants(j);
   if (const auto work = j.find("work"); work != j.end()) {
-    Table table("work of a small image");
+    TextTable table("work of a small image");
     for (const auto& [name, count] : work->items()) table.add({name, count.dump()});
     out += table.text();
   }

@@ -28,8 +28,6 @@ std::optional<std::pair<int, int>> two_numbers(std::string_view text, char betwe
   return std::pair(*first, *second);
 }
 
-tl::unexpected<Error> wrong(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
-
 // Fills an optional field from an option that may not have been given.
 template <class T, class Parse>
 Result<void> take(const std::string& text, std::optional<T>& field, Parse parse) {
@@ -43,8 +41,8 @@ Result<void> take(const std::string& text, std::optional<T>& field, Parse parse)
 Result<int> parse_priority(const std::string& text) {
   const auto value = number<int>(text);
   if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
-    return wrong(fmt::format("--priority '{}': it must be a whole number from -{} to {}", text, kMaxPriority,
-                             kMaxPriority));
+    return bad_argument(fmt::format("--priority '{}': it must be a whole number from -{} to {}", text,
+                                    kMaxPriority, kMaxPriority));
   return *value;
 }
 
@@ -54,7 +52,8 @@ Result<std::uint64_t> parse_whole(const std::string& what, const std::string& te
                                   std::uint64_t most) {
   const auto value = number<std::uint64_t>(text);
   if (!value || *value < least || *value > most)
-    return wrong(fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
+    return bad_argument(
+        fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
   return *value;
 }
 
@@ -65,33 +64,34 @@ Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& te
   const auto value = number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
   const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
   if (!value || *value == 0 || *value > kMaxMemory >> shift)
-    return wrong(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T", what,
-                             text, kMaxMemory >> 40));
+    return bad_argument(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T",
+                                    what, text, kMaxMemory >> 40));
   return *value << shift;
 }
 
 Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
   const auto value = number<double>(text);
   if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
-    return wrong(fmt::format("{} '{}': it must be a number above 0, at most {:g}", what, text, most));
+    return bad_argument(fmt::format("{} '{}': it must be a number above 0, at most {:g}", what, text, most));
   return *value;
 }
 
 Result<FrameSize> parse_size(const std::string& text) {
   const auto size = two_numbers(text, 'x');
-  if (!size) return wrong(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
+  if (!size) return bad_argument(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
   const auto [width, height] = *size;
-  if (width < 1 || height < 1) return wrong(fmt::format("--size '{}': such an image has no pixels", text));
+  if (width < 1 || height < 1)
+    return bad_argument(fmt::format("--size '{}': such an image has no pixels", text));
   if (width > kMaxFrameSide || height > kMaxFrameSide || std::int64_t{width} * height > kMaxFramePixels)
-    return wrong(fmt::format("--size '{}': at most {} pixels a side and {} in all", text, kMaxFrameSide,
-                             kMaxFramePixels));
+    return bad_argument(fmt::format("--size '{}': at most {} pixels a side and {} in all", text,
+                                    kMaxFrameSide, kMaxFramePixels));
   return FrameSize{width, height};
 }
 
 Result<std::pair<int, int>> parse_pixel(const std::string& text) {
   const auto pixel = two_numbers(text, ',');
   if (!pixel || pixel->first < 0 || pixel->second < 0)
-    return wrong(fmt::format("--pixel '{}': write it as X,Y, counted from 0 at the top left", text));
+    return bad_argument(fmt::format("--pixel '{}': write it as X,Y, counted from 0 at the top left", text));
   return *pixel;
 }
 
@@ -100,11 +100,11 @@ Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::
   for (const std::string& define : defines) {
     const auto equals = define.find('=');
     if (equals == std::string::npos || equals == 0)
-      return wrong(fmt::format("-D '{}': write it as name=value", define));
+      return bad_argument(fmt::format("-D '{}': write it as name=value", define));
     if (!values.emplace(define.substr(0, equals), define.substr(equals + 1)).second)
-      return wrong(fmt::format("-D '{}': '{}' is given twice", define, define.substr(0, equals)));
+      return bad_argument(fmt::format("-D '{}': '{}' is given twice", define, define.substr(0, equals)));
   }
-  if (values.size() > kMaxDefines) return wrong(fmt::format("-D: at most {} of them", kMaxDefines));
+  if (values.size() > kMaxDefines) return bad_argument(fmt::format("-D: at most {} of them", kMaxDefines));
   return values;
 }
 
@@ -163,9 +163,9 @@ Result<JobSpec> JobOptions::parse() const {
     if (!range) return fail(Errc::invalid_argument, "--" + range.error().message);
     spec.frames = *range;
     if (spec.defines.contains("frame"))
-      return wrong("-D frame: with --frames the scene's $frame is the number of the frame");
+      return bad_argument("-D frame: with --frames the scene's $frame is the number of the frame");
   }
-  if (const auto known = parse_aovs(aov); !known) return wrong("--aov: " + known.error().message);
+  if (const auto known = parse_aovs(aov); !known) return bad_argument("--aov: " + known.error().message);
   spec.aov = aov;
   spec.priority = priority_value.value_or(0);
   spec.float_output = float_output;

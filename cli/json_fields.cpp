@@ -32,4 +32,8 @@ std::optional<std::pair<double, double>> pair_field(const json& object, const ch
   return std::pair((*found)[0].get<double>(), (*found)[1].get<double>());
 }
 
+std::string dump(const nlohmann::json& value) {
+  return value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace ls::cli

@@ -14,5 +14,6 @@ bool flag_field(const nlohmann::json& object, const char* key);  // false: none,
 int int_field(const nlohmann::json& object, const char* key, int otherwise);
 std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object,
                                                     const char* key);  // [1.5, 2]
+std::string dump(const nlohmann::json& value);  // indented, for --json; invalid UTF-8 is replaced
 
 }  // namespace ls::cli

@@ -16,9 +16,7 @@ struct TokenFlags {
   FarmOptions farm;
   std::string role, user, id;
 };
-using Run = int (*)(FarmApi& api, const TokenFlags& flags);
-
-std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
+using RunToken = int (*)(FarmApi& api, const TokenFlags& flags);
 
 int add_token(FarmApi& api, const TokenFlags& flags) {
   json body{{"role", flags.role}};
@@ -43,7 +41,7 @@ int revoke_token(FarmApi& api, const TokenFlags& flags) {
   return done ? kOk : say_rejected(done.error());
 }
 
-CLI::App* add(CLI::App& parent, Action& action, const char* name, const char* help, Run run,
+CLI::App* add(CLI::App& parent, Action& action, const char* name, const char* help, RunToken run,
               const std::shared_ptr<TokenFlags>& flags) {
   CLI::App* command = parent.add_subcommand(name, help);
   flags->farm.add_to(*command);

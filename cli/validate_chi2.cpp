@@ -57,9 +57,9 @@ V3 direction(double cosine, double phi) {
 
 // Cells of equal solid angle over the sphere: `rows` in the cosine, twice as many in phi; and one for what is
 // absorbed or scattered by a delta lobe.
-class Table {
+class BinTable {
  public:
-  Table(const render::BsdfTable& bsdfs, BsdfIndex index, int rows, const V3& wo)
+  BinTable(const render::BsdfTable& bsdfs, BsdfIndex index, int rows, const V3& wo)
       : bsdfs_(bsdfs), index_(index), rows_(rows), wo_(wo) {}
 
   std::size_t cells() const { return static_cast<std::size_t>(2 * rows_) * rows_ + 1; }
@@ -164,7 +164,7 @@ Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const ren
   render::RandomStream stream(render::combine(seed, 0x6368693274657374));
   // As Nori chooses them: by the cosine.
   const double u = stream.uniform(), phi = 2 * std::numbers::pi * stream.uniform();
-  const Table table(surface->bsdfs, surface->index, test.resolution, direction(std::sqrt(1 - u), phi));
+  const BinTable table(surface->bsdfs, surface->index, test.resolution, direction(std::sqrt(1 - u), phi));
   const std::uint64_t samples =
       test.sample_count > 0 ? test.sample_count : kSamplesPerCell * (table.cells() - 1);
   const std::vector<double> p = table.expected();

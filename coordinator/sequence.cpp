@@ -8,8 +8,6 @@
 namespace ls::coordinator {
 namespace {
 
-bool ended(JobState s) { return s == JobState::done || s == JobState::failed || s == JobState::cancelled; }
-
 double pixels_of(const JobView& frame) { return static_cast<double>(frame.size.width) * frame.size.height; }
 
 // Mean over the pixels of all frames that have an estimate. Frames have seeds of their own, so their
@@ -69,7 +67,7 @@ std::string trouble_of(std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
     if (!found && f.state == JobState::failed && !f.error.empty()) found = &f;
-  const auto waits = [](const JobView& f) { return !ended(f.state); };
+  const auto waits = [](const JobView& f) { return !is_terminal(f.state); };
   if (!found) {
     const auto first = std::find_if(frames.begin(), frames.end(), waits);
     if (first != frames.end() && !first->error.empty()) found = &*first;
@@ -92,7 +90,7 @@ WorkLeft work_left(std::span<const JobView> frames) {
     if (f.units_done > 0) spent += f.core_seconds, progress += f.progress;
   const double each = progress > 0 ? spent / progress : 0;
   for (const JobView& f : frames) {
-    if (ended(f.state)) continue;
+    if (is_terminal(f.state)) continue;
     out.core_left += each * (1 - f.progress);
     out.units += f.units_total - std::min(f.units_total, f.units_done);
     if (f.state == JobState::queued)
@@ -139,7 +137,7 @@ JobState sequence_state(std::span<const JobView> frames) {
     failed |= f.state == JobState::failed;
     cancelled |= f.state == JobState::cancelled;
     begun |= f.state != JobState::queued && f.state != JobState::paused;
-    if (ended(f.state)) continue;
+    if (is_terminal(f.state)) continue;
     open = true;
     all_paused &= f.state == JobState::paused;
   }

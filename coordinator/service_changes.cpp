@@ -17,10 +17,6 @@ std::string_view done_to_become(JobState asked) {
   return asked == JobState::running ? "resumed" : "cancelled";
 }
 
-bool is_end(JobState state) {
-  return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-}
-
 }  // namespace
 
 Result<void> check_priority(int priority) {
@@ -68,7 +64,7 @@ Result<void> Service::may_become_locked(const JobEntry& entry, JobState asked, b
   if (extended && state == JobState::done) state = JobState::running;
   if (state == asked && !finishing) return {};
   const bool possible =
-      asked == JobState::running ? !is_end(state) || finishing : !is_end(state) && !finishing;
+      asked == JobState::running ? !is_terminal(state) || finishing : !is_terminal(state) && !finishing;
   if (possible) return {};
   return fail(Errc::failed_precondition,
               fmt::format("job {} is {}: it cannot be {}", entry.stored.id.value,
@@ -190,7 +186,7 @@ Result<void> Service::remove(const JobId& id) {
     return fail(Errc::failed_precondition,
                 fmt::format("{} is a frame of job {}: it can be cancelled, and is removed with all frames",
                             id.value, frame->sequence.value));
-  if (!is_end(shown_state(*entry)) && entry->finishing == 0) {
+  if (!is_terminal(shown_state(*entry)) && entry->finishing == 0) {
     run_locked(JobCancelled{id});
     return {};
   }

@@ -271,9 +271,7 @@ void Service::retire(const EntryPtr& entry) {
 void Service::forget_locked(JobEntry& entry) {
   const auto figures = farm_.job(entry.stored.id);
   if (!on_disk() || !figures || entry.dormant) return;
-  if (figures->state != JobState::done && figures->state != JobState::failed &&
-      figures->state != JobState::cancelled)
-    return;
+  if (!is_terminal(figures->state)) return;
   entry.dormant = true;
   entry.assembly.reset();
   entry.truths.reset();

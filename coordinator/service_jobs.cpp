@@ -17,8 +17,6 @@ JobId random_job_id(bool wide) {
   return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
 }
 
-Rejected rejected(Error error) { return {std::move(error), {}}; }
-
 }  // namespace
 
 JobId Service::unused_id_locked() const {
@@ -52,23 +50,23 @@ tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
   auto intake = take_in(request, *blobs_);
   if (!intake) return tl::unexpected(std::move(intake.error()));
   if (const auto put = blobs_->put(intake->job.scene, std::as_bytes(std::span(intake->scene_json))); !put)
-    return tl::unexpected(rejected(put.error()));
+    return tl::unexpected(Rejected{put.error(), {}});
   StoredJob job = std::move(intake->job);
   job.submitted_unix = unix_now();
 
   const std::lock_guard lock(mutex_);
-  if (auto room = room_for_locked(job.owner, 1); !room) return tl::unexpected(rejected(room.error()));
+  if (auto room = room_for_locked(job.owner, 1); !room) return tl::unexpected(Rejected{room.error(), {}});
   job.id = unused_id_locked();
   const EntryPtr entry = make_entry(std::move(job));
   if (on_disk()) {
     auto log = PartialLog::open(folder(entry->stored.id));
-    if (!log) return tl::unexpected(rejected(log.error()));
+    if (!log) return tl::unexpected(Rejected{log.error(), {}});
     entry->log = std::move(*log);
   }
   entry->assembly.emplace(entry->grid, entry->stored.spec.target_error.has_value(),
                           aovs_of(entry->stored.settings));
   if (entry->stored.spec.reference) entry->truths.emplace(entry->assembly->film());
-  if (const auto put = store_->put_job(entry->stored); !put) return tl::unexpected(rejected(put.error()));
+  if (const auto put = store_->put_job(entry->stored); !put) return tl::unexpected(Rejected{put.error(), {}});
   const JobId id = entry->stored.id;
   register_locked(entry);
   log_info(fmt::format("job={} name={}", id.value, log_value(entry->stored.name)), "submitted");
@@ -90,9 +88,7 @@ Result<void> Service::wait(const JobId& id) const {
   }
   ended_.wait(lock, [&] {
     return std::all_of(awaited.begin(), awaited.end(), [&](const EntryPtr& entry) {
-      const JobState state = shown_state(*entry);
-      return entry->removed || state == JobState::done || state == JobState::failed ||
-             state == JobState::cancelled;
+      return entry->removed || is_terminal(shown_state(*entry));
     });
   });
   return {};

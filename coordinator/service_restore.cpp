@@ -43,7 +43,7 @@ Result<void> Service::restore() {
   for (StoredJob& job : *jobs) {
     if (image_is_lost(job)) begin_again(job);
     const JobState state = job.state;
-    const bool ended = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+    const bool ended = is_terminal(state);
     const auto entry = make_entry(std::move(job));
     entry->dormant = ended;
     register_locked(entry);

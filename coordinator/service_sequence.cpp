@@ -14,10 +14,6 @@
 namespace ls::coordinator {
 namespace {
 
-bool is_end(JobState state) {
-  return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-}
-
 Error in_frame(const JobId& job, Error error) {
   if (const auto id = frame_of(job)) error.message = fmt::format("frame {}: {}", id->frame, error.message);
   return error;
@@ -139,7 +135,7 @@ Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& se
   for (const EntryPtr& frame : sequence.frames) {
     if (!frame->broken.empty()) continue;
     sound.push_back(frame);
-    if (!is_end(shown_state(*frame))) open.push_back(frame);
+    if (!is_terminal(shown_state(*frame))) open.push_back(frame);
   }
   if (change.priority)
     if (auto ok = check_priority(*change.priority); !ok) return ok;
@@ -270,7 +266,7 @@ Result<void> Service::remove_sequence_locked(const JobId& id, const Sequence& se
   std::vector<JobId> ids;
   for (const EntryPtr& frame : sequence.frames) {
     ids.push_back(frame->stored.id);
-    if (!is_end(shown_state(*frame)) && !frame->finishing) open.push_back(frame);
+    if (!is_terminal(shown_state(*frame)) && !frame->finishing) open.push_back(frame);
   }
   if (!open.empty()) {
     auto done = become_together_locked(open, JobState::cancelled);

@@ -96,7 +96,7 @@ void Service::take_over(Inheritance inheritance) {
   const JobState state = job.state;
   const JobId id = job.id;
   const auto entry = make_entry(std::move(job));
-  entry->dormant = state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+  entry->dormant = is_terminal(state);
   restoring_ = true;
   register_locked(entry);
   if (auto taken = take_up_locked(*entry, state, missing); !taken) set_aside_locked(*entry, taken.error());

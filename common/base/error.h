@@ -34,6 +34,9 @@ using Result = tl::expected<T, Error>;
 inline tl::unexpected<Error> fail(Errc code, std::string message) {
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }
+inline tl::unexpected<Error> bad_argument(std::string message) {
+  return fail(Errc::invalid_argument, std::move(message));
+}
 
 std::string_view to_string(Errc code);  // "invalid_argument" ...
 

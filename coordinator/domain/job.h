@@ -97,9 +97,7 @@ struct Job {
   double marked_spp = 0;                 // of the last mark made
   std::uint64_t foreseen_at = 0;         // rounds seen when the end was last foreseen
 
-  bool ended() const {
-    return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-  }
+  bool ended() const { return is_terminal(state); }
   bool leasable() const { return state == JobState::queued || state == JobState::running; }
   bool audit_waits() const {
     return std::any_of(audits.begin(), audits.end(), [](const auto& a) { return a.second.lease == 0; });

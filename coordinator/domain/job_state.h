@@ -12,6 +12,10 @@ constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
   return kWords[static_cast<std::size_t>(state)];
 }
+// Nothing follows; only `extend` leads out of it.
+constexpr bool is_terminal(JobState state) {
+  return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
+}
 
 // Why a job that is done went no further. The words of the report: "spp", "error", "time", "user".
 enum class StopReason { spp, error, time, user };

@@ -18,8 +18,6 @@ using nlohmann::json;
 
 constexpr std::size_t kMostShown = 5;  // names in a message
 
-tl::unexpected<Error> bad(std::string text) { return bad_bundle(std::move(text)); }
-
 std::string shown(std::string_view name) {
   return fmt::format("\"{}\"", plain_text(name.substr(0, kMaxAssetName)));
 }
@@ -65,11 +63,11 @@ Result<std::string> only_scene(const std::vector<BundleFile>& files, const std::
   }
   if (found.size() == 1) return found.front();
   if (found.empty())
-    return bad(
+    return bad_bundle(
         "there is no .xml at its top: put the scene there, or name it in a file job.json, {\"scene\": "
         "\"FILE\"}");
-  return bad(fmt::format("which of {} is the scene? Name it in a file job.json, {{\"scene\": \"FILE\"}}",
-                         listed(found)));
+  return bad_bundle(fmt::format(
+      "which of {} is the scene? Name it in a file job.json, {{\"scene\": \"FILE\"}}", listed(found)));
 }
 
 struct JobFile {
@@ -79,7 +77,7 @@ struct JobFile {
 
 Result<JobFile> read_job_file(const std::string& text) {
   if (text.size() > kMaxBundleJobJson)
-    return bad(fmt::format("job.json has more than {} bytes", kMaxBundleJobJson));
+    return bad_bundle(fmt::format("job.json has more than {} bytes", kMaxBundleJobJson));
   JobFile out;
   json job;
   bool too_deep = false;
@@ -89,19 +87,20 @@ Result<JobFile> read_job_file(const std::string& text) {
   try {
     job = json::parse(text, watch);
   } catch (const json::exception& e) {
-    return bad(fmt::format("job.json is not JSON: {}", plain_text(e.what())));
+    return bad_bundle(fmt::format("job.json is not JSON: {}", plain_text(e.what())));
   }
-  if (too_deep) return bad(fmt::format("job.json is nested deeper than {} levels", kMaxJsonDepth));
-  if (!job.is_object()) return bad("job.json must be an object: {\"scene\": \"FILE\", and the spec's keys}");
+  if (too_deep) return bad_bundle(fmt::format("job.json is nested deeper than {} levels", kMaxJsonDepth));
+  if (!job.is_object())
+    return bad_bundle("job.json must be an object: {\"scene\": \"FILE\", and the spec's keys}");
   if (const auto scene = job.find("scene"); scene != job.end()) {
-    if (!scene->is_string()) return bad("'scene' in job.json must be the name of a file");
+    if (!scene->is_string()) return bad_bundle("'scene' in job.json must be the name of a file");
     out.scene = scene->get<std::string>();
     job.erase(scene);
   }
   // The spec's keys stand beside the scene, or, as in a request of JSON, in an object of their own.
   if (const auto spec = job.find("spec"); spec != job.end()) {
     if (!spec->is_object() || job.size() != 1)
-      return bad("'spec' in job.json must be an object, and the only key besides 'scene'");
+      return bad_bundle("'spec' in job.json must be an object, and the only key besides 'scene'");
     job = json(*spec);
   }
   out.spec = job.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -135,7 +134,7 @@ Result<Bundle> sorted_out(const BundleContents& contents) {
   if (job.scene) {
     const auto name = normal_name(*job.scene);
     if (!name)
-      return bad(fmt::format("'scene' in job.json, {}, {}", shown(*job.scene), name.error().message));
+      return bad_bundle(fmt::format("'scene' in job.json, {}, {}", shown(*job.scene), name.error().message));
     bundle.scene = top + *name;
   } else {
     auto name = only_scene(contents.files, top);
@@ -160,7 +159,7 @@ tl::unexpected<Error> bad_bundle(std::string text) {
 }
 
 tl::unexpected<Error> bad_entry(std::string_view name, std::string_view what) {
-  return bad(fmt::format("{} {}", shown(name), what));
+  return bad_bundle(fmt::format("{} {}", shown(name), what));
 }
 
 }  // namespace ls::http

@@ -20,17 +20,16 @@ using nlohmann::json;
 
 constexpr std::string_view kDefaultName = "scene.xml";
 
-tl::unexpected<Error> bad(std::string message) { return fail(Errc::invalid_argument, std::move(message)); }
-
 Result<std::map<std::string, Digest>> read_assets(const json& body) {
   std::map<std::string, Digest> assets;
   const auto found = body.find("assets");
   if (found == body.end()) return assets;
-  if (!found->is_object()) return bad("'assets' must be an object {name: SHA256}");
-  if (found->size() > kMaxAssets) return bad(fmt::format("'assets' names more than {} files", kMaxAssets));
+  if (!found->is_object()) return bad_argument("'assets' must be an object {name: SHA256}");
+  if (found->size() > kMaxAssets)
+    return bad_argument(fmt::format("'assets' names more than {} files", kMaxAssets));
   for (const auto& item : found->items()) {
     if (item.key().empty() || item.key().size() > kMaxAssetName)
-      return bad(fmt::format("an asset's name must have 1 to {} characters", kMaxAssetName));
+      return bad_argument(fmt::format("an asset's name must have 1 to {} characters", kMaxAssetName));
     const auto digest = read_digest(item.value(), fmt::format("the digest of asset '{}'", item.key()));
     if (!digest) return tl::unexpected(digest.error());
     assets.emplace(item.key(), *digest);
@@ -44,11 +43,11 @@ Result<SubmitRequest> from_json(Api& api, const Request& request) {
   SubmitRequest submit;
   submit.scene_name = kDefaultName;
   if (const auto name = body->find("name"); name != body->end()) {
-    if (!name->is_string()) return bad("'name' must be a text");
+    if (!name->is_string()) return bad_argument("'name' must be a text");
     submit.scene_name = name->get<std::string>().substr(0, kMaxAssetName);
   }
   const auto scene = body->find("scene");
-  if (scene == body->end()) return bad("the body names no 'scene' (SHA-256 of the scene file)");
+  if (scene == body->end()) return bad_argument("the body names no 'scene' (SHA-256 of the scene file)");
   const auto digest = read_digest(*scene, "'scene'");
   if (!digest) return tl::unexpected(digest.error());
   auto assets = read_assets(*body);
@@ -80,26 +79,27 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
   using coordinator::JobState;
   const auto body = read_object(text, {"state", "priority", "spp", "target_error"});
   if (!body) return tl::unexpected(body.error());
-  if (body->empty()) return bad("the body changes nothing; possible: state, priority, spp, target_error");
+  if (body->empty())
+    return bad_argument("the body changes nothing; possible: state, priority, spp, target_error");
   coordinator::JobChange change;
   if (const auto target = body->find("target_error"); target != body->end()) {
     if (!target->is_number() || !(target->get<double>() > 0))
-      return bad("'target_error' must be a positive number");
+      return bad_argument("'target_error' must be a positive number");
     change.target_error = target->get<double>();
   }
   if (const auto state = body->find("state"); state != body->end()) {
     for (const JobState possible : {JobState::paused, JobState::running, JobState::cancelled})
       if (*state == std::string(to_string(possible))) change.state = possible;
-    if (!change.state) return bad("'state' must be \"paused\", \"running\" or \"cancelled\"");
+    if (!change.state) return bad_argument("'state' must be \"paused\", \"running\" or \"cancelled\"");
   }
   if (const auto priority = body->find("priority"); priority != body->end()) {
     if (!priority->is_number_integer() || std::abs(priority->get<double>()) > kMaxPriority)
-      return bad(fmt::format("'priority' must be a whole number from -{0} to {0}", kMaxPriority));
+      return bad_argument(fmt::format("'priority' must be a whole number from -{0} to {0}", kMaxPriority));
     change.priority = priority->get<int>();
   }
   if (const auto spp = body->find("spp"); spp != body->end()) {
     if (!spp->is_number_unsigned() || spp->get<std::uint64_t>() == 0)
-      return bad("'spp' must be a whole number: the new total per pixel");
+      return bad_argument("'spp' must be a whole number: the new total per pixel");
     change.spp = spp->get<std::uint64_t>();
   }
   return change;

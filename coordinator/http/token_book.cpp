@@ -21,8 +21,6 @@ constexpr struct {
   std::string_view name;
 } kRoles[] = {{Role::admin, "admin"}, {Role::submit, "submit"}, {Role::read, "read"}, {Role::join, "join"}};
 
-tl::unexpected<Error> bad(std::string message) { return fail(Errc::invalid_argument, std::move(message)); }
-
 std::string_view next_word(std::string_view& text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
   if (begin == std::string_view::npos) return text = {};
@@ -109,22 +107,22 @@ void TokenBook::look_again_locked() const {
 }
 
 Result<void> TokenBook::read_line(std::string_view line) const {
-  if (line.size() > kMaxLine) return bad("the line is too long to be a token's");
+  if (line.size() > kMaxLine) return bad_argument("the line is too long to be a token's");
   std::string_view rest = line.substr(0, line.find('#'));
   const std::string_view role_name = next_word(rest);
   if (role_name.empty()) return {};
   const auto role = parse_role(role_name);
-  if (!role) return bad("a line begins with admin, submit, read or join");
+  if (!role) return bad_argument("a line begins with admin, submit, read or join");
   std::string_view user = next_word(rest);
   if (user == "-") user = {};
-  if (!user.empty() && !plausible_user(user)) return bad("the second word is no user name, nor '-'");
-  if (user.empty() && *role == Role::submit) return bad("a submit token needs a user name");
+  if (!user.empty() && !plausible_user(user)) return bad_argument("the second word is no user name, nor '-'");
+  if (user.empty() && *role == Role::submit) return bad_argument("a submit token needs a user name");
   const auto digest = Digest::parse(next_word(rest));
   if (!digest || !next_word(rest).empty())
-    return bad("the third and last word must be the SHA-256 of the token: 64 hexadecimal digits");
-  if (entries_.size() >= kMaxTokens) return bad(fmt::format("more than {} tokens", kMaxTokens));
+    return bad_argument("the third and last word must be the SHA-256 of the token: 64 hexadecimal digits");
+  if (entries_.size() >= kMaxTokens) return bad_argument(fmt::format("more than {} tokens", kMaxTokens));
   for (const Entry& e : entries_)
-    if (e.info.id == digest->hex().substr(0, kIdDigits)) return bad("this token is listed already");
+    if (e.info.id == digest->hex().substr(0, kIdDigits)) return bad_argument("this token is listed already");
   put(*role, std::string(user), *digest, false);
   return {};
 }
@@ -157,10 +155,11 @@ bool TokenBook::may_join(std::string_view token) const {
 }
 
 Result<TokenBook::Made> TokenBook::add(Role role, std::string user) {
-  if (role == Role::submit && user.empty()) return bad("a submit token needs a user: its jobs are theirs");
+  if (role == Role::submit && user.empty())
+    return bad_argument("a submit token needs a user: its jobs are theirs");
   if (!user.empty() && !plausible_user(user))
-    return bad(fmt::format("a user name has 1 to {} of a-z A-Z 0-9 . _ - @ and begins with a letter or digit",
-                           kMaxUserName));
+    return bad_argument(fmt::format(
+        "a user name has 1 to {} of a-z A-Z 0-9 . _ - @ and begins with a letter or digit", kMaxUserName));
   auto token = random_token();
   if (!token) return tl::unexpected(token.error());
   const std::lock_guard lock(mutex_);

@@ -29,9 +29,11 @@ std::string blend(const char* weight) {
 </scene>)",
                      weight);
 }
-const Digest kWood = sha256("wood");
+const Digest kWoodDigest = sha256("wood");
 
-SubmitRequest request(const char* weight) { return {"a.xml", blend(weight), {{"wood.png", kWood}}, {}}; }
+SubmitRequest request(const char* weight) {
+  return {"a.xml", blend(weight), {{"wood.png", kWoodDigest}}, {}};
+}
 
 TEST(Needs, AFileThatNothingNeededNamesNeedNotBeUploaded) {
   auto coordinator = open_at({});
@@ -54,7 +56,7 @@ TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
   EXPECT_EQ(refused.error().diagnostics[0].place.line, 7);
   EXPECT_THAT(refused.error().diagnostics[0].text, HasSubstr("wood.png"));
 
-  ASSERT_TRUE(coordinator->blobs().put(kWood, std::as_bytes(std::span(std::string_view("wood")))));
+  ASSERT_TRUE(coordinator->blobs().put(kWoodDigest, std::as_bytes(std::span(std::string_view("wood")))));
   const auto taken = take_in(request("0.5"), coordinator->blobs());
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->job.assets.size(), 1u);
