@@ -3,6 +3,8 @@
 #   tests/run.sh                everything: release build, unit, statistical, system and browser tests; sanitizer builds
 #   tests/run.sh --quick        the inner loop: release build, unit tests, the fast system tests
 #   tests/run.sh --require-all  a test that cannot run here is a failure, not a skip
+# System and browser tests mostly wait, for farms and pages; builds and unit tests mostly compute. So these are two lanes
+# that run side by side once the programs are built. Logs, and the seconds of each step, are in build/test-logs.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -15,12 +17,27 @@ for arg in "$@"; do
   esac
 done
 
-passed=0 failed=0 skipped=0
 started=$SECONDS
 logs=build/test-logs
+rm -rf "$logs"
 mkdir -p "$logs"
-say() { printf '\n== %s (%d s)\n' "$1" $((SECONDS - started)); }
-give_up() { printf '\n%s\n%d passed, %d failed, %d skipped\n' "$1" "$passed" "$((failed + 1))" "$skipped"; exit 1; }
+counts=$logs/counts times=$logs/times.csv
+: >"$counts"
+echo "step,begins,seconds" >"$times"
+
+count() { echo "$1 $2 $3" >>"$counts"; }  # passed failed skipped
+total() { awk -v column="$1" '{ n += $column } END { print n + 0 }' "$counts"; }
+summary() { echo "$(total 1) passed, $(total 2) failed, $(total 3) skipped"; }
+# Ends a lane, or the whole run: what comes after needs what failed.
+give_up() { printf '\n%s\n' "$1"; count 0 1 0; summary; exit 1; }
+
+step() {  # name, command...: with its seconds
+  local name="$1" begins=$((SECONDS - started)); shift
+  "$@"
+  local took=$((SECONDS - started - begins))
+  echo "$name,$begins,$took" >>"$times"
+  printf '== %s: %d s, ended after %d s\n' "$name" "$took" $((SECONDS - started))
+}
 
 build() {  # preset, targets...
   local preset="$1"; shift
@@ -31,66 +48,92 @@ build() {  # preset, targets...
 # Each GoogleTest case counts: the binaries' own summaries are added up. (--output-on-failure would print failing ones twice.)
 run_ctest() {  # preset, label, log name
   local log="$logs/$3.log"
-  ctest --preset "$1" -L "$2" --verbose -j "$(nproc)" >"$log" 2>&1
+  ctest --preset "$1" -L "^$2\$" --verbose -j "$(nproc)" >"$log" 2>&1
   local rc=$?
   # ctest -V prefixes lines with the test's number.
   local p f s
   p=$(grep -oE '\[  PASSED  \] [0-9]+' "$log" | awk '{ n += $4 } END { print n + 0 }')
   f=$(grep -oE '\[  FAILED  \] [0-9]+ test' "$log" | awk '{ n += $4 } END { print n + 0 }')
   s=$(grep -oE '\[  SKIPPED \] [0-9]+ test' "$log" | awk '{ n += $4 } END { print n + 0 }')
-  passed=$((passed + p)) skipped=$((skipped + s)) failed=$((failed + f))
   if [ "$rc" -ne 0 ]; then
-    [ "$f" -gt 0 ] || failed=$((failed + 1))
+    [ "$f" -gt 0 ] || f=1
     grep -E '\[  FAILED  \]|Failure|ERROR|Expected|Which is|\*\*\*|SUMMARY|WARNING: ThreadSanitizer' "$log" | head -n 60
   fi
+  count "$p" "$f" "$s"
   echo "$3: $p passed, $f failed, $s skipped$([ "$rc" -eq 0 ] || echo ', ctest says failed')"
 }
 
 run_pytest() {  # name, arguments...
   local name="$1" log="$logs/$1.log"; shift
-  /usr/bin/python3 -m pytest -q -ra -p no:cacheprovider "$@" >"$log" 2>&1
+  /usr/bin/python3 -m pytest -q -ra --durations=0 -p no:cacheprovider "$@" >"$log" 2>&1
   local rc=$? last
   last=$(grep -E '[0-9]+ (passed|failed|skipped|error)' "$log" | tail -n 1)
   local p f s e
   p=$(grep -oE '[0-9]+ passed' <<<"$last" | grep -oE '[0-9]+'); f=$(grep -oE '[0-9]+ failed' <<<"$last" | grep -oE '[0-9]+')
   s=$(grep -oE '[0-9]+ skipped' <<<"$last" | grep -oE '[0-9]+'); e=$(grep -oE '[0-9]+ error' <<<"$last" | grep -oE '[0-9]+')
-  passed=$((passed + ${p:-0})) skipped=$((skipped + ${s:-0})) failed=$((failed + ${f:-0} + ${e:-0}))
+  f=$((${f:-0} + ${e:-0}))
   if [ "$rc" -ne 0 ]; then
-    [ $((${f:-0} + ${e:-0})) -gt 0 ] || failed=$((failed + 1))
+    [ "$f" -gt 0 ] || f=1
     grep -E '^(FAILED|ERROR|E  )' "$log" | head -n 60
   fi
+  count "${p:-0}" "$f" "${s:-0}"
   grep -E '^SKIPPED' "$log" || true
   echo "$name: ${last:-pytest exited with $rc}"
 }
 
-deploy/install-deps.sh --tests || give_up "what the tests need could not be installed"
+run_lint() {
+  if tests/lint.sh >"$logs/lint.log" 2>&1; then count 1 0 0; else count 0 1 0; tail -n 20 "$logs/lint.log"; fi
+  echo "lint: $(tail -n 1 "$logs/lint.log")"
+}
 
-say "release build"
-build release
+run_compose() {
+  if ! docker info >/dev/null 2>&1; then
+    echo "compose: no Docker engine answers here, so it is not part of this run (tests/compose/run.sh)"
+  elif tests/compose/run.sh >"$logs/compose.log" 2>&1; then count 1 0 0; echo "compose: passed"
+  else count 0 1 0; tail -n 40 "$logs/compose.log"; echo "compose: failed"; fi
+}
+
+waiting_lane() {
+  step "system tests" run_pytest system tests/system
+  step "browser tests" run_pytest web tests/web
+  step "compose" run_compose
+}
+
+computing_lane() {
+  renice -n 5 "$BASHPID" >/dev/null  # what waits has short turns, and limits to its patience
+  step "release build: tests" build release
+  step "unit and architecture tests" run_ctest release unit unit
+  step "statistical tests" run_ctest release statistical statistical
+  step "AddressSanitizer build" build asan tests-asan lightshaft lightshaft-coordinator lightshaft-worker
+  step "AddressSanitizer: unit tests" run_ctest asan asan unit-asan
+  LIGHTSHAFT_BIN="$PWD/build/asan/bin" step "AddressSanitizer: a farm" run_pytest farm-asan tests/system -m sanitized
+  step "ThreadSanitizer build" build tsan tests-tsan lightshaft-coordinator lightshaft-worker
+  step "ThreadSanitizer: unit tests" run_ctest tsan tsan threads-tsan
+  LIGHTSHAFT_BIN="$PWD/build/tsan/bin" step "ThreadSanitizer: a farm" run_pytest farm-tsan tests/system -m threads
+}
+
+deploy/install-deps.sh --tests >"$logs/install.log" 2>&1 || { tail -n 20 "$logs/install.log"; give_up "what the tests need could not be installed"; }
+step "lint" run_lint
 export LIGHTSHAFT_BIN="$PWD/build/release/bin"
+step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker
 
-say "unit and architecture tests"
-run_ctest release unit unit
 if [ "$quick" -eq 1 ]; then
-  say "system tests, the fast ones"
-  run_pytest system tests/system -m "not slow"
+  step "system tests, the fast ones" run_pytest system tests/system -m "not slow" &
+  waiting=$!
+  (step "release build: tests" build release tests-unit
+   step "unit and architecture tests" run_ctest release unit unit)
 else
-  say "statistical tests"
-  run_ctest release statistical statistical
-  say "system tests"
-  run_pytest system tests/system
-  say "browser tests"
-  run_pytest web tests/web
-  say "AddressSanitizer and UndefinedBehaviorSanitizer"
-  build asan tests-unit lightshaft lightshaft-coordinator lightshaft-worker
-  run_ctest asan unit unit-asan
-  LIGHTSHAFT_BIN="$PWD/build/asan/bin" run_pytest farm-asan tests/system -m sanitized
-  say "ThreadSanitizer"
-  build tsan tests-tsan
-  run_ctest tsan tsan threads-tsan
+  waiting_lane &
+  waiting=$!
+  (computing_lane)
 fi
+wait "$waiting"
 
-say "done"
-if [ "$require_all" -eq 1 ] && [ "$skipped" -gt 0 ]; then echo "--require-all: $skipped tests were skipped"; failed=$((failed + skipped)); skipped=0; fi
-echo "$passed passed, $failed failed, $skipped skipped"
-[ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
+printf '\nThe slowest steps (%s):\n' "$times"
+tail -n +2 "$times" | sort -t, -k3 -rn | head -n 6 | awk -F, '{ printf "  %5d s  %s\n", $3, $1 }'
+if [ "$require_all" -eq 1 ] && [ "$(total 3)" -gt 0 ]; then
+  echo "--require-all: $(total 3) tests were skipped"
+  count 0 "$(total 3)" "-$(total 3)"
+fi
+summary
+[ "$(total 2)" -eq 0 ] && [ "$(total 1)" -gt 0 ]
