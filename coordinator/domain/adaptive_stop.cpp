@@ -176,16 +176,17 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error grows with the level: halve the interval of its exponent.
-  double low = -100, high = 40;
+  // The error grows with the level: halve the interval of its exponent, by roots, which are the same on every
+  // machine.
+  double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
-    const double middle = (low + high) / 2, root = std::exp2(middle);
+    const double middle = std::sqrt(low * high);
     double sum = 0;
-    for (std::size_t g = 0; g < groups_.size(); ++g) sum += groups_[g].pixels * a[g] / samples(a[g], root);
+    for (std::size_t g = 0; g < groups_.size(); ++g) sum += groups_[g].pixels * a[g] / samples(a[g], middle);
     (sum <= target * pixels ? low : high) = middle;
   }
   for (std::size_t i = 0; i < groups_.size(); ++i) {
-    const double n = samples(a[i], std::exp2(low));
+    const double n = samples(a[i], low);
     groups_[i].foreseen =
         std::max(groups_[i].stop, round_count(static_cast<std::uint64_t>(std::ceil(n))) - 1);
   }

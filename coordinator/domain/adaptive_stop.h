@@ -21,6 +21,9 @@
 // last rounds asked, too, and may make the image go on. Nothing stops before kMinSppBeforeStop. Cost per
 // sample counts as equal everywhere: measured times would make pixels depend on the machine. An error that is
 // not known (NaN) stops nothing.
+//
+// All of it, and the error estimates that it is fed, is made of +, -, *, / and square roots, which are the
+// same bits on every machine: another coordinator that takes the job over decides alike.
 #pragma once
 
 #include <cstdint>
