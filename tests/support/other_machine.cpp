@@ -1,0 +1,49 @@
+// Preloaded into a program, this makes it run as on another machine. LIGHTSHAFT_TEST_ISA: Embree is asked for
+// these instructions instead of those that the program names. LIGHTSHAFT_TEST_OFF: this function's results
+// are off by one unit in the last place ("expf"), or one triangle is taken for the one beside it
+// ("rtcIntersect1").
+#include <dlfcn.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <string_view>
+
+namespace {
+
+template <class F>
+F* library(const char* name) {
+  return reinterpret_cast<F*>(dlsym(RTLD_NEXT, name));
+}
+std::string_view setting(const char* name) {
+  const char* text = std::getenv(name);
+  return text ? text : "";
+}
+
+}  // namespace
+
+extern "C" float expf(float x) noexcept {
+  static const auto real = library<float(float)>("expf");
+  static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "expf";
+  const float y = real(x);
+  return off ? std::nextafter(y, std::numeric_limits<float>::infinity()) : y;
+}
+
+extern "C" void* rtcNewDevice(const char* config) {
+  static const auto real = library<void*(const char*)>("rtcNewDevice");
+  const std::string_view isa = setting("LIGHTSHAFT_TEST_ISA");
+  std::string text = config ? config : "";
+  if (!isa.empty()) text += "," + std::string("isa=").append(isa) + "," + std::string("max_isa=").append(isa);
+  return real(text.c_str());  // of two settings the later one counts
+}
+
+// RTCRayHit up to the primitive's number, after 12 numbers of the ray and 5 of the hit.
+extern "C" void rtcIntersect1(void* scene, void* context, void* ray) {
+  static const auto real = library<void(void*, void*, void*)>("rtcIntersect1");
+  static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "rtcIntersect1";
+  real(scene, context, ray);
+  constexpr int kPrimitive = 17;
+  unsigned& primitive = static_cast<unsigned*>(ray)[kPrimitive];
+  if (off && primitive == 1) primitive = 0;
+}
