@@ -1,6 +1,8 @@
 // lightshaft verify: is this image what its scene gives?
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -34,10 +36,10 @@ struct VerifyFlags {
   bool json = false;
 };
 
-Result<SealedImage> open_image(const std::string& path) {
+Result<FinalPicture> open_image(const std::string& path) {
   const auto bytes = coordinator::read_file(path, kMaxFinalBytes);
   if (!bytes) return tl::unexpected(bytes.error());
-  return read_sealed_image(*bytes, path);
+  return read_final_exr(*bytes, path);
 }
 
 // What must be equal before anything can be: the scene and the arithmetic.
@@ -72,7 +74,26 @@ Tally tally_of(const std::vector<VerifiedTile>& tiles) {
 
 std::string verdict_of(const VerifiedTile& t) { return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass"; }
 
-nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, std::uint64_t seed) {
+// What the seal over the whole file says, and what was computed again of the header.
+struct Contents {
+  bool sealed = false;
+  std::vector<std::string> changed;  // "layer depth.Z"
+
+  bool as_sealed() const { return sealed && changed.empty(); }
+  std::string verdict() const { return !changed.empty() ? "fail" : sealed ? "pass" : "unsealed"; }
+};
+Contents contents_of(const FinalPicture& picture) {
+  return {picture.changed.has_value(), picture.changed.value_or(std::vector<std::string>{})};
+}
+
+std::string line_of(const Contents& c) {
+  if (!c.changed.empty()) return fmt::format("not as sealed: {}", fmt::join(c.changed, ", "));
+  if (c.sealed) return "all layers and headers are as sealed";
+  return "layers and headers have no seal: what was not rendered again may have been changed";
+}
+
+nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, const Contents& contents,
+                               std::uint64_t seed) {
   nlohmann::ordered_json j{{"seed", seed}, {"tiles", nlohmann::ordered_json::array()}};
   for (const VerifiedTile& t : tiles) {
     j["tiles"].push_back({{"tile", t.tile},
@@ -81,8 +102,10 @@ nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, std::uint
                           {"verdict", verdict_of(t)},
                           {"problem", t.problem}});
   }
+  j["contents"] = {{"verdict", contents.verdict()}, {"changed", contents.changed}};
   const Tally tally = tally_of(tiles);
-  j["verdict"] = tally.wrong > 0 ? "fail" : tally.stopped > 0 ? "stopped" : "pass";
+  j["verdict"] = tally.wrong > 0 ? "fail" : tally.stopped > 0 ? "stopped" : contents.verdict();
+  if (!contents.changed.empty()) j["verdict"] = "fail";
   return j;
 }
 
@@ -146,7 +169,12 @@ int run(const VerifyFlags& flags) {
   if (!numbers) return say_error(numbers.error());
   const auto defines = parse_defines(flags.defines);
   if (!defines) return say_error(defines.error());
-  const auto image = open_image(flags.image);
+  auto picture = open_image(flags.image);
+  if (!picture) return say_error(picture.error());
+  Contents contents = contents_of(*picture);
+  // Before anything else is asked of the image: what follows may fail for just this.
+  if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
+  const auto image = read_sealed_image(std::move(*picture), flags.image);
   if (!image) return say_error(image.error());
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
@@ -162,14 +190,20 @@ int run(const VerifyFlags& flags) {
   if (!world) return say_rejected(world.error());
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
   const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
-  if (flags.json) print(to_json(verified, numbers->seed).dump(2));
+  for (std::string& header :
+       wrong_headers(*image, coordinator::manifests_of(scene->scene, aovs_of(image->settings)), verified))
+    if (std::find(contents.changed.begin(), contents.changed.end(), header) == contents.changed.end())
+      contents.changed.push_back(std::move(header));
+  if (flags.json) print(to_json(verified, contents, numbers->seed).dump(2));
   const Tally tally = tally_of(verified);
-  if (!flags.json)
+  if (!flags.json) {
+    print(line_of(contents));
     print(fmt::format("{} of {} tiles are as sealed{} ({} in the image; the same choice again: --seed {})",
                       tally.right, verified.size(),
                       tally.stopped > 0 ? fmt::format(", {} were not rendered: stopped", tally.stopped) : "",
                       image->grid().count(), numbers->seed));
-  return tally.right < verified.size() ? kFailed : kOk;
+  }
+  return tally.right == verified.size() && contents.as_sealed() ? kOk : kFailed;
 }
 
 }  // namespace

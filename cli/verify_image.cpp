@@ -51,12 +51,37 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
   if (film.tile_digest(tile) != image.tiles[tile])
     out.problem = fmt::format("rendered again it is {}, the image seals {}", film.tile_digest(tile).hex(),
                               image.tiles[tile].hex());
-  else if (const auto pixel = first_difference(image, film.pixels(tile)))
+  else if (const auto pixel = first_difference(image, film, tile))
     out.problem = fmt::format(
-        "its seal is right, but pixel {},{} has another {} than its samples give: the image was changed "
-        "afterwards",
-        pixel->x, pixel->y, pixel->what);
+        "its seal is right, but pixel {},{} has another value in layer {} than its samples give: the image "
+        "was changed afterwards",
+        pixel->x, pixel->y, pixel->layer);
+  out.error = film.error(tile);
   return out;
+}
+
+std::vector<std::string> wrong_headers(const SealedImage& image, const MatteManifests& names,
+                                       const std::vector<VerifiedTile>& tiles) {
+  auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, true).strings;
+  expected["lightshaft:seed"] = fmt::format("{}", image.settings.seed);
+  const bool all = tiles.size() == image.grid().count() &&
+                   std::none_of(tiles.begin(), tiles.end(), [](const auto& t) { return t.stopped; });
+  if (all) {
+    TileError sums;
+    std::uint64_t missing = 0;
+    for (const VerifiedTile& t : tiles) {
+      if (t.spp > 0) sums.add(t.error);
+      if (t.spp == 0) missing += static_cast<std::uint64_t>(t.rect.pixels());
+    }
+    expected.merge(error_strings(sums, missing));
+    expected.erase("lightshaft:verdict");  // the curve of errors has its say in it
+  }
+  std::vector<std::string> wrong;
+  for (const auto& [name, value] : expected) {
+    const auto found = image.picture.strings.find(name);
+    if (found == image.picture.strings.end() || found->second != value) wrong.push_back("header " + name);
+  }
+  return wrong;
 }
 
 }  // namespace ls::cli

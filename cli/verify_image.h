@@ -18,7 +18,8 @@ struct VerifiedTile {
   PixelRect rect;
   std::uint64_t spp = 0;
   bool stopped = false;  // before it was rendered: nothing is known of it
-  std::string problem;   // empty: digest and pixels are what they should be
+  TileError error;       // as its samples tell it
+  std::string problem;   // empty: digest and all layers are what they should be
 
   bool wrong() const { return !problem.empty(); }
 };
@@ -28,8 +29,14 @@ struct VerifiedTile {
 std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed);
 
 // Renders all rounds of the tile and compares: the chain over its units' digests with the one sealed in the
-// image, and its pixels with those in the image. The world is that of the image's scene and settings.
+// image, and its values in every layer with those in the image. The world is that of the image's scene and
+// settings.
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop);
+
+// Headers that say something else than the settings, the names of the scene and, where `tiles` are all there
+// are, their samples give: "header NAME". The others (seconds, health, ...) only the seal holds.
+std::vector<std::string> wrong_headers(const SealedImage& image, const MatteManifests& names,
+                                       const std::vector<VerifiedTile>& tiles);
 
 }  // namespace ls::cli

@@ -29,9 +29,10 @@ struct ExrLimits {
   int max_side = 65536;
 };
 
-// Flat scanline or tiled EXR, half/float, any compression; single part, or the first part that has colour.
-// Channels R G B, or Y alone (grey); alpha is left out. Chroma-subsampled (luminance/chroma) and deep files
-// are refused. `name` is for the messages. Sizes are checked before anything is allocated.
+// Flat scanline or tiled EXR, half/float, any compression, with losses or without; single part, or the first
+// part that has colour. Channels R G B, or Y alone (grey); alpha is left out. Chroma-subsampled
+// (luminance/chroma) and deep files are refused. `name` is for the messages. Sizes are checked before
+// anything is allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
 // A file whole: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
@@ -76,12 +77,13 @@ class ByteSink {
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
 // A picture that comes in bands of whole rows, from the top: each of them as a picture of as many rows, all
-// with the same channels and without strings. The file is that of the whole picture.
+// with the same channels. The strings of the first one go into the header, too.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;
-  std::function<ExrPicture(int band)> band;  // asked for 0, 1, 2, ... until there are all rows
+  std::function<ExrPicture(int band)> band;  // asked for 0, 1, 2, ... until there are all rows; twice
 };
-Result<void> write_exr(const ExrBands& bands, ByteSink& sink);
+// The file is that of the whole picture, with the seal of all of it in its header (exr_seal.h).
+Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
 
 }  // namespace ls

@@ -11,6 +11,7 @@
 
 #include "common/image/exr_headers.h"
 #include "common/image/exr_memory.h"
+#include "common/image/exr_seal.h"
 #include "common/image/final_image.h"
 #include "common/image/render_limits.h"
 
@@ -19,6 +20,7 @@ namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
 constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
+constexpr std::size_t kMaxLayers = 128;  // with every AOV there are 68
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
   return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
@@ -39,32 +41,63 @@ Result<void> check_layers(const Imf::Header& header, const std::string& name, Fi
     if (!channel || channel->type != Imf::FLOAT || channel->xSampling != 1 || channel->ySampling != 1)
       return bad(name, fmt::format("it has no layer {} of floats", error));
   }
+  std::size_t layers = 0;
+  for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
+    if (at.channel().xSampling != 1 || at.channel().ySampling != 1)
+      return bad(name, fmt::format("its layer {} is subsampled", at.name()));
+    if (++layers > kMaxLayers) return bad(name, "it has more layers than any image of ours");
+  }
   return {};
 }
 
-// Some rows at a time: a small file that only claims to be large costs little memory.
+std::variant<ExrHalf, ExrFloat, ExrUint> empty_channel(Imf::PixelType type, std::size_t pixels) {
+  if (type == Imf::UINT) return ExrUint{std::vector<std::uint32_t>(pixels)};
+  if (type == Imf::HALF) return ExrHalf{std::vector<float>(pixels)};
+  return ExrFloat{std::vector<float>(pixels)};
+}
+
+// Some rows of every layer.
+ExrPicture read_rows(Imf::InputFile& file, int width, int y0, int rows) {
+  ExrPicture band{{width, rows}, {}, {}};
+  Imf::FrameBuffer buffer;
+  const Imf::ChannelList& list = file.header().channels();
+  for (auto at = list.begin(); at != list.end(); ++at) {
+    auto& channel = band.channels[at.name()] =
+        empty_channel(at.channel().type, static_cast<std::size_t>(width) * static_cast<std::size_t>(rows));
+    const Imf::PixelType type = at.channel().type == Imf::UINT ? Imf::UINT : Imf::FLOAT;
+    std::visit(
+        [&](auto& c) {
+          buffer.insert(at.name(), Imf::Slice::Make(type, c.values.data(), {0, y0}, width, rows));
+        },
+        channel);
+  }
+  file.setFrameBuffer(buffer);
+  file.readPixels(y0, y0 + rows - 1);
+  return band;
+}
+
+void append(const ExrPicture& band, FinalPicture& image) {
+  for (const auto& [name, channel] : band.channels)
+    std::visit(
+        [&]<class Channel>(const Channel& from) {
+          auto& to = std::get<Channel>(image.channels.try_emplace(name, Channel{}).first->second).values;
+          to.insert(to.end(), from.values.begin(), from.values.end());
+        },
+        channel);
+}
+
+// A band at a time: a small file that only claims to be large costs little memory.
 void read_pixels(Imf::InputFile& file, FinalPicture& image) {
   constexpr int kBand = 64;
-  const auto width = static_cast<std::size_t>(image.size.width);
+  exr::Seal seal;
   for (int y0 = 0; y0 < image.size.height; y0 += kBand) {
-    const int rows = std::min(kBand, image.size.height - y0);
-    const std::size_t first = image.spp.size(), pixels = width * static_cast<std::size_t>(rows);
-    image.rgb.resize(3 * (first + pixels));
-    image.error.resize(3 * (first + pixels));
-    image.spp.resize(first + pixels);
-    Imf::FrameBuffer buffer;
-    const auto insert = [&](const char* layer, float* to) {
-      buffer.insert(layer, Imf::Slice::Make(Imf::FLOAT, to, {0, y0}, image.size.width, rows,
-                                            3 * sizeof(float), 3 * sizeof(float) * width));
-    };
-    for (std::size_t c = 0; c < 3; ++c) {
-      insert(kColours[c], &image.rgb[3 * first + c]);
-      insert(kErrors[c], &image.error[3 * first + c]);
-    }
-    buffer.insert("spp", Imf::Slice::Make(Imf::UINT, &image.spp[first], {0, y0}, image.size.width, rows));
-    file.setFrameBuffer(buffer);
-    file.readPixels(y0, y0 + rows - 1);
+    const ExrPicture band = read_rows(file, image.size.width, y0, std::min(kBand, image.size.height - y0));
+    seal.add(band);
+    append(band, image);
   }
+  seal.add(file.header());
+  if (const auto sealed = image.strings.find(exr::kSealName); sealed != image.strings.end())
+    image.changed = exr::differences(sealed->second, seal.text());
 }
 
 Result<FinalPicture> read(std::span<const std::byte> exr, const std::string& name) {

@@ -10,6 +10,7 @@
 #include "common/base/overloaded.h"
 #include "common/image/exr_file.h"
 #include "common/image/exr_memory.h"
+#include "common/image/exr_seal.h"
 
 namespace ls {
 namespace {
@@ -70,18 +71,37 @@ Imf::Header header_of(FrameSize size, const ExrPicture& like,
   return header;
 }
 
-Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
-  if (bands.size.width < 1 || bands.size.height < 1)
-    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
-  ExrPicture rows = bands.band(0);
-  Imf::OutputFile file(out, header_of(bands.size, rows, bands.strings), /*numThreads=*/0);
-  for (int band = 0, y = 0;; rows = bands.band(++band)) {
+// Calls take(rows, y) for each band, y being its first row in the file.
+template <class Take>
+Result<void> each_band(const ExrBands& bands, Take take) {
+  for (int band = 0, y = 0; y < bands.size.height; ++band) {
+    const ExrPicture rows = bands.band(band);
     if (auto sound = check(rows); !sound) return sound;
     if (rows.size.width != bands.size.width || rows.size.height > bands.size.height - y)
       return fail(Errc::internal, "writing an EXR: its bands are not those of one picture");
-    write_rows(file, rows, y);
-    if (y += rows.size.height; y == bands.size.height) return {};
+    take(rows, y);
+    y += rows.size.height;
   }
+  return {};
+}
+
+// The seal is in the header and so comes before what it seals: the bands are made twice.
+Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
+  if (bands.size.width < 1 || bands.size.height < 1)
+    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
+  std::optional<Imf::Header> header;
+  exr::Seal seal;
+  const auto read = each_band(bands, [&](const ExrPicture& rows, int) {
+    auto strings = rows.strings;
+    strings.insert(bands.strings.begin(), bands.strings.end());
+    if (!header) header = header_of(bands.size, rows, strings);
+    seal.add(rows);
+  });
+  if (!read) return read;
+  seal.add(*header);
+  header->insert(exr::kSealName, Imf::StringAttribute(seal.text()));
+  Imf::OutputFile file(out, *header, /*numThreads=*/0);
+  return each_band(bands, [&](const ExrPicture& rows, int y) { write_rows(file, rows, y); });
 }
 
 // The library knows errors as exceptions only; the sink's own is kept.
@@ -119,7 +139,7 @@ Result<std::vector<std::byte>> write_exr(const ExrPicture& picture) {
   });
 }
 
-Result<void> write_exr(const ExrBands& bands, ByteSink& sink) {
+Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink) {
   SinkStream out(sink);
   auto written = exr::guarded(Errc::internal, "writing an EXR", [&] { return write_bands(out, bands); });
   if (out.trouble) return tl::unexpected(*out.trouble);

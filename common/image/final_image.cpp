@@ -91,43 +91,48 @@ std::uint64_t values_above_half(const Film& film) {
   return above;
 }
 
-namespace {
-
-// Of a film, or of one row of its tiles; without strings but those of the AOVs. Adds to `clamped`.
-ExrPicture picture_of(const Film& film, const MatteManifests& manifests, bool float_output,
-                      std::uint64_t& clamped) {
+ExrPicture final_layers(const Film& film, const MatteManifests& manifests, bool float_output,
+                        std::uint64_t* clamped) {
   Gathered planes = gather(film);
   ExrPicture picture{film.grid().frame, {}, {}};
   constexpr const char* kRgb[3] = {"R", "G", "B"};
+  std::uint64_t above = 0;
   for (int c = 0; c < 3; ++c) {
     const std::string layer = fmt::format("stderr.{}", kRgb[c]);
-    if (!float_output) clamped += clamp_to_half(planes.rgb[c]);
+    if (!float_output) above += clamp_to_half(planes.rgb[c]);
     if (float_output) picture.channels[kRgb[c]] = ExrFloat{std::move(planes.rgb[c])};
     if (!float_output) picture.channels[kRgb[c]] = ExrHalf{std::move(planes.rgb[c])};
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
-  clamped += add_aov_layers(film, manifests, float_output, picture);
+  above += add_aov_layers(film, manifests, float_output, picture);
+  if (clamped) *clamped += above;
   return picture;
 }
 
+namespace {
+
 std::string pair_text(double lo, double hi) { return fmt::format("{:.9g} {:.9g}", lo, hi); }
 
-// What the film says of its own error; of an empty one there is nothing to say.
-void put_error(std::map<std::string, std::string>& strings, const Film& film,
-               const std::optional<Judgement>& judgement) {
-  if (const auto missing = film.pixels_without_samples(); missing > 0)
-    strings["lightshaft:pixels_without_samples"] = fmt::format("{}", missing);
-  if (film.samples() == 0) return;
-  const ImageError error = image_error(film.error());
-  const bool trusted = error.trusted && (!judgement || judgement->trusted);
+}  // namespace
+
+std::map<std::string, std::string> error_strings(const TileError& sums,
+                                                 std::uint64_t pixels_without_samples) {
+  std::map<std::string, std::string> strings;
+  if (pixels_without_samples > 0)
+    strings["lightshaft:pixels_without_samples"] = fmt::format("{}", pixels_without_samples);
+  if (sums.samples == 0) return strings;
+  const ImageError error = image_error(sums);
   strings["lightshaft:relmse"] = fmt::format("{:.9g}", error.relmse);
   strings["lightshaft:relmse_ci95"] = pair_text(error.relmse_lo, error.relmse_hi);
   strings["lightshaft:rmse"] = fmt::format("{:.9g}", error.rmse);
   strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
-  strings["lightshaft:verdict"] = trusted ? "trusted" : error.trusted ? judgement->words : error.verdict;
+  strings["lightshaft:verdict"] = error.trusted ? "trusted" : error.verdict;
   strings["lightshaft:few_hits"] = fmt::format("{}", error.few_hits);
+  return strings;
 }
+
+namespace {
 
 std::map<std::string, std::string> strings_of(const Film& film, const Provenance& from) {
   std::map<std::string, std::string> strings = {{"lightshaft:scene", from.scene.hex()},
@@ -135,7 +140,11 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:build", from.build},
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
-  put_error(strings, film, from.judgement);
+  strings.merge(error_strings(film.error(), film.pixels_without_samples()));
+  // The curve may know better than the film.
+  if (auto verdict = strings.find("lightshaft:verdict");
+      verdict != strings.end() && verdict->second == "trusted" && from.judgement && !from.judgement->trusted)
+    verdict->second = from.judgement->words;
   if (from.seed) strings["lightshaft:seed"] = fmt::format("{}", *from.seed);
   if (from.seconds) strings["lightshaft:seconds"] = fmt::format("{:.3f}", *from.seconds);
   if (!from.health.empty()) strings["lightshaft:health"] = from.health;
@@ -162,13 +171,11 @@ class MemorySink final : public ByteSink {
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output,
                                       ByteSink& sink) {
   std::uint64_t clamped = 0;
-  ExrBands bands{film.grid().frame, strings_of(film, from),
-                 [&](int row) { return picture_of(film.row(row), from.manifests, float_output, clamped); }};
-  if (!film.aovs().empty()) {  // names of identifiers, the same for every row
-    std::uint64_t ignored = 0;
-    bands.strings.merge(picture_of(film.row(0), from.manifests, float_output, ignored).strings);
-  }
-  if (auto written = write_exr(bands, sink); !written) return tl::unexpected(written.error());
+  const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
+                         if (row == 0) clamped = 0;  // the bands are asked for twice
+                         return final_layers(film.row(row), from.manifests, float_output, &clamped);
+                       }};
+  if (auto written = write_sealed_exr(bands, sink); !written) return tl::unexpected(written.error());
   return clamped;
 }
 

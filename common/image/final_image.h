@@ -46,27 +46,32 @@ struct FinalImage {
   std::vector<std::byte> exr;
   std::uint64_t clamped = 0;  // values whose magnitude was above 65504, the largest half
 };
-// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers. Works
-// on an unfinished film, too.
+// The layers of the final EXR of a film, or of one row of its tiles, and the strings that come with them.
+// Adds to `clamped`.
+ExrPicture final_layers(const Film& film, const MatteManifests& manifests, bool float_output,
+                        std::uint64_t* clamped = nullptr);
+// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers, all
+// sealed in `lightshaft:seal` (exr_seal.h). Works on an unfinished film, too.
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
 // The same bytes into `sink`, made a row of tiles at a time: a large film's image takes no memory of its
 // size. Returns how many values were clamped.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink);
 
+// The header strings that tell the error of an image whose tiles have these sums, by their whole names;
+// `lightshaft:verdict` only as far as the pixels alone know it. Without a sample there are none.
+std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
+
 // How many values of R, G and B it clamps in a half image.
 std::uint64_t values_above_half(const Film& film);
 
-// A final EXR of somebody's, read back: the layers that every one has, and all its header strings. Sizes are
-// bounded.
+// A final EXR of somebody's, read back: all its layers and header strings, among them at least the layers
+// that every one has. Sizes are bounded.
 inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
-struct FinalPicture {
-  FrameSize size;
-  std::vector<float> rgb;          // interleaved, row by row, as stored
-  std::vector<float> error;        // stderr.R, G, B, likewise
-  std::vector<std::uint32_t> spp;  // samples of each pixel
-  bool half = false;               // colours are stored as halves
-  std::map<std::string, std::string> strings;
+struct FinalPicture : ExrPicture {
+  bool half = false;  // colours are stored as halves
+  // The layers and headers that are not as its seal says, by name ("layer depth.Z"); nothing: it has no seal.
+  std::optional<std::vector<std::string>> changed;
 };
 // invalid_argument: what is missing or wrong.
 Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name);

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <bit>
 #include <string_view>
 
+#include "common/base/overloaded.h"
 #include "common/image/exr_file.h"
 #include "common/image/render_limits.h"
 
@@ -32,8 +32,8 @@ Result<Digest> digest_of_header(const FinalPicture& from, const char* key, const
   return *digest;
 }
 
-Result<void> read_settings(const FinalPicture& from, const std::string& name, SealedImage& image) {
-  const auto text = text_of(from, "lightshaft:job", name);
+Result<void> read_settings(SealedImage& image, const std::string& name) {
+  const auto text = text_of(image.picture, "lightshaft:job", name);
   if (!text) return tl::unexpected(text.error());
   auto settings = parse_render_settings(*text);
   if (!settings)
@@ -43,14 +43,15 @@ Result<void> read_settings(const FinalPicture& from, const std::string& name, Se
                     "merged from partials names them by their digest only",
                     settings.error().message));
   image.settings = std::move(*settings);
-  if (image.settings.size != image.size)
-    return bad(name, fmt::format("it has {} x {} pixels, its settings say {} x {}", image.size.width,
-                                 image.size.height, image.settings.size.width, image.settings.size.height));
+  if (image.settings.size != image.picture.size)
+    return bad(name,
+               fmt::format("it has {} x {} pixels, its settings say {} x {}", image.picture.size.width,
+                           image.picture.size.height, image.settings.size.width, image.settings.size.height));
   return check_job_size(image.settings, 2);
 }
 
-Result<void> read_tiles(const FinalPicture& from, const std::string& name, SealedImage& image) {
-  const auto text = text_of(from, "lightshaft:tiles", name);
+Result<void> read_tiles(SealedImage& image, const std::string& name) {
+  const auto text = text_of(image.picture, "lightshaft:tiles", name);
   if (!text) return tl::unexpected(text.error());
   const std::size_t count = image.grid().count();
   constexpr std::size_t kStep = 65;  // 64 digits and a space
@@ -64,44 +65,42 @@ Result<void> read_tiles(const FinalPicture& from, const std::string& name, Seale
   return {};
 }
 
-// What final_exr() stores of a mean.
-float stored(double mean, bool halves) {
-  const float value = static_cast<float>(mean) + 0.f;  // -0 becomes 0
-  if (!halves) return value;
-  return as_half(std::abs(value) <= kLargestHalf ? value : std::copysign(kLargestHalf, value));
+std::size_t index_of(FrameSize size, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) + static_cast<std::size_t>(x);
+}
+
+// The bits of a value as the file has it.
+std::uint32_t stored(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel, std::size_t at) {
+  return std::visit(
+      overloaded{[&](const ExrHalf& c) { return std::bit_cast<std::uint32_t>(as_half(c.values[at])); },
+                 [&](const ExrFloat& c) { return std::bit_cast<std::uint32_t>(c.values[at]); },
+                 [&](const ExrUint& c) { return c.values[at]; }},
+      channel);
 }
 
 }  // namespace
 
-Result<SealedImage> read_sealed_image(std::span<const std::byte> exr, const std::string& name) {
-  auto picture = read_final_exr(exr, name);
-  if (!picture) return tl::unexpected(picture.error());
+Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name) {
   SealedImage image;
-  image.size = picture->size;
-  image.half = picture->half;
-  const auto scene = digest_of_header(*picture, "lightshaft:scene", name);
+  image.picture = std::move(picture);
+  const auto scene = digest_of_header(image.picture, "lightshaft:scene", name);
   if (!scene) return tl::unexpected(scene.error());
-  const auto numeric_class = digest_of_header(*picture, "lightshaft:class", name);
+  const auto numeric_class = digest_of_header(image.picture, "lightshaft:class", name);
   if (!numeric_class) return tl::unexpected(numeric_class.error());
-  auto build = text_of(*picture, "lightshaft:build", name);
+  auto build = text_of(image.picture, "lightshaft:build", name);
   if (!build) return tl::unexpected(build.error());
   image.scene = *scene;
   image.numeric_class = *numeric_class;
   image.build = std::move(*build);
-  if (const auto ok = read_settings(*picture, name, image); !ok) return tl::unexpected(ok.error());
-  if (const auto ok = read_tiles(*picture, name, image); !ok) return tl::unexpected(ok.error());
-  image.rgb = std::move(picture->rgb);
-  image.error = std::move(picture->error);
-  image.spp = std::move(picture->spp);
+  if (const auto ok = read_settings(image, name); !ok) return tl::unexpected(ok.error());
+  if (const auto ok = read_tiles(image, name); !ok) return tl::unexpected(ok.error());
   return image;
 }
 
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile) {
   const PixelRect r = image.grid().rect(tile);
-  const auto at = [&](int x, int y) {
-    return image.spp[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
-                     static_cast<std::size_t>(x)];
-  };
+  const auto& spp = std::get<ExrUint>(image.picture.channels.at("spp")).values;
+  const auto at = [&](int x, int y) { return spp[index_of(image.picture.size, x, y)]; };
   const std::uint32_t first = at(r.x0, r.y0);
   for (int y = r.y0; y < r.y1; ++y)
     for (int x = r.x0; x < r.x1; ++x)
@@ -116,19 +115,18 @@ Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile) {
   return first;
 }
 
-std::optional<PixelDifference> first_difference(const SealedImage& image, const TilePixels& tile) {
-  std::size_t from = 0;
-  for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
-    for (int x = tile.rect.x0; x < tile.rect.x1; ++x, from += 3) {
-      const std::size_t at = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
-                                  static_cast<std::size_t>(x));
-      for (std::size_t c = 0; c < 3; ++c) {
-        if (!(image.rgb[at + c] == stored(tile.mean[from + c], image.half)))
-          return PixelDifference{x, y, "colour"};
-        if (!(image.error[at + c] == static_cast<float>(tile.standard_error[from + c])))
-          return PixelDifference{x, y, "standard error"};
-      }
-    }
+std::optional<PixelDifference> first_difference(const SealedImage& image, const Film& film, TileIndex tile) {
+  const int row = static_cast<int>(tile) / film.grid().columns();
+  const PixelRect rect = film.grid().rect(tile);
+  for (const auto& [name, ours] : final_layers(film.row(row), {}, !image.picture.half).channels) {
+    const auto theirs = image.picture.channels.find(name);
+    if (theirs == image.picture.channels.end() || theirs->second.index() != ours.index())
+      return PixelDifference{rect.x0, rect.y0, name};
+    for (int y = rect.y0; y < rect.y1; ++y)
+      for (int x = rect.x0; x < rect.x1; ++x)
+        if (stored(ours, index_of(image.picture.size, x, y - row * film.grid().tile)) !=
+            stored(theirs->second, index_of(image.picture.size, x, y)))
+          return PixelDifference{x, y, name};
   }
   return std::nullopt;
 }

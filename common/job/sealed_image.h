@@ -19,31 +19,27 @@
 namespace ls {
 
 struct SealedImage {
-  FrameSize size;
-  std::vector<float> rgb;          // interleaved, row by row, as stored
-  std::vector<float> error;        // standard errors of those, likewise
-  std::vector<std::uint32_t> spp;  // samples of each pixel
-  bool half = false;               // colours are stored as halves
+  FinalPicture picture;
   Digest scene, numeric_class;
   RenderSettings settings;
   std::string build;
   std::vector<Digest> tiles;  // one per tile, see Film::tile_digest
 
-  TileGrid grid() const { return {size, settings.tile}; }
+  TileGrid grid() const { return {picture.size, settings.tile}; }
 };
 
 // invalid_argument: what is missing or wrong, by the name of the header or layer.
-Result<SealedImage> read_sealed_image(std::span<const std::byte> exr, const std::string& name);
+Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
 // How many samples the tile's pixels say they have. invalid_argument: they do not agree.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The first pixel of the tile whose colour, or else its standard error, is not that of the film, as
-// final_exr() would store it.
+// The first value of the tile that is not the film's, as final_exr() would store it; in the order of layers.
+// Where the image lacks the whole layer, that of the tile's first pixel.
 struct PixelDifference {
   int x = 0, y = 0;
-  std::string what;  // "colour" or "standard error"
+  std::string layer;
 };
-std::optional<PixelDifference> first_difference(const SealedImage& image, const TilePixels& tile);
+std::optional<PixelDifference> first_difference(const SealedImage& image, const Film& film, TileIndex tile);
 
 }  // namespace ls

@@ -1,5 +1,6 @@
-"""Channels and header strings of the images that we write (scanline, ZIP), read without a library: what a test compares."""
+"""Channels and header strings of the images that we write (scanline, ZIP), read without a library, and changed: what a test compares."""
 
+import hashlib
 import struct
 import zlib
 
@@ -37,15 +38,21 @@ def _unzipped(block, size):
     return bytes(out)
 
 
-def read(path):
-    """({channel: rows of numbers}, {name: string of the header}, {channel: its type, one of "Ief"})."""
-    data = path.read_bytes()
-    header, at = read_header(data)
+def channel_types(header):
+    """[(channel, its type, one of "Ief")], sorted by name as in the file."""
     channels, raw, place = [], header["channels"][1], 0
     while raw[place]:
         name, place = _text(raw, place)
         channels.append((name, TYPES[struct.unpack_from("<i", raw, place)[0]]))
         place += 16
+    return channels
+
+
+def read(path):
+    """({channel: rows of numbers}, {name: string of the header}, {channel: its type, one of "Ief"})."""
+    data = path.read_bytes()
+    header, at = read_header(data)
+    channels = channel_types(header)
     x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"][1])
     width, height = x1 - x0 + 1, y1 - y0 + 1
     line = sum(struct.calcsize("<" + kind) * width for _, kind in channels)
@@ -66,17 +73,40 @@ def _attribute(name, kind, value):
     return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
 
 
+def write(path, header, rows):
+    """An uncompressed picture with these attributes {name: (type, bytes)}, its channels among them: whoever changes an image."""
+    kinds = {name: kind for name, kind in channel_types(header)}
+    x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"][1])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    stored = {**header, "compression": ("compression", b"\0")}
+    # Names of 32 characters and more need a flag of the version.
+    version = 2 | (1024 if any(len(name) > 31 for name in [*header, *kinds]) else 0)
+    head = struct.pack("<2i", 20000630, version) + b"".join(_attribute(name, *a) for name, a in stored.items()) + b"\0"
+    lines = [b"".join(struct.pack(f"<{width}{kinds[name]}", *rows[name][y]) for name in sorted(rows)) for y in range(height)]
+    chunks = [struct.pack("<2i", y0 + y, len(line)) + line for y, line in enumerate(lines)]
+    first = len(head) + 8 * height
+    offsets = struct.pack(f"<{height}Q", *(first + y * len(chunks[0]) for y in range(height)))
+    path.write_bytes(head + offsets + b"".join(chunks))
+
+
 def write_rgb(path, layers):
     """A plain picture of the layers R, G and B (rows of floats), with nothing said about itself."""
-    names, height, width = "BGR", len(layers["R"]), len(layers["R"][0])
-    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    channels = b"".join(name.encode() + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in names) + b"\0"
-    header = struct.pack("<2i", 20000630, 2) + b"".join(_attribute(*a) for a in (
-        ("channels", "chlist", channels), ("compression", "compression", b"\0"), ("dataWindow", "box2i", window),
-        ("displayWindow", "box2i", window), ("lineOrder", "lineOrder", b"\0"), ("pixelAspectRatio", "float", struct.pack("<f", 1)),
-        ("screenWindowCenter", "v2f", bytes(8)), ("screenWindowWidth", "float", struct.pack("<f", 1)))) + b"\0"
-    lines = [struct.pack("<2i", y, 12 * width) + b"".join(struct.pack(f"<{width}f", *layers[name][y]) for name in names)
-             for y in range(height)]
-    first = len(header) + 8 * height
-    offsets = struct.pack(f"<{height}Q", *(first + y * len(lines[0]) for y in range(height)))
-    path.write_bytes(header + offsets + b"".join(lines))
+    window = struct.pack("<4i", 0, 0, len(layers["R"][0]) - 1, len(layers["R"]) - 1)
+    channels = b"".join(name.encode() + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in "BGR") + b"\0"
+    write(path, {"channels": ("chlist", channels), "dataWindow": ("box2i", window), "displayWindow": ("box2i", window),
+                 "lineOrder": ("lineOrder", b"\0"), "pixelAspectRatio": ("float", struct.pack("<f", 1)),
+                 "screenWindowCenter": ("v2f", bytes(8)), "screenWindowWidth": ("float", struct.pack("<f", 1))},
+          {name: layers[name] for name in "BGR"})
+
+
+def seal(header, rows):
+    """What `lightshaft:seal` of this picture would be, by the words of docs/error.md and none of the program's code."""
+    left_out = ("compression", "lineOrder", "lightshaft:seal")
+    lines = [f"{hashlib.sha256(kind.encode() + bytes(1) + value).hexdigest()} header {name}"
+             for name, (kind, value) in sorted(header.items()) if name not in left_out]
+    kinds = dict(channel_types(header))
+    for name in sorted(rows):
+        values = [value for row in rows[name] for value in row]
+        packed = struct.pack(f"<{len(values)}{'I' if kinds[name] == 'I' else 'f'}", *values)
+        lines.append(f"{hashlib.sha256(packed).hexdigest()} layer {name}")
+    return "".join(line + "\n" for line in lines)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from cli_kit import PATIENCE, bin_dir, lightshaft, write_fog
+from exr_layers import read, read_header, seal, write
 from local_farm import wait_until
 
 SPP = 70  # full rounds and a cut one
@@ -48,6 +49,135 @@ def test_a_seal_that_is_another_is_found(finished, tmp_path):
     assert "5 of 6 tiles are as sealed" in done.stdout
     wrong = [line for line in done.stdout.splitlines() if "the image seals" in line]
     assert len(wrong) == 1 and wrong[0].startswith("tile 3 [0,32 to 32,40)")
+
+
+# ---- an image that was changed afterwards ----
+
+AOVS = ("albedo,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,position,shape_id,single,"
+        "surface,uv,volume")
+STORAGE = {"compression", "lineOrder"}  # how the pixels are packed
+X, Y = 3, 5  # the pixel that is changed
+
+
+@pytest.fixture(scope="module")
+def layered(tmp_path_factory):
+    """A scene and its image with every layer there is, of six small tiles: (scene, attributes, rows)."""
+    folder = tmp_path_factory.mktemp("layered")
+    scene = write_fog(folder)
+    lightshaft("render", scene, "-o", folder / "out.exr", "--spp", 4, "--seed", 3, "--size", "72x40", "--aov", AOVS)
+    return scene, read_header((folder / "out.exr").read_bytes())[0], read(folder / "out.exr")[0]
+
+
+def verify(scene, path, header, rows, *flags):
+    """(exit code, all that is said) of the image with these attributes and layers."""
+    write(path, header, rows)
+    done = subprocess.run([str(bin_dir() / "lightshaft"), "verify", path, "--scene", scene, "--seed", "1", *flags],
+                          capture_output=True, text=True, timeout=PATIENCE)
+    return done.returncode, done.stdout + done.stderr
+
+
+def with_layer_changed(rows, layer):
+    """One value of it, to one that the layer's type holds exactly."""
+    changed = {name: list(lines) for name, lines in rows.items()}
+    line = list(changed[layer][Y])
+    line[X] = line[X] + 2 if layer == "spp" else -line[X] or 1.0
+    changed[layer][Y] = tuple(line)
+    return changed
+
+
+def resealed(header, rows):
+    """Whoever changes an image may seal it anew."""
+    return {**header, "lightshaft:seal": ("string", seal(header, rows).encode())}
+
+
+def test_the_seal_is_what_its_description_says(layered):
+    _, header, rows = layered
+
+    assert header["lightshaft:seal"][1].decode() == seal(header, rows)
+
+
+def test_an_image_that_was_only_packed_anew_is_as_sealed(layered, tmp_path):
+    scene, header, rows = layered
+
+    code, said = verify(scene, tmp_path / "same.exr", header, rows, "--tiles", "99")
+
+    assert code == 0 and "6 of 6 tiles are as sealed" in said and "all layers and headers are as sealed" in said
+
+
+def test_a_change_of_any_layer_is_found(layered, tmp_path):
+    scene, header, rows = layered
+    assert len(rows) == 68
+    for layer in rows:
+        code, said = verify(scene, tmp_path / "changed.exr", header, with_layer_changed(rows, layer), "--tiles", "1")
+
+        assert code == 1 and f"not as sealed: layer {layer}\n" in said, f"{layer}: {code}, {said}"
+
+
+def test_a_change_of_any_header_is_found(layered, tmp_path):
+    scene, header, rows = layered
+    assert {"lightshaft:relmse", "lightshaft:seconds", "lightshaft:verdict", "lightshaft:health", "dataWindow"} < set(header)
+    for name, (kind, value) in header.items():
+        if name in STORAGE or name in ("channels", "dataWindow", "lightshaft:seal"):
+            continue  # those first two make another file; of the last below
+        other = bytes([value[0] ^ 1]) + value[1:]
+        code, said = verify(scene, tmp_path / "changed.exr", {**header, name: (kind, other)}, rows, "--tiles", "1")
+
+        assert code != 0, f"{name}: {said}"
+        assert f"header {name}" in said or name == "displayWindow" and "windows" in said, f"{name}: {said}"
+
+        without = {key: attribute for key, attribute in header.items() if key != name}
+        if name.startswith(("lightshaft:", "cryptomatte/")):
+            code, said = verify(scene, tmp_path / "changed.exr", without, rows, "--tiles", "1")
+            assert code != 0 and f"header {name}" in said, f"without {name}: {said}"
+    code, said = verify(scene, tmp_path / "changed.exr", {**header, "owner": ("string", b"me")}, rows, "--tiles", "1")
+    assert code == 1 and "not as sealed: header owner" in said
+
+
+def test_an_image_without_its_seal_is_not_called_as_sealed(layered, tmp_path):
+    scene, header, rows = layered
+    bare = {name: attribute for name, attribute in header.items() if name != "lightshaft:seal"}
+
+    code, said = verify(scene, tmp_path / "bare.exr", bare, rows, "--tiles", "1")
+    told = json.loads(verify(scene, tmp_path / "bare.exr", bare, rows, "--tiles", "1", "--json")[1])
+
+    assert code == 1 and "layers and headers have no seal" in said and "1 of 1 tiles are as sealed" in said
+    assert told["verdict"] == "unsealed" and told["contents"] == {"verdict": "unsealed", "changed": []}
+
+
+def test_a_seal_made_anew_does_not_hide_a_pixel(layered, tmp_path):
+    scene, header, rows = layered
+    for layer in ("R", "stderr.G", "depth.Z", "crypto_object00.R", "albedo.B"):
+        changed = with_layer_changed(rows, layer)
+
+        code, said = verify(scene, tmp_path / "forged.exr", resealed(header, changed), changed, "--tiles", "99")
+
+        assert code == 1 and "all layers and headers are as sealed" in said and "5 of 6 tiles are as sealed" in said
+        assert f"pixel {X},{Y} has another value in layer {layer} than its samples give" in said
+
+
+def test_a_seal_made_anew_does_not_hide_an_error_once_all_tiles_are_rendered(layered, tmp_path):
+    scene, header, rows = layered
+    for name in ("relmse", "relmse_ci95", "rmse", "rmse_ci95", "few_hits", "seed"):
+        forged = resealed({**header, f"lightshaft:{name}": ("string", b"1e-09")}, rows)
+
+        code, said = verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")
+
+        assert code == 1 and f"not as sealed: header lightshaft:{name}\n" in said and "6 of 6 tiles are as sealed" in said
+    # What no rendering can tell again is no safer than the seal: docs/error.md says so.
+    forged = resealed({**header, "lightshaft:seconds": ("string", b"0.001")}, rows)
+    assert verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")[0] == 0
+
+
+def test_every_way_to_an_image_seals_it(tmp_path):
+    scene = write_fog(tmp_path)
+    lightshaft("render", scene, "-o", tmp_path / "one.exr", "--spp", 2, "--partial-dir", tmp_path / "partials")
+    lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "merged.exr")
+    lightshaft("render", scene, "--frames", "1-2", "-o", tmp_path / "frame_#.exr", "--spp", 2)
+    for name in ("one", "merged", "frame_1", "frame_2"):
+        image = tmp_path / f"{name}.exr"
+        header, rows = read_header(image.read_bytes())[0], read(image)[0]
+
+        assert header["lightshaft:seal"][1].decode() == seal(header, rows), name
 
 
 def test_another_scene_is_not_what_the_image_was_rendered_from(finished):

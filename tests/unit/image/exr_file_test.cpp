@@ -3,14 +3,18 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <ImfMultiPartOutputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfOutputPart.h>
 #include <ImfPartType.h>
+#include <ImfStringAttribute.h>
 #include <ImfTiledOutputFile.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <climits>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -27,10 +31,15 @@ constexpr int kWidth = 37, kHeight = 70;  // more than one band of the reader, a
 // Exact in half: small multiples of 1/8.
 float value(int x, int y, int c) { return static_cast<float>((x * 3 + y * 5 + c * 7) % 64) / 8; }
 
-std::vector<float> plane(int c) {
+// With more bits than a half has: what packs with losses has something to lose. From 0.05 to 8.
+float fine_value(int x, int y, int c) {
+  return (value(x, y, c) + .05f) * (1 + 1e-4f * static_cast<float>(x));
+}
+
+std::vector<float> plane(int c, float (*value_at)(int, int, int) = value) {
   std::vector<float> out;
   for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) out.push_back(value(x, y, c));
+    for (int x = 0; x < kWidth; ++x) out.push_back(value_at(x, y, c));
   return out;
 }
 
@@ -51,6 +60,7 @@ struct Foreign {
   Imf::PixelType type = Imf::FLOAT;
   std::vector<std::string> channels = {"R", "G", "B"};
   bool tiled = false;
+  float (*value)(int x, int y, int c) = ls::value;
 };
 
 std::vector<std::byte> write(const Foreign& f) {
@@ -63,7 +73,7 @@ std::vector<std::byte> write(const Foreign& f) {
   std::vector<std::vector<half>> halves;
   floats.reserve(8), halves.reserve(8);
   for (std::size_t c = 0; c < f.channels.size(); ++c) {
-    floats.push_back(plane(static_cast<int>(c)));
+    floats.push_back(plane(static_cast<int>(c), f.value));
     halves.emplace_back(floats.back().begin(), floats.back().end());
     const void* data =
         f.type == Imf::HALF ? static_cast<const void*>(halves.back().data()) : floats.back().data();
@@ -82,13 +92,123 @@ std::vector<std::byte> write(const Foreign& f) {
   return out.take();
 }
 
-TEST(ExrRead, UnderstandsEveryCompressionTypeAndLayout) {
+TEST(ExrRead, UnderstandsEveryLosslessCompressionTypeAndLayout) {
   for (const auto compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
                                  Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION})  // the lossless ones
     for (const auto type : {Imf::HALF, Imf::FLOAT})
       for (const bool tiled : {false, true})
         expect_rgb(
             read_exr_rgb(write({.compression = compression, .type = type, .tiled = tiled}), "foreign"));
+}
+
+// ---- what packs with losses: how far from the picture it may be, by its definition ----
+
+// Both of kHeight x kWidth x 3, as read.
+struct Pair {
+  std::vector<float> was, is;
+  float before(int x, int y, int c) const { return was[at(x, y, c)]; }
+  float after(int x, int y, int c) const { return is[at(x, y, c)]; }
+  static std::size_t at(int x, int y, int c) { return static_cast<std::size_t>((y * kWidth + x) * 3 + c); }
+};
+
+Pair packed(Imf::Compression compression, Imf::PixelType type, bool tiled) {
+  const auto image = read_exr_rgb(
+      write({.compression = compression, .type = type, .tiled = tiled, .value = fine_value}), "lossy");
+  if (!image) throw std::runtime_error(image.error().message);
+  Pair pair{{}, image->rgb};
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const float v = fine_value(x, y, c);
+        pair.was.push_back(type == Imf::HALF ? float(half(v)) : v);
+      }
+  if (pair.was.size() != pair.is.size()) throw std::runtime_error("another size");
+  return pair;
+}
+
+// Calls check(x, y, c) for the pixels of each block, and done() behind each channel of it.
+template <class Check, class Done>
+void each_block(int side, Check check, Done done) {
+  for (int c = 0; c < 3; ++c)
+    for (int y0 = 0; y0 < kHeight; y0 += side)
+      for (int x0 = 0; x0 < kWidth; x0 += side) {
+        for (int y = y0; y < std::min(kHeight, y0 + side); ++y)
+          for (int x = x0; x < std::min(kWidth, x0 + side); ++x) check(x, y, c);
+        done(x0, y0, c);
+      }
+}
+
+TEST(ExrRead, TakesPxr24WithFloatsOf24Bits) {
+  for (const bool tiled : {false, true}) {
+    EXPECT_EQ(packed(Imf::PXR24_COMPRESSION, Imf::HALF, tiled).is,
+              packed(Imf::PXR24_COMPRESSION, Imf::HALF, tiled).was);
+    const Pair p = packed(Imf::PXR24_COMPRESSION, Imf::FLOAT, tiled);
+    EXPECT_NE(p.is, p.was);
+    // A sign, 8 bits of exponent and 15 of mantissa, rounded to nearest: half a unit of 2^-15.
+    for (std::size_t i = 0; i < p.was.size(); ++i)
+      ASSERT_LE(std::abs(p.is[i] - p.was[i]), 0x1p-16f * p.was[i]) << i;
+  }
+}
+
+// A half's place among all positive halves.
+int step_of(float v) { return half(v).bits(); }
+
+// Blocks of 4 x 4 halves keep their largest and, in steps of 2^s halves, what each value is below it; s is
+// the least for which the differences of neighbours fit into 6 bits. None is above (spread / 2^s) + 1, so s
+// is 0 where the spread is 30 or less, and else at most such that spread / 2^(s-1) > 30. A value rounds to
+// the nearest step: 2^(s-1) < spread / 30. Floats are not packed.
+TEST(ExrRead, TakesB44AsFarAsItsStepsReach) {
+  for (const auto compression : {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION})
+    for (const bool tiled : {false, true}) {
+      EXPECT_EQ(packed(compression, Imf::FLOAT, tiled).is, packed(compression, Imf::FLOAT, tiled).was);
+      const Pair p = packed(compression, Imf::HALF, tiled);
+      EXPECT_NE(p.is, p.was);
+      int least = INT_MAX, most = 0, off = 0;
+      each_block(
+          4,
+          [&](int x, int y, int c) {
+            const int was = step_of(p.before(x, y, c));
+            least = std::min(least, was), most = std::max(most, was);
+            off = std::max(off, std::abs(step_of(p.after(x, y, c)) - was));
+          },
+          [&](int x0, int y0, int c) {
+            EXPECT_LE(off, (most - least) / 30.) << x0 << " " << y0 << " " << c;
+            least = INT_MAX, most = off = 0;
+          });
+    }
+}
+
+// DWA's own scale, in which it packs: x^(1/2.2) up to 1, ln(x) / 2.2 + 1 beyond.
+double on_dwa_scale(double v) { return v <= 1 ? std::pow(v, 1 / 2.2) : std::log(v) / 2.2 + 1; }
+
+// Y', Cb and Cr of blocks of 8 x 8, on that scale, go through an orthonormal cosine transform, whose
+// coefficients are rounded within 45 / 100,000 (the usual level) times JPEG's table, over the table's least
+// number. The squares of the errors of 64 pixels sum up to those of 64 coefficients (Parseval): their root
+// mean square is at most 0.00045 times that of the table, 6.71 for Y' and 5.31 for Cb and Cr. Of those blue
+// has Y' and 1.8556 Cb, red Y' and 1.5747 Cr. Coefficients, results and the pixels themselves are halves:
+// each rounding is 2^-11 of what is at most 8 times (a sum over 64, over 8) a value below 2.2, in a block
+// 2^-11 times 2.2 a pixel, four times (forth, into Y'CbCr, back and out), and up to 2.9 times in blue.
+TEST(ExrRead, TakesDwaWithinItsQuantisation) {
+  constexpr double kBase = 45. / 100'000, kY = 6.71 * kBase, kC = 5.31 * kBase;
+  const double bound = kY + 1.8556 * kC + 2.9 * 4 * 0x1p-11 * 2.2;
+  for (const auto compression : {Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION})
+    for (const auto type : {Imf::HALF, Imf::FLOAT})
+      for (const bool tiled : {false, true}) {
+        const Pair p = packed(compression, type, tiled);
+        if (!tiled)
+          EXPECT_NE(p.is, p.was);  // a block that does not shrink, as of small tiles, stays as it is
+        double squares = 0;
+        each_block(
+            8,
+            [&](int x, int y, int c) {
+              const double off = on_dwa_scale(p.after(x, y, c)) - on_dwa_scale(p.before(x, y, c));
+              squares += off * off;
+            },
+            [&](int x0, int y0, int c) {
+              EXPECT_LE(std::sqrt(squares / 64), bound) << x0 << " " << y0 << " " << c;
+              squares = 0;
+            });
+      }
 }
 
 TEST(ExrRead, TakesTheDataWindowWhereverItLies) {
@@ -285,11 +405,17 @@ TEST(ExrWrite, APictureInBandsIsTheFileOfTheWholePicture) {
   whole.strings = {{"lightshaft:test", "hello"}};
   Memory sink;
 
-  const auto written = write_exr(
+  const auto written = write_sealed_exr(
       {{7, 50}, whole.strings, [](int band) { return rows_of(13 * band, std::min(13, 50 - 13 * band)); }},
       sink);
 
   ASSERT_TRUE(written) << written.error().message;
+  exr::MemoryReader in(sink.bytes, "sealed");
+  const std::string seal =
+      Imf::InputFile(in).header().typedAttribute<Imf::StringAttribute>("lightshaft:seal").value();
+  EXPECT_THAT(seal, HasSubstr(" header lightshaft:test\n"));
+  EXPECT_THAT(seal, HasSubstr(" layer stderr.R\n"));
+  whole.strings["lightshaft:seal"] = seal;
   EXPECT_EQ(sink.bytes, write_exr(whole).value());
 }
 
@@ -298,7 +424,8 @@ TEST(ExrWrite, TellsWhyABandCouldNotBeWrittenWhereverThatWas) {
   for (std::size_t most = 0; most < length; most += 97) {
     Memory sink;
     sink.most = most;
-    const auto written = write_exr({{7, 50}, {}, [](int band) { return rows_of(25 * band, 25); }}, sink);
+    const auto written =
+        write_sealed_exr({{7, 50}, {}, [](int band) { return rows_of(25 * band, 25); }}, sink);
     ASSERT_FALSE(written) << most;
     EXPECT_EQ(written.error().code, Errc::resource_exhausted);
     EXPECT_EQ(written.error().message, "the disk is full");
@@ -307,8 +434,8 @@ TEST(ExrWrite, TellsWhyABandCouldNotBeWrittenWhereverThatWas) {
 
 TEST(ExrWrite, RefusesBandsThatAreNotThoseOfThePicture) {
   Memory sink;
-  EXPECT_FALSE(write_exr({{7, 40}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too many rows";
-  EXPECT_FALSE(write_exr({{8, 50}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too narrow";
+  EXPECT_FALSE(write_sealed_exr({{7, 40}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too many rows";
+  EXPECT_FALSE(write_sealed_exr({{8, 50}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too narrow";
 }
 
 TEST(ExrWrite, RefusesPlanesOfTheWrongSize) {

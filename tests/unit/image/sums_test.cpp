@@ -93,8 +93,8 @@ TEST(Sums, OfMoreSamplesThanAnIntHoldsKeepTheirCountInTheImage) {
   ASSERT_TRUE(image) << image.error().message;
   const auto read = read_final_exr(image->exr, "own");
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->spp.at(0), 3'000'000'064u);
-  EXPECT_EQ(read->rgb.at(0), .1f);
+  EXPECT_EQ(std::get<ExrUint>(read->channels.at("spp")).values.at(0), 3'000'000'064u);
+  EXPECT_EQ(std::get<ExrFloat>(read->channels.at("R")).values.at(0), .1f);
 }
 
 }  // namespace

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <tuple>
 
 #include "common/image/exr_file.h"
+#include "common/image/fake_pixels.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -32,8 +34,14 @@ std::vector<std::byte> sealed(const Film& film, bool float_output, const RenderS
   return std::move(image->exr);
 }
 
+Result<SealedImage> read(std::span<const std::byte> exr) {
+  auto picture = read_final_exr(exr, "image.exr");
+  if (!picture) return tl::unexpected(picture.error());
+  return read_sealed_image(std::move(*picture), "image.exr");
+}
+
 std::string refusal(const std::vector<std::byte>& exr) {
-  const auto image = read_sealed_image(exr, "image.exr");
+  const auto image = read(exr);
   return image ? "taken" : image.error().message;
 }
 
@@ -46,14 +54,26 @@ std::vector<std::byte> changed(std::vector<std::byte> exr, std::string_view from
   return exr;
 }
 
+bool same_bits(const std::variant<ExrHalf, ExrFloat, ExrUint>& a,
+               const std::variant<ExrHalf, ExrFloat, ExrUint>& b) {
+  return a.index() == b.index() && std::visit(
+                                       [&]<class Channel>(const Channel& of_a) {
+                                         const auto& of_b = std::get<Channel>(b);
+                                         return of_a.values.size() == of_b.values.size() &&
+                                                std::memcmp(of_a.values.data(), of_b.values.data(),
+                                                            of_a.values.size() * sizeof of_a.values[0]) == 0;
+                                       },
+                                       a);
+}
+
 TEST(SealedImage, GivesBackWhatTheFinalImageHolds) {
   const Film film = make_film(kGrid, 6);
 
   for (const bool floats : {false, true}) {
-    const auto image = read_sealed_image(sealed(film, floats), "image.exr");
+    const auto image = read(sealed(film, floats));
 
     ASSERT_TRUE(image) << image.error().message;
-    EXPECT_EQ(image->half, !floats);
+    EXPECT_EQ(image->picture.half, !floats);
     EXPECT_EQ(image->scene, test::name_of("scene"));
     EXPECT_EQ(image->numeric_class, test::name_of("class"));
     EXPECT_EQ(image->settings, settings());
@@ -62,47 +82,64 @@ TEST(SealedImage, GivesBackWhatTheFinalImageHolds) {
     for (TileIndex t = 0; t < kGrid.count(); ++t) {
       EXPECT_EQ(image->tiles[t], film.tile_digest(t));
       EXPECT_EQ(tile_samples(*image, t).value(), 6u);
-      EXPECT_FALSE(first_difference(*image, film.pixels(t)));
+      EXPECT_FALSE(first_difference(*image, film, t));
     }
   }
 }
 
-TEST(SealedImage, FindsTheFirstPixelThatIsNotOfItsSamples) {
-  const Film film = make_film(kGrid, 6);
-  auto image = read_sealed_image(sealed(film, false), "image.exr").value();
-  const int x = 11, y = 9;  // of tile 5, which begins at 8, 8
-  float& green = image.rgb[3 * (y * 25 + x) + 1];
-  green = std::nextafter(green, 1e9f);
-
-  const auto found = first_difference(image, film.pixels(5));
-  ASSERT_TRUE(found);
-  EXPECT_EQ(std::tuple(found->x, found->y, found->what), std::tuple(x, y, "colour"));
-  EXPECT_FALSE(first_difference(image, film.pixels(3)));
+// Every layer that there can be, with a value in each pixel.
+Film film_with_aovs() {
+  AovSet all;
+  for (const AovRow& row : aov_rows()) all = all.with(row.aov);
+  Film film(kGrid, all);
+  for (TileIndex t = 0; t < kGrid.count(); ++t)
+    if (!film.fold(t, 0, fake_partial(test::make_partial(kGrid, t, {0, 2}).header, all)))
+      throw std::logic_error("not folded");
+  return film;
 }
 
-TEST(SealedImage, FindsTheFirstStandardErrorThatIsNotOfItsSamples) {
-  const Film film = make_film(kGrid, 6);
-  auto image = read_sealed_image(sealed(film, false), "image.exr").value();
-  const int x = 12, y = 10;  // of tile 5
-  image.error[3 * (y * 25 + x) + 2] /= 2;
+// The pixel's value, as the next one that the layer can hold.
+void change(std::variant<ExrHalf, ExrFloat, ExrUint>& layer, std::size_t at) {
+  if (auto* halves = std::get_if<ExrHalf>(&layer))
+    halves->values[at] +=
+        std::abs(halves->values[at]) / 512 + 1e-6f;  // halves have 11 bits, or steps of 2^-24
+  if (auto* floats = std::get_if<ExrFloat>(&layer))
+    floats->values[at] = std::nextafter(floats->values[at], 1e30f);
+  if (auto* counts = std::get_if<ExrUint>(&layer)) ++counts->values[at];
+}
 
-  const auto found = first_difference(image, film.pixels(5));
-  ASSERT_TRUE(found);
-  EXPECT_EQ(std::tuple(found->x, found->y, found->what), std::tuple(x, y, "standard error"));
-  EXPECT_FALSE(first_difference(image, film.pixels(3)));
+TEST(SealedImage, FindsTheFirstValueOfEachLayerThatIsNotOfItsSamples) {
+  const Film film = film_with_aovs();
+  const int x = 11, y = 9;  // of tile 5, which begins at 8, 8
+  for (const bool floats : {false, true}) {
+    const auto whole = read(sealed(film, floats)).value();
+    EXPECT_EQ(whole.picture.channels.size(), 68u);
+    for (const auto& [layer, values] : whole.picture.channels) {
+      auto image = whole;
+      change(image.picture.channels.at(layer), static_cast<std::size_t>(y * 25 + x));
+
+      const auto found = first_difference(image, film, 5);
+      ASSERT_TRUE(found) << layer;
+      EXPECT_EQ(std::tuple(found->x, found->y, found->layer), std::tuple(x, y, layer));
+      EXPECT_FALSE(first_difference(image, film, 3)) << layer;
+      image.picture.channels.erase(layer);
+      EXPECT_EQ(first_difference(image, film, 3)->layer, layer);
+    }
+  }
 }
 
 TEST(SealedImage, ATileHasOneCountOfSamples) {
-  auto image = read_sealed_image(sealed(make_film(kGrid, 6), true), "image.exr").value();
-  image.spp[0] = 8;
-  image.spp[8] = 7;
+  auto image = read(sealed(make_film(kGrid, 6), true)).value();
+  auto& spp = std::get<ExrUint>(image.picture.channels.at("spp")).values;
+  spp[0] = 8;
+  spp[8] = 7;
 
   EXPECT_THAT(tile_samples(image, 0).error().message,
               HasSubstr("pixel 0,0 says 8 samples, pixel 1,0 says 6"));
   EXPECT_FALSE(tile_samples(image, 1));
   EXPECT_TRUE(tile_samples(image, 2));
   for (int y = 0; y < 8; ++y)
-    for (int x = 8; x < 16; ++x) image.spp[y * 25 + x] = 7;
+    for (int x = 8; x < 16; ++x) spp[y * 25 + x] = 7;
   EXPECT_THAT(tile_samples(image, 1).error().message, HasSubstr("has 7 samples"));
 }
 
@@ -135,7 +172,43 @@ TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
 TEST(SealedImage, CutShortAnywhereIsRefusedAndNothingElse) {
   const auto good = sealed(make_film(kGrid, 2), false);
   for (std::size_t n = 0; n < good.size(); n += 1 + good.size() / 97)
-    EXPECT_FALSE(read_sealed_image(std::span(good).first(n), "image.exr")) << n;
+    EXPECT_FALSE(read(std::span(good).first(n))) << n;
+}
+
+// ---- the seal over the whole file ----
+
+// A faulty disk: whatever a changed bit changes of what is read is refused or found.
+TEST(SealedImage, NoBitOfTheFileChangesUnseen) {
+  const auto good = sealed(film_with_aovs(), false);
+  const auto before = read_final_exr(good, "image.exr").value();
+  ASSERT_TRUE(before.changed && before.changed->empty());
+  std::size_t refused = 0, found = 0, same = 0;
+  for (std::size_t at = 0; at < good.size(); at += 13) {
+    auto bytes = good;
+    bytes[at] ^= std::byte(1 << at % 8);
+
+    const auto after = read_final_exr(bytes, "image.exr");
+    if (!after)
+      ++refused;
+    else if (after->changed != before.changed)
+      ++found;
+    else
+      ++same;
+    if (after && after->changed == before.changed) {
+      EXPECT_EQ(after->strings, before.strings) << "byte " << at;
+      for (const auto& [layer, values] : before.channels)
+        EXPECT_TRUE(same_bits(values, after->channels.at(layer))) << "byte " << at << ": " << layer;
+    }
+  }
+  EXPECT_GT(refused, 0u);
+  EXPECT_GT(found, 0u);
+  EXPECT_LT(same, found);
+}
+
+TEST(SealedImage, WithoutItsSealIsCalledUnsealed) {
+  const auto good = sealed(make_film(kGrid, 2), false);
+
+  EXPECT_EQ(read(changed(good, "lightshaft:seal", "lightshaft:sea1")).value().picture.changed, std::nullopt);
 }
 
 }  // namespace

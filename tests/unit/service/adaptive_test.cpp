@@ -97,8 +97,9 @@ TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   ASSERT_TRUE(exr);
   const auto picture = read_final_exr(*exr, "image.exr");
   ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->spp.front(), spp.front());
-  EXPECT_EQ(picture->spp.back(), spp.back());
+  const auto& counts = std::get<ExrUint>(picture->channels.at("spp")).values;
+  EXPECT_EQ(counts.front(), spp.front());
+  EXPECT_EQ(counts.back(), spp.back());
   const auto& header = picture->strings;
   EXPECT_TRUE(header.at("lightshaft:stopped").starts_with("error; stopped at a target error"));
   EXPECT_GT(std::stod(header.at("lightshaft:core_seconds")), 0);
