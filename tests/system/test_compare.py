@@ -9,12 +9,12 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 
 import pytest
 
 from cli_kit import bin_dir, lightshaft, write_fog
 from exr_layers import read, write_rgb
+from local_farm import PATIENCE
 
 ADAPTERS = pathlib.Path(__file__).resolve().parents[1] / "bench" / "adapters"
 
@@ -46,9 +46,9 @@ def other(folder):
                             "{seed}", "{size}"], first_spp=2)
 
 
-def compare(folder, *arguments, code=0):
-    return lightshaft("compare", write_fog(folder), "--size", "48x32", "--threads", "1", "--clock", "cpu", "--report", folder / "out", "--quiet",
-                      *arguments, code=code)
+def compare(folder, *arguments, code=0, quiet=True):
+    return lightshaft("compare", write_fog(folder), "--size", "48x32", "--threads", "1", "--clock", "cpu", "--report", folder / "out",
+                      *(["--quiet"] if quiet else []), *arguments, code=code)
 
 
 def test_integrators_of_ours_race_with_intervals(tmp_path):
@@ -170,13 +170,14 @@ def test_a_reference_with_the_noise_of_a_racer_is_refused(tmp_path):
 def test_a_race_that_nobody_could_judge_is_not_run(tmp_path):
     """References are given, but none is of this scene."""
     (tmp_path / "refs").mkdir()
-    began = time.monotonic()
-    told = compare(tmp_path, "--references", tmp_path / "refs", "--time", "600", "--seeds", "1", code=2)
+    told = compare(tmp_path, "--references", tmp_path / "refs", "--time", "600", "--seeds", "1", code=2, quiet=False)
 
     assert "two seeds at least" in told.stderr
-    blind = compare(tmp_path, "--integrators", "path", "--time", "600", "--seeds", "2", code=2)
+    blind = compare(tmp_path, "--integrators", "path", "--time", "600", "--seeds", "2", code=2, quiet=False)
     assert "sees all of the scene" in blind.stderr
-    assert time.monotonic() - began < 500, "a seed of it takes 600 s"
+    for refused in (told, blind):
+        assert "seed 1 of" not in refused.stderr, "a seed was begun"
+    assert not (tmp_path / "out" / "points.csv").exists()
 
 
 def test_wrong_use_is_told_before_anything_is_rendered(tmp_path):
@@ -218,9 +219,8 @@ def test_interrupting_keeps_what_was_done(tmp_path):
         if re.search("long: seed 1", line):
             run.send_signal(2)
             break
-    began = time.monotonic()
-    run.stderr.read()
-    assert run.wait(timeout=60) == 1
-    assert time.monotonic() - began < 30
+    rest = run.stderr.read()
+    assert run.wait(timeout=PATIENCE) == 1
+    assert "long: seed 2" not in rest, "another seed was begun"
     assert [row["scene"] for row in rows(out / "summary.csv")] == ["fog"]
     assert not list(tmp_path.glob("lightshaft-race-*")), "pictures were left behind"

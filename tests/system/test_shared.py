@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import subprocess
-import time
 import urllib.error
 from concurrent.futures import ThreadPoolExecutor
 
@@ -15,7 +14,6 @@ from local_farm import SCENE, HttpError, LocalFarm, Process, bin_dir, wait_until
 from redis_server import RedisServer
 
 SPEC = dict(spp=64, seed=3)
-PROMISE = 10.0  # seconds from the death of a coordinator until another one has its jobs
 
 
 @pytest.fixture
@@ -59,15 +57,11 @@ def test_a_killed_coordinators_job_goes_on_at_the_other_one(pair, redis, expecte
     a.wait_for_progress(job, 5)
 
     a.coordinator.kill()
-    killed = time.monotonic()
     wait_until(lambda: has(b, job), "the other one has the job")
-    seconds = time.monotonic() - killed
 
     assert b.pixels(job) == expected
     assert redis.ask("HGET", f"lightshaft:job:{job}", "fence") == "2"
     assert "taken over from coordinator" in b.request("GET", f"/api/v1/jobs/{job}/log").decode()
-    print(f"taken over after {seconds:.1f} s")
-    assert seconds < PROMISE
 
 
 def test_a_coordinator_sends_clients_to_the_one_that_has_the_job(pair):

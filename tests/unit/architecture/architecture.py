@@ -104,6 +104,14 @@ SLEEP_EXCEPTIONS = {
     "tests/support/local_farm.py": "looks again every 20 ms whether another process has come so far, until a deadline",
 }
 
+TIMED_EXCEPTIONS = {
+    "tests/support/local_farm.py": "the deadline of every wait for an event",
+    "tests/unit/agent/scripted_coordinator.h": "likewise",
+}
+TEST_CLOCK = re.compile(r"\b(monotonic|perf_counter|process_time)\(\)|\btime\.time\(\)|_clock::now\(\)")
+ASSERTION = re.compile(r"^\s*(?:assert\b|(?:EXPECT|ASSERT)_\w+\()(.*)")
+ASSIGNMENT = re.compile(r"^\s*(?:const |auto |double |float )*(\w+) = (.*)")
+
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.M)
 NOW = re.compile(r"::now\s*\(\s*\)")
 SLEEP = re.compile(r"\bsleep_(for|until)\b|(?<![\w.])(u|nano)?sleep\s*\(|\b(time|asyncio)\.sleep\b")
@@ -264,6 +272,23 @@ def tests_do_not_sleep(tree):
             yield f"{path} sleeps; wait for what it waits for"
 
 
+def tests_assert_no_times(tree):
+    """No test fails because the machine was slow: neither a clock nor the difference of two readings is asserted about."""
+    for path, text in tree.items():
+        if not path.startswith("tests/") or path.startswith(("tests/bench/", "tests/unit/architecture/")) or path in TIMED_EXCEPTIONS:
+            continue
+        timed = set()
+        for number, line in enumerate(text.splitlines(), 1):
+            assigned, asserted = ASSIGNMENT.match(line), ASSERTION.match(line)
+            read = TEST_CLOCK.search(line)
+            if assigned and read and "-" in assigned[2]:
+                timed.add(assigned[1])
+            elif assigned:
+                timed.discard(assigned[1])
+            if asserted and (read or timed & set(re.findall(r"\w+", asserted[1].split(", \"")[0]))):
+                yield f"{path}:{number} asserts how long something took; wait for an event, or ask for an order or a state"
+
+
 def nobody_exits(tree):
     for path, text in product(tree).items():
         ends = EXIT.search(without_texts(text)) is not None
@@ -274,7 +299,7 @@ def nobody_exits(tree):
 
 
 def exceptions_are_files(tree):
-    for path in [*LONG_FILES, *CLOCK_EXCEPTIONS, *EXIT_EXCEPTIONS, *SLEEP_EXCEPTIONS]:
+    for path in [*LONG_FILES, *CLOCK_EXCEPTIONS, *EXIT_EXCEPTIONS, *SLEEP_EXCEPTIONS, *TIMED_EXCEPTIONS]:
         if path not in tree:
             yield f"the exception for {path} is for a file that is not there"
 
@@ -315,5 +340,5 @@ def constants_are_listed(tree):
 
 
 RULES = [layering, quoted_includes_exist, include_cycles, doors, library_types_stay_behind_their_doors, headers_are_guarded,
-         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, nobody_exits, exceptions_are_files,
+         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits, exceptions_are_files,
          constants_are_listed]

@@ -109,6 +109,16 @@ class Rules(unittest.TestCase):
             "tests/a_test.cpp": "std::this_thread::sleep_for(1ms);", "tests/b.py": "time.sleep(1)", "tests/c.sh": "run & sleep 3\n",
             "tests/d.py": "# no time.sleep here\n", "deploy/demo.sh": "sleep 1\n"}, "tests/a_test.cpp", "tests/b.py", "tests/c.sh")
 
+    def test_times(self):
+        self.assert_finds(architecture.tests_assert_no_times, {
+            "tests/a.py": "began = time.monotonic()\nrun()\nassert time.monotonic() - began < 30\n",
+            "tests/b.py": "seconds = time.monotonic() - began\nprint(seconds)\nassert seconds < 10\n",
+            "tests/c_test.cpp": "  const auto took = std::chrono::steady_clock::now() - start;\n  EXPECT_LT(took, 5s);\n",
+            "tests/d.py": "end = time.monotonic() + 5\nassert job.seconds < 3\n",
+            "tests/bench/e.py": "assert time.monotonic() - began < 30\n",
+            "tests/support/local_farm.py": "assert time.monotonic() < deadline\n"},
+            "tests/a.py:3", "tests/b.py:3", "tests/c_test.cpp:2")
+
     def test_exits(self):
         self.assert_finds(architecture.nobody_exits, {
             "cli/a.cpp": "if (bad) std::exit(1);", "worker/b.cpp": "  abort();", "coordinator/c.cpp": "::_exit(3);",
@@ -124,7 +134,8 @@ class Rules(unittest.TestCase):
             "b.h: kNew decides", "b.h: 0x1p-20 decides", "b.h: .001 decides", "row for kOld in worker/render/gone.h")
 
     def test_exceptions_for_files_that_went(self):
-        excepted = {**architecture.LONG_FILES, **architecture.CLOCK_EXCEPTIONS, **architecture.EXIT_EXCEPTIONS, **architecture.SLEEP_EXCEPTIONS}
+        excepted = {**architecture.LONG_FILES, **architecture.CLOCK_EXCEPTIONS, **architecture.EXIT_EXCEPTIONS, **architecture.SLEEP_EXCEPTIONS,
+                    **architecture.TIMED_EXCEPTIONS}
         self.assert_finds(architecture.exceptions_are_files, {path: "" for path in list(excepted)[1:]}, next(iter(excepted)))
 
 

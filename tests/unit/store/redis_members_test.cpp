@@ -42,6 +42,14 @@ struct OneMember {
   std::unique_ptr<RedisMembers> members;
 };
 
+// From the death of a coordinator until another one takes its jobs. Its last sign of life lasts for a lease;
+// the looks that miss it follow, and the first of them may come a beat later.
+TEST(MemberOptions, HaveJobsTakenWithinTenSeconds) {
+  const MemberOptions usual;
+
+  EXPECT_LE(usual.lease + usual.looks * usual.beat, std::chrono::seconds(10));
+}
+
 class Members : public testing::Test {
  protected:
   static constexpr int kLooks = 2;
