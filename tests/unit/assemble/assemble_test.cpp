@@ -37,13 +37,6 @@ std::string refusal(const Verified& v) {
   return bad ? bad->error.message : "";
 }
 
-TEST(FakePixels, SumsOverRangesComposePerHalf) {
-  const Partial whole = fake_partial(header(1, {4, 32}));
-  const Partial first = fake_partial(header(1, {4, 18})), second = fake_partial(header(1, {18, 32}));
-  for (std::size_t i = 0; i < whole.sums.size(); ++i)
-    ASSERT_EQ(whole.sums[i], first.sums[i] + second.sums[i]);
-}
-
 TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
   RoundErrors errors(2, true);
   TileError e;

@@ -4,8 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <numeric>
 #include <random>
+#include <utility>
 
+#include "common/image/fake_pixels.h"
 #include "common/image/final_image.h"
 #include "tests/unit/image/support.h"
 
@@ -194,6 +198,44 @@ TEST(FilmBytes, RefusesTruncationAndDamage) {
     bad[i] ^= std::byte{16};
     ASSERT_FALSE(Film::load(bad)) << i;
   }
+}
+
+// A film refuses any order but 0, 1, 2 ..., so each round's sums go under the name of the round it waits for:
+// the finished pixels divide by all samples, whatever round they are of.
+Digest folded_in(const std::vector<RoundIndex>& order) {
+  const TileGrid grid{{32, 32}, 32};
+  static std::map<RoundIndex, Partial> rounds;
+  Film film(grid);
+  for (RoundIndex at = 0; at < order.size(); ++at) {
+    auto& made = rounds[order[at]];
+    if (made.sums.empty()) made = fake_partial(make_partial(grid, 0, round_range(order[at])).header);
+    Partial partial = made;
+    partial.header.samples = round_range(at);
+    EXPECT_TRUE(film.fold(0, at, partial));
+  }
+  return pixels_sha256(film);
+}
+
+TEST(FakePixels, ShowWhenTwoRoundsAreFoldedInReversedOrder) {
+  std::vector<RoundIndex> order(kFakeMarkerRounds + 4);  // more than one group of marks
+  std::iota(order.begin(), order.end(), RoundIndex{0});
+  const Digest right = folded_in(order);
+  for (std::size_t i = 0; i < order.size(); ++i)
+    for (std::size_t k = i + 1; k < order.size(); ++k) {
+      std::swap(order[i], order[k]);
+      if (k > 1)
+        EXPECT_NE(folded_in(order), right) << "rounds " << i << " and " << k;
+      else  // a + b is b + a, so no pixel can tell
+        EXPECT_EQ(folded_in(order), right);
+      std::swap(order[i], order[k]);
+    }
+}
+
+TEST(FakePixels, ShowRoundsOfAShortJobFoldedAsTheyCome) {
+  const Digest right = folded_in({0, 1, 2, 3});
+  for (const auto& order :
+       std::vector<std::vector<RoundIndex>>{{0, 2, 1, 3}, {0, 1, 3, 2}, {2, 0, 1, 3}, {3, 2, 1, 0}})
+    EXPECT_NE(folded_in(order), right) << ::testing::PrintToString(order);
 }
 
 }  // namespace
