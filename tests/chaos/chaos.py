@@ -7,13 +7,16 @@ Ends with 1 if any image was another one, or a storm broke what it must not. A s
 
 import argparse
 import functools
+import json
 import os
 import statistics
+import subprocess
 import sys
 import time
 import traceback
 
-from chaos_kit import DELAY, SPEC, Storm
+from chaos_kit import DELAY, FOG, SPEC, Asked, Storm
+from local_farm import bin_dir
 from storms import STORMS
 from weather import Skip
 
@@ -24,22 +27,33 @@ def try_once(name, seed):
 
 
 @functools.cache
-def expected_pixels(size):
-    """Of one worker that nothing happens to."""
-    with Storm(0) as storm, storm.farm() as farm:
-        farm.fast_worker()
-        farm.submit_storm(size=size)
-        return farm.finish()[0]
+def expected_pixels(asked):
+    """Of one fake worker that nothing happens to; where pixels are real, those of `lightshaft render`."""
+    with Storm(0) as storm:
+        if asked.real:
+            return rendered_alone(storm.folder, asked.size)
+        with storm.farm() as farm:
+            farm.fast_worker()
+            farm.submit_storm(size=asked.size)
+            return farm.finish()[0]
+
+
+def rendered_alone(folder, size):
+    scene, report = folder / "fog.xml", folder / "report.json"
+    scene.write_text(FOG)
+    subprocess.run([str(part) for part in (bin_dir() / "lightshaft", "render", scene, "--spp", SPEC["spp"], "--seed", SPEC["seed"], "--size", size,
+                                           "--report", report, "-o", folder / "fog.exr", "--quiet")], check=True, capture_output=True)
+    return json.loads(report.read_text())["pixels_sha256"]
 
 
 @functools.cache
-def calm_seconds(size):
+def calm_seconds(asked):
     """Of three workers that nothing happens to, the middle one of three tries."""
     def once():
-        with Storm(0) as storm, storm.farm() as farm:
-            farm.add_workers(3, "--fake-delay", DELAY)
+        with Storm(0, real=asked.real) as storm, storm.farm() as farm:
+            farm.fast_workers(3)
             farm.wait_for_workers(3)
-            farm.submit_storm(size=size)
+            farm.submit_storm(size=asked.size)
             return farm.finish()[2]
     return statistics.median(once() for _ in range(3))
 
@@ -49,16 +63,16 @@ def tries(name, seed, repetitions):
     right, again, lost = 0, [], []
     for k in range(repetitions):
         try:
-            pixels, units, took, size = try_once(name, f"{seed} {name} {k}")
+            pixels, units, took, asked = try_once(name, f"{seed} {name} {k}")
         except Skip:
             raise
         except Exception:
             print(f"BROKEN: {name}, seed {seed}, repetition {k}", file=sys.stderr)
             traceback.print_exc()
             continue
-        right += pixels == expected_pixels(size)
+        right += pixels == expected_pixels(asked)
         again.append(units)
-        lost.append(max(0, took - calm_seconds(size)))
+        lost.append(max(0, took - calm_seconds(asked)))
     return right, again, lost
 
 
@@ -71,7 +85,7 @@ def line(name, right, count, again, lost):
 PAGE = """# Storms
 
 `/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
-same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
+same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. In the storms "with real pixels" workers render fog, and the pixels must be those of `lightshaft render`. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
 
 *Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun; after a takeover also what the dead owner had done. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
 
@@ -111,7 +125,7 @@ def main():
         left_out = "\nLeft out, because they could not be made on that machine:\n\n" + "\n".join(skipped) + "\n" if skipped else ""
         with open(arguments.write, "w", encoding="utf-8") as out:
             out.write(PAGE.format(seed=arguments.seed, repetitions=arguments.repetitions, cores=os.cpu_count(),
-                                  minutes=(time.monotonic() - began) / 60, units=48 * 5, delay=DELAY, calm=calm_seconds(SPEC["size"]), table="\n".join(rows), skipped=left_out))
+                                  minutes=(time.monotonic() - began) / 60, units=48 * 5, delay=DELAY, calm=calm_seconds(Asked()), table="\n".join(rows), skipped=left_out))
     return 1 if wrong else 0
 
 

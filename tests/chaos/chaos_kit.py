@@ -1,5 +1,6 @@
 """What the storms share: a farm whose loss of work is measured, and disks that can be full."""
 
+import dataclasses
 import pathlib
 import random
 import shutil
@@ -16,13 +17,28 @@ from weather import Skip, as_root, need_root  # noqa: E402
 
 SPEC = dict(spp=24, seed=5, size="256x192")  # 48 tiles of 5 rounds
 DELAY = 15  # milliseconds a unit
+# What is rendered where pixels are real: light in fog, in the same units.
+FOG = SCENE.replace('<shape type="sphere"><bsdf type="diffuse"/></shape>', """<shape type="cube">
+    <bsdf type="null"/>
+    <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="1, .8, .6"/><rgb name="albedo" value=".9, .8, .7"/>
+      <phase type="hg"><float name="g" value=".5"/></phase></medium>
+  </shape>
+  <shape type="sphere"><float name="radius" value=".3"/><bsdf type="diffuse"/></shape>""")
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """What the pixels of a storm's job follow from."""
+    size: str = SPEC["size"]
+    real: bool = False  # rendered, rather than made up by fake workers
 
 
 class ChaosFarm(LocalFarm):
     """Counts the units that may have been rendered again, through restarts of the coordinator: what it knew when it was seen last
     stays counted."""
 
-    def __init__(self, *arguments, **options):
+    def __init__(self, *arguments, real=False, **options):
+        self.real = real  # workers that render
         self._again_before, self._again = 0, 0
         self.done_seen = 0  # units of the storm's job
         super().__init__(*arguments, **options)
@@ -45,13 +61,17 @@ class ChaosFarm(LocalFarm):
             pass  # it is away
         return self._again_before + self._again
 
-    def fast_worker(self, **options):
-        return self.add_worker("--fake-delay", DELAY, **options)
+    def fast_worker(self, *flags, **options):
+        delay = () if self.real else ("--fake-delay", DELAY)
+        return self.add_worker(*delay, *flags, fake=not self.real, **options)
+
+    def fast_workers(self, count, *flags, **options):
+        return [self.fast_worker(*flags, **options) for _ in range(count)]
 
     def submit_storm(self, **spec):
         self.storm_began = time.monotonic()
-        self.storm_size = spec.get("size", SPEC["size"])
-        self.storm_job = self.submit(SCENE, **dict(SPEC, **spec))
+        self.asked = Asked(spec.get("size", SPEC["size"]), self.real)
+        self.storm_job = self.submit(FOG if self.real else SCENE, **dict(SPEC, **spec))
         self.total = self.job(self.storm_job)["units_total"]
         return self.storm_job
 
@@ -69,15 +89,15 @@ class ChaosFarm(LocalFarm):
 
     def goes_on_with(self, other):
         """This coordinator has taken the storm's job over from the other one, and begins again what that one had done."""
-        for name in ("storm_began", "storm_size", "storm_job", "total"):
+        for name in ("storm_began", "asked", "storm_job", "total"):
             setattr(self, name, getattr(other, name))
         self._again_before += other._again_before + other._again + other.done_seen
 
     def finish(self):
-        """(pixels_sha256, units rendered again at most, seconds, size) of the storm's job."""
+        """(pixels_sha256, units rendered again at most, seconds, what was asked) of the storm's job."""
         self.until_share(1)
         pixels = self.pixels(self.storm_job)
-        return pixels, self.again(), time.monotonic() - self.storm_began, self.storm_size
+        return pixels, self.again(), time.monotonic() - self.storm_began, self.asked
 
 
 class SmallDisk:
@@ -140,6 +160,10 @@ class Storm:
 
     def __exit__(self, *error):
         self._folder.cleanup()
+
+    def render(self):
+        """From now on its farms have workers that render."""
+        self._options["real"] = True
 
     def farm(self, name="farm", **options):
         return ChaosFarm(self.folder / name, **dict(self._options, **options))

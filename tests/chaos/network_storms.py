@@ -6,7 +6,7 @@ changes the digest. What is random is drawn from the storm's seed.
 
 import contextlib
 
-from chaos_kit import DELAY, after
+from chaos_kit import after
 from meddler import Meddler
 from storm_list import storm
 from weather import Network
@@ -17,7 +17,7 @@ def divided_farm(s, inside=2, outside=0):
     with Network(s.dice.random()) as network, s.farm(host=network.host) as farm:
         for _ in range(inside):
             farm.fast_worker(within=network.inside)
-        farm.add_workers(outside, "--fake-delay", DELAY)
+        farm.fast_workers(outside)
         farm.wait_for_workers(inside + outside)
         farm.submit_storm()
         farm.until_share(s.dice.uniform(.05, .4))

@@ -6,7 +6,7 @@ changes the digest. What is random is drawn from the storm's seed.
 
 import signal
 
-from chaos_kit import DELAY, after
+from chaos_kit import after
 from local_farm import wait_until
 from redis_server import RedisServer
 from storm_list import storm
@@ -22,7 +22,7 @@ def kill_and_replace(farm, victim):
 @storm
 def nothing_happens(s):
     with s.farm() as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.submit_storm()
         yield farm
 
@@ -30,7 +30,7 @@ def nothing_happens(s):
 @storm
 def workers_killed_at_random(s):
     with s.farm() as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.submit_storm()
         for _ in range(6):
             farm.until_share(s.dice.uniform(0, .9))
@@ -41,7 +41,7 @@ def workers_killed_at_random(s):
 @storm
 def coordinator_killed_at_random(s):
     with s.farm() as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.submit_storm()
         for share in sorted(s.dice.uniform(0, .9) for _ in range(3)):
             farm.until_share(share)
@@ -54,7 +54,7 @@ def coordinator_killed_at_random(s):
 @storm
 def redis_killed_at_random(s):
     with RedisServer(s.folder) as redis, s.farm(flags=["--store", redis.url]) as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.submit_storm()
         for share in sorted(s.dice.uniform(0, .9) for _ in range(3)):
             farm.until_share(share)
@@ -67,7 +67,7 @@ def redis_killed_at_random(s):
 @storm
 def coordinator_redis_and_workers_killed_together(s):
     with RedisServer(s.folder) as redis, s.farm(flags=["--store", redis.url]) as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.submit_storm()
         farm.until_share(s.dice.uniform(0, .9))
         for process in farm.workers:
@@ -76,14 +76,14 @@ def coordinator_redis_and_workers_killed_together(s):
         farm.coordinator.kill()
         redis.start()
         farm.start_coordinator()
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         yield farm
 
 
 @storm
 def workers_drained_by_SIGTERM(s):
     with s.farm() as farm:
-        farm.add_workers(3, "--fake-delay", DELAY, threads=2)
+        farm.fast_workers(3, threads=2)
         farm.submit_storm()
         for _ in range(3):
             farm.until_share(s.dice.uniform(.05, .8))
@@ -91,7 +91,7 @@ def workers_drained_by_SIGTERM(s):
             # sees that, and its units are told as those of a lost one.)
             known = {w["name"] for w in farm.get("/api/v1/workers")["workers"] if w["units_done"] > 0}
             leaver = s.dice.choice([w for w in farm.workers if w.alive() and w.name in known])
-            farm.add_worker("--fake-delay", DELAY, threads=2)
+            farm.fast_worker(threads=2)
             assert leaver.terminate() == 0, f"{leaver.name}: {leaver.output()}"
         yield farm
         # Finished units of a drained worker are handed in: nobody rendered a unit that was not asked for again.
@@ -128,7 +128,7 @@ def a_worker_frozen_until_its_leases_have_passed(s):
 @storm
 def the_coordinator_frozen_for_a_while(s):
     with s.farm() as farm:
-        farm.add_workers(2, "--fake-delay", DELAY)
+        farm.fast_workers(2)
         farm.submit_storm()
         farm.until_share(s.dice.uniform(.1, .6))
         farm.coordinator.stop()
@@ -141,7 +141,7 @@ def the_coordinator_frozen_for_a_while(s):
 def one_slow_worker_among_fast_ones(s):
     with s.farm() as farm:
         farm.add_worker("--fake-delay", 2000)
-        farm.add_workers(2, "--fake-delay", DELAY)
+        farm.fast_workers(2)
         farm.wait_for_workers(3)
         farm.submit_storm()
         yield farm
@@ -163,7 +163,7 @@ def coordinator_killed_at(step):
     def run(s):
         with s.farm(environment=killed_at(f"{step}:{s.dice.randint(1, ONCE_A_JOB.get(step, 30))}")) as farm:
             farm.submit_storm()
-            farm.add_workers(3, "--fake-delay", DELAY)
+            farm.fast_workers(3)
             wait_until(lambda: farm.again() < 0 or not farm.coordinator.alive(), f"the coordinator comes to {step}")
             assert farm.coordinator.popen.returncode == -signal.SIGKILL
             farm.environment = {}
@@ -181,7 +181,7 @@ def worker_killed_at(step):
             farm.submit_storm()
             wait_until(lambda: farm.again() < 0 or not victim.alive(), f"the worker comes to {step}")
             assert victim.popen.returncode == -signal.SIGKILL
-            farm.add_workers(3, "--fake-delay", DELAY)
+            farm.fast_workers(3)
             yield farm
     run.__name__ = f"worker killed at {step}"
     storm(run)
@@ -202,8 +202,8 @@ def barred(farm):
 def a_liar(percent, spec):
     def run(s):
         with s.farm(flags=["--audit-percent", percent]) as farm:
-            farm.add_workers(2, "--fake-delay", DELAY)
-            liar = farm.add_worker("--fake-delay", DELAY, "--fake-fault", "wrong")
+            farm.fast_workers(2)
+            liar = farm.fast_worker("--fake-fault", "wrong")
             farm.wait_for_workers(3)
             farm.submit_storm(**spec)
             yield farm

@@ -6,7 +6,7 @@ changes the digest. What is random is drawn from the storm's seed.
 
 import contextlib
 
-from chaos_kit import DELAY, after
+from chaos_kit import after
 from cut_line import CutLine
 from local_farm import SCENE, wait_until
 from redis_server import RedisServer
@@ -26,7 +26,7 @@ def record_is_done(redis, job):
 def one_coordinator(s):
     with RedisServer(s.folder) as redis, CutLine(redis.port) as line, \
             s.farm(flags=["--store", f"redis://127.0.0.1:{line.port}/0"]) as farm:
-        farm.add_workers(3, "--fake-delay", DELAY)
+        farm.fast_workers(3)
         farm.wait_for_workers(3)
         farm.submit_storm()
         farm.until_share(s.dice.uniform(.05, .5))
@@ -81,7 +81,7 @@ def two_coordinators(s):
         options = dict(flags=["--shared", "--store", redis.url, "--blobs", s.folder / "blobs"], secrets=s.folder / "secrets")
         with s.farm("a", **options) as a, s.farm("b", **options) as b:
             a.submit_storm()  # first: a worker that has nothing to do looks elsewhere
-            a.add_workers(2, "--fake-delay", DELAY, "--coordinator", f"127.0.0.1:{b.grpc}")
+            a.fast_workers(2, "--coordinator", f"127.0.0.1:{b.grpc}")
             b.fast_worker()
             a.until_share(s.dice.uniform(.05, .5))
             wait_until(lambda: redis.ask("HGET", f"lightshaft:job:{a.storm_job}", "fence") == "1", "Redis knows whose the job is")

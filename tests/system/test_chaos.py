@@ -16,7 +16,7 @@ from weather import Skip  # noqa: E402
 @pytest.mark.parametrize("name", STORMS)
 def test_the_image_is_the_same_after(name):
     try:
-        pixels, _, _, size = try_once(name, f"7 {name}")
+        pixels, _, _, asked = try_once(name, f"7 {name}")
     except Skip as why:
         pytest.skip(str(why))
-    assert pixels == expected_pixels(size)
+    assert pixels == expected_pixels(asked)
