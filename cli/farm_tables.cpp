@@ -11,6 +11,7 @@
 #include "cli/say.h"
 #include "cli/verdict.h"
 #include "common/base/plain_text.h"
+#include "common/image/final_image.h"
 #include "common/report/words.h"
 
 namespace ls::cli {
@@ -147,7 +148,8 @@ std::string jobs_table(const json& answer) {
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
                     time_left_text(job, "eta_seconds"),
-                    text(job, "name") + (unclean(job) ? " (numbers not clean)" : "") +
+                    text(job, "name") + (flag_field(job, "fake") ? " (fake pixels)" : "") +
+                        (unclean(job) ? " (numbers not clean)" : "") +
                         (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
                         (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
   return rows.size() == 1 ? "no jobs" : table(rows);
@@ -167,8 +169,9 @@ std::string workers_table(const json& answer) {
   std::vector<Row> rows{{"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "JOB", "ACTIVITY"}};
   for (const json& w : objects(answer, "workers")) {
     const auto rss = w.find("rss_bytes");
-    rows.push_back({text(w, "name"), text(w, "state"), number(w, "threads", "{:.0f}"),
-                    number(w, "units_done", "{:.0f}"), time_of(w, "cpu_seconds"),
+    rows.push_back({text(w, "name"), text(w, "state") + (flag_field(w, "fake") ? " (fake)" : ""),
+                    number(w, "threads", "{:.0f}"), number(w, "units_done", "{:.0f}"),
+                    time_of(w, "cpu_seconds"),
                     rss != w.end() && rss->is_number_unsigned() ? show_bytes(rss->get<std::uint64_t>()) : "-",
                     time_of(w, "last_seen_seconds"), text(w, "job"), text(w, "activity")});
   }
@@ -190,6 +193,7 @@ std::string job_text(const json& job) {
   if (number_field(job, "eta_with_8_more"))
     rows.push_back({"with 8 more workers", time_left_text(job, "eta_with_8_more", "eta_with_8_more_ci95")});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
+  if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
     for (const json& warning : *warnings)
       if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});

@@ -198,6 +198,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
     options.keep_unused.reset();
   options.limits = flags.shares;
   options.audit_rate = flags.audit_percent / 100;
+  options.allow_fake = flags.allow_fake;
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
   auto coordinator = ls::coordinator::Coordinator::open(std::move(options));

@@ -50,6 +50,9 @@ void add_shares(CLI::App& app, Flags& flags) {
                  "of the results that another worker renders again, to find workers whose pixels are wrong")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
+  app.add_flag("--allow-fake", flags.allow_fake,
+               "for tests: workers started with --fake may join, which make pixels up; without it they are "
+               "refused");
 }
 
 void add_tls(CLI::App& app, Flags& flags) {

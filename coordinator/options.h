@@ -31,6 +31,7 @@ struct Flags {
   http::Limits limits;
   ShareLimits shares;
   double audit_percent = 1;
+  bool allow_fake = false;
 };
 
 // The exit code instead, when there is nothing to run (help) or the usage is wrong (2, said on stderr).

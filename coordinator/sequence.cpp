@@ -104,7 +104,9 @@ WorkLeft work_left(std::span<const JobView> frames) {
 void add_up(JobView& v, std::span<const JobView> frames) {
   double pixels = 0;
   v.spp_done = v.progress = 0;
+  v.fake = false;
   for (const JobView& f : frames) {
+    v.fake |= f.fake;
     pixels += pixels_of(f);
     v.spp_done += f.spp_done * pixels_of(f);
     v.progress += f.progress * pixels_of(f);

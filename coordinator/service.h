@@ -118,6 +118,7 @@ struct JobView {
   double submitted_unix = 0;      // wall clock, for people
   Health health;                  // of what is folded; of a sequence its totals alone
   std::vector<HealthNote> notes;  // the same for people; none: all is well
+  bool fake = false;              // fake workers make its pixels up; of a sequence those of any frame
   // Of a sequence; its other figures are those of all frames together: sums, means over pixels, and
   // elapsed_seconds from the first ray of any frame to the last fold.
   std::optional<FramesView> frames;
@@ -146,6 +147,7 @@ struct WorkerView {
   std::string name;
   std::string build;
   Digest numeric_class;
+  bool fake = false;  // it renders nothing and makes its pixels up
   int threads = 1;
   std::vector<std::string> tags;
   std::string state;     // "connected", "draining", "lost", "sick"
@@ -285,9 +287,10 @@ class Coordinator {
     // How long a blob stays that no job needs and nobody asks for, and an unfinished upload that does not
     // grow; nothing: blobs for good, unfinished uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
-    bool shared = false;     // other coordinators have the same store and blobs
-    std::string join_token;  // empty: any worker may join
-    JoinCheck may_join;      // given: asked instead
+    bool shared = false;      // other coordinators have the same store and blobs
+    std::string join_token;   // empty: any worker may join
+    JoinCheck may_join;       // given: asked instead
+    bool allow_fake = false;  // workers that make their pixels up may join
     ShareLimits limits;
     double audit_rate = 0.01;  // share of the results that another worker renders again
     std::shared_ptr<const Clock> clock;

@@ -147,7 +147,10 @@ void Service::on(const JobPinned& e, Todo& todo) {
   if (!entry) return;
   entry->stored.numeric_class = e.numeric_class;
   for (const auto& [id, worker] : workers_)
-    if (worker.hello.numeric_class == e.numeric_class) entry->stored.build = worker.hello.build;
+    if (worker.hello.numeric_class == e.numeric_class) {
+      entry->stored.build = worker.hello.build;
+      entry->stored.fake |= worker.hello.fake;
+    }
   entry->pin_unsaved = true;
   if (!save_pin_locked(*entry)) todo.push_back(JobPaused{e.job});
 }

@@ -85,6 +85,7 @@ struct Connection {
   WorkerId worker;
   std::uint64_t epoch = 0;
   Digest numeric_class;
+  bool fake = false;
   std::shared_ptr<WorkerSink> sink;
   bool open = true;                    // under the service's lock
   std::atomic<bool> held_back{false};  // a result of its waits for room; its stream is not read

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <set>
+#include <utility>
 
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
@@ -98,6 +99,8 @@ void Service::commit(std::vector<Checked> batch) {
       // A copy that has been accepted since it arrived need not be stored again; the farm compares it.
       batch[i].arrived.duplicate = farm_.wanted(a.result.unit).verdict != Wanted::Verdict::yes;
       batch[i].arrived.barred = farm_.barred(a.from->worker);
+      // Its class says so when the job is pinned; whatever a worker calls its class, none is hidden.
+      if (a.from->fake && !a.duplicate && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
       at[i] = elapsed_locked(*a.job);
       logs[i] = a.job->log;
       if (const auto saved = save_pin_locked(*a.job); !saved) stored[i].error = saved.error();

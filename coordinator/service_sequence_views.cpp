@@ -83,6 +83,7 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
                                           "health",
                                           "pixels_sha256",
                                           "numeric_class",
+                                          "fake",
                                           "stopped"};
   json frames = json::array();
   std::uint64_t samples = 0, rss = 0;
@@ -128,6 +129,7 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
          {"numeric_class", last.is_object() ? last.value("numeric_class", json()) : json()},
          {"stopped", view.stopped.empty() ? json() : json(view.stopped)},
          {"warnings", view.warnings},
+         {"fake", view.fake},
          {"convergence", json::array()},  // every frame has its own
          {"frames", std::move(frames)}};
   const auto& e = view.error_now;

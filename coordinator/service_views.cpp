@@ -113,6 +113,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.target_error = job.spec.target_error;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
+  v.fake = job.fake;
   v.size = job.settings.size;
   v.tile = job.settings.tile;
   v.priority = job.spec.priority;
@@ -310,6 +311,7 @@ WorkerView Service::view_locked(const WorkerId& id, const WorkerEntry& worker) c
   v.name = worker.hello.name;
   v.build = worker.hello.build;
   v.numeric_class = worker.hello.numeric_class;
+  v.fake = worker.hello.fake;
   v.threads = worker.hello.threads;
   v.tags = worker.hello.tags;
   v.state = to_string(figures.state);

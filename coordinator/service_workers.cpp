@@ -40,7 +40,7 @@ class Session final : public WorkerSession {
   std::shared_ptr<Connection> connection_;
 };
 
-Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join) {
+Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join, bool allow_fake) {
   if (!may_join(hello.join_token))
     return fail(Errc::unauthenticated,
                 "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of "
@@ -49,6 +49,11 @@ Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join) {
     return fail(Errc::failed_precondition,
                 fmt::format("this worker speaks protocol {}, the coordinator {}: use the same build on both",
                             hello.protocol, kProtocolVersion));
+  if (hello.fake && !allow_fake)
+    return fail(
+        Errc::failed_precondition,
+        "this worker runs with --fake: it makes pixels up instead of rendering. Start it without --fake, "
+        "or, for tests, start the coordinator with --allow-fake");
   if (hello.name.size() > ls::limits::kNameBytes || hello.build.size() > ls::limits::kNameBytes ||
       hello.previous_id.value.size() > ls::limits::kIdBytes)
     return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
@@ -89,7 +94,8 @@ std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& 
 
 Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello,
                                                         std::shared_ptr<WorkerSink> sink) {
-  if (auto ok = check_hello(hello, options_.may_join); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_hello(hello, options_.may_join, options_.allow_fake); !ok)
+    return tl::unexpected(ok.error());
   const std::lock_guard lock(mutex_);
   WorkerId id = hello.previous_id;
   const auto known = workers_.find(id);
@@ -104,6 +110,7 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   connection->worker = id;
   connection->epoch = ++last_epoch_;
   connection->numeric_class = hello.numeric_class;
+  connection->fake = hello.fake;
   connection->sink = std::move(sink);
   connection->service_lives = alive_;
   WorkerEntry& worker = workers_[id];

@@ -95,6 +95,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   hello.threads = in.threads();
   hello.memory_bytes = in.memory_bytes();
   hello.join_token = in.join_token();
+  hello.fake = in.fake();
   return hello;
 }
 

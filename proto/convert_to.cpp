@@ -44,6 +44,7 @@ void put(const WorkerHello& hello, pb::FromWorker& out) {
   for (const Digest& blob : hello.blobs_held) h->add_blobs_held(digest_bytes(blob));
   h->set_join_token(hello.join_token);
   h->set_previous_id(hello.previous_id.value);
+  h->set_fake(hello.fake);
 }
 
 void put(const WorkerProgress& progress, pb::FromWorker& out) {

@@ -103,6 +103,7 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
   agent_options.hello.memory_bytes = options.memory_limit;
   agent_options.hello.tags = options.tags;
   agent_options.hello.join_token = options.join_token;
+  agent_options.hello.fake = options.fake;
   agent_options.backoff_seed = std::random_device{}();
   const SystemClock clock;
   worker::Agent agent(std::move(agent_options), *link, **backend, **cache, clock);

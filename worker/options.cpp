@@ -57,7 +57,10 @@ void describe(CLI::App& app, Options& o, Files& files) {
   ca->needs(cert)->needs(key);
   cert->needs(ca);
   key->needs(ca);
-  app.add_flag("--fake", o.fake, "Render no scene: give pixels that are a pure function of the unit");
+  app.add_flag(
+      "--fake", o.fake,
+      "Render no scene: make pixels up, a pure function of the unit, for tests; the coordinator needs "
+      "--allow-fake");
   app.add_flag("--render-child", o.render_child)->group("");
   app.add_option("--fake-delay", "Milliseconds that a fake unit takes")->group("");
   app.add_option("--fake-sample-seconds", o.fake_options.sample_seconds)->group("");

@@ -116,6 +116,7 @@ struct WorkerHello {
   // Given by the coordinator at an earlier Welcome; empty for a new worker. The same worker keeps its id over
   // reconnects.
   WorkerId previous_id;
+  bool fake = false;  // it renders nothing and makes its pixels up
   bool operator==(const WorkerHello&) const = default;
 };
 // Renews the named leases' deadlines. Sent about once a second while there is work.

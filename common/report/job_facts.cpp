@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/image/final_image.h"
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/words.h"
@@ -116,6 +117,7 @@ std::string provenance(const Json& report) {
       row("Scene", text(report, "scene"), true) +
       row("Pixels (SHA-256)", text(report, "pixels_sha256"), true) +
       row("Numeric class", text(report, "numeric_class"), true) + row("Build", text(report, "build")) +
+      row("Fake", flag(report, "fake", false) ? kFakePixels : "") +
       row("Integrator", text(report, "integrator")) + row("Seed", whole(number(report, "seed"))) +
       asked(report) + row("Threads", threads_words(number(report, "threads"))) +
       row("Reference", text(member(report, "reference"), "digest"), true);

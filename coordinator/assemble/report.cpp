@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/image/final_image.h"
+
 namespace ls::coordinator {
 namespace {
 
@@ -189,6 +191,7 @@ std::map<std::string, double> header_figures(const ReportFacts& facts) {
 std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
   std::map<std::string, std::string> notes;
   if (facts.job.reference_same_seed) notes["reference_same_seed"] = kSameSeed;
+  if (facts.job.fake) notes["fake"] = kFakePixels;
   const auto truth = last_truth(facts.convergence);
   if (!truth) return notes;
   std::string below = truth->rmse_below_noise() ? "rmse" : "";
@@ -233,6 +236,7 @@ std::string report_json(const ReportFacts& facts) {
          {"features_left_out", job.features_left_out},
          {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
          {"build", job.build},
+         {"fake", job.fake},
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};

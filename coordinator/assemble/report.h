@@ -40,7 +40,7 @@ Efficiency efficiency_of(const ReportFacts& facts);
 // Of the final EXR's header besides those of the film: slope, efficiency, efficiency_per_core, target_error,
 // true_rmse, true_relmse, as far as they are known.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
-// true_below_noise and reference_same_seed, where they are so.
+// true_below_noise, reference_same_seed and fake, where they are so.
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
 // What to know of an image that was not ended by its samples; else empty.

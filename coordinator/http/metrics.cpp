@@ -64,15 +64,18 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
 
 void write_workers(std::string& out, std::span<const coordinator::WorkerView> workers) {
   std::map<std::string, std::uint64_t> by_state{{"connected", 0}, {"draining", 0}, {"lost", 0}, {"sick", 0}};
-  std::uint64_t threads = 0;
+  std::uint64_t threads = 0, fake = 0;
   for (const auto& worker : workers) {
     ++by_state[worker.state];
-    if (worker.state == "connected") threads += static_cast<std::uint64_t>(worker.threads);
+    if (worker.state != "connected") continue;
+    threads += static_cast<std::uint64_t>(worker.threads);
+    fake += worker.fake;
   }
   head(out, "lightshaft_workers", "gauge", "Workers by state.");
   for (const auto& [state, count] : by_state)
     fmt::format_to(std::back_inserter(out), "lightshaft_workers{{state=\"{}\"}} {}\n", state, count);
   single(out, "lightshaft_worker_threads", "gauge", "Render threads of connected workers.", threads);
+  single(out, "lightshaft_workers_fake", "gauge", "Connected workers that make their pixels up.", fake);
 }
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {

@@ -60,6 +60,7 @@ struct StoredJob {
   std::string error;
   std::optional<Digest> numeric_class;
   std::string build;  // of the worker that the job was pinned with
+  bool fake = false;  // that worker was a fake one, and so are all that may do its units
   JobTotals totals;
   // Workers that rendered wrong pixels, in records of earlier versions: now JobStore::barred().
   std::vector<WorkerId> distrusted;

@@ -115,6 +115,7 @@ StoredJob stored_from(const json& j) {
   job.error = j.at("error");
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
+  job.fake = j.value("fake", false);  // not in records of earlier versions
   job.totals = totals_of(j.at("totals"));
   if (const auto distrusted = j.find("distrusted"); distrusted != j.end())
     for (const auto& worker : *distrusted) job.distrusted.push_back({worker.get<std::string>()});
@@ -154,6 +155,7 @@ std::string to_json(const StoredJob& job) {
   for (const WorkerId& worker : job.distrusted) j["distrusted"].push_back(worker.value);
   for (const Digest& digest : job.awaited) j["awaited"].push_back(digest.hex());
   if (job.reference_same_seed) j["reference_same_seed"] = true;
+  if (job.fake) j["fake"] = true;
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;
   // Names and messages may come from a worker: what is not UTF-8 is replaced, never thrown about.

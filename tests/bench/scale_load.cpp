@@ -271,6 +271,7 @@ int run(const Flags& flags) {
     hello.name = fmt::format("load-{}", i);
     hello.build = "load";
     hello.numeric_class = worker::fake_numeric_class();
+    hello.fake = true;
     hello.join_token = token ? token : "";
     workers.push_back(std::make_shared<Worker>(load, flags.address, hello.join_token));
     if (auto connected = workers.back()->link().connect(hello, workers.back()); !connected) return 1;

@@ -89,11 +89,11 @@ class Process:
 
 
 class LocalFarm:
-    def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None):
+    def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None, allow_fake=True):
         self.host = host  # that workers connect to
         self.environment = dict(environment or {})  # of the coordinator, besides this process's; read at every start
         self.tls = tls
-        self.flags = list(flags) + (["--tls"] if tls else [])  # of the coordinator, besides its ports and folder
+        self.flags = list(flags) + (["--tls"] if tls else []) + (["--allow-fake"] if allow_fake else [])  # of the coordinator, besides its ports and folder
         self.bin = pathlib.Path(bin) if bin else bin_dir()
         self._temporary = tempfile.TemporaryDirectory(prefix="lightshaft-farm-") if folder is None else None
         self.folder = pathlib.Path(folder or self._temporary.name)

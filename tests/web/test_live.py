@@ -266,6 +266,18 @@ def test_workers_come_and_go(farm, dashboard):
     page.wait("!document.querySelector('[data-worker=\"w-1\"]')")
 
 
+@pytest.mark.parametrize("fake", (True, False))
+def test_fake_workers_and_what_they_make_say_so(farm, dashboard, fake):
+    farm.workers["w-1"], farm.jobs["j-1"] = worker(fake=fake), job(fake=fake)
+    page = dashboard("#/workers")
+    page.wait("document.querySelector('[data-worker]')")
+    assert ("fake" in page.text("[data-worker='w-1']")) == fake
+
+    page.evaluate("void (location.hash = '#/jobs/j-1')")
+    page.wait("document.querySelector('article.job .figures, article.job .facts')")
+    assert ("no picture of the scene" in page.text("article.job")) == fake
+
+
 # ---- submission ----
 
 SCENE = """<scene version="3.0.0">

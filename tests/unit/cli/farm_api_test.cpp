@@ -62,6 +62,17 @@ TEST(FarmTables, StandMissingAndWrongFields) {
   EXPECT_FALSE(job_text(json::object()).empty());
 }
 
+TEST(FarmTables, SayWhatIsFake) {
+  const auto tables = [](bool fake) {
+    const json worker{{"name", "w"}, {"state", "connected"}, {"fake", fake}};
+    const json job{{"id", "j-1"}, {"name", "fog.xml"}, {"fake", fake}};
+    return std::vector{workers_table({{"workers", {worker}}}), jobs_table({{"jobs", {job}}}), job_text(job)};
+  };
+
+  EXPECT_THAT(tables(true), testing::Each(HasSubstr("fake")));
+  EXPECT_THAT(tables(false), testing::Each(Not(HasSubstr("fake"))));
+}
+
 TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
   const json jobs{{"jobs", {{{"id", "j-1"}, {"name", "a\x1b[2Jb\nc"}}}}};
 

@@ -52,7 +52,8 @@ const std::vector<FromWorker> kFromWorker = {
                 {"gpu", "big"},
                 {digest_of_text("held")},
                 "token",
-                WorkerId{"w-9"}},
+                WorkerId{"w-9"},
+                true},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
     UnitResult{
         {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, unwell()},

@@ -27,6 +27,46 @@ TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
   ASSERT_TRUE(std::holds_alternative<Welcome>(mail->take()->second));
 }
 
+TEST(Service, AFakeWorkerIsTakenOnlyWhereItIsAllowed) {
+  WorkerHello hello;
+  hello.name = "w";
+  hello.fake = true;
+  auto mail = std::make_shared<Mailbox>();
+  const auto real = Coordinator::open({}).value();
+
+  const auto refused = real->connect(hello, std::make_shared<MailSink>(mail, 0));
+
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::failed_precondition);
+  EXPECT_NE(refused.error().message.find("--allow-fake"), std::string::npos) << "it says what to do";
+  EXPECT_TRUE(real->workers().empty());
+
+  Coordinator::Options options;
+  options.allow_fake = true;
+  const auto test = Coordinator::open(options).value();
+  const auto session = test->connect(hello, std::make_shared<MailSink>(mail, 0));
+  ASSERT_TRUE(session);
+  EXPECT_TRUE(test->workers().at(0).fake);
+}
+
+// Whatever class it names: where a fake worker has rendered a unit, the job says so.
+TEST(Service, AJobSaysSoOnceAFakeWorkerHasRenderedAUnitOfIt) {
+  Coordinator::Options options;
+  options.allow_fake = true;
+  options.audit_rate = 0;
+  for (const bool fake : {false, true}) {
+    const auto coordinator = Coordinator::open(options).value();
+    FakeFarm farm(*coordinator, 1, fake);
+    const JobId job = submit(*coordinator);
+
+    ASSERT_TRUE(farm.finish(job));
+
+    EXPECT_EQ(coordinator->job(job)->fake, fake);
+    EXPECT_NE(coordinator->report_json(job)->find(fake ? "\"fake\": true" : "\"fake\": false"),
+              std::string::npos);
+  }
+}
+
 TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
   auto coordinator = open_at({});
   auto mail = std::make_shared<Mailbox>();

@@ -83,11 +83,12 @@ class MailSink final : public WorkerSink {
 
 class FakeFarm {
  public:
-  FakeFarm(Coordinator& coordinator, int workers) : coordinator_(coordinator) {
+  FakeFarm(Coordinator& coordinator, int workers, bool fake = false) : coordinator_(coordinator) {
     for (int i = 0; i < workers; ++i) {
       WorkerHello hello;
       hello.name = "fake-" + std::to_string(i);
       hello.build = "test";
+      hello.fake = fake;
       hello.numeric_class = sha256("fake class");
       hello.join_token = token;
       auto session = coordinator_.connect(hello, std::make_shared<MailSink>(mail_, i));

@@ -25,6 +25,7 @@ inline StoredJob sample_job(std::string id) {
   job.state = JobState::running;
   job.stopped = StopReason::error;
   job.numeric_class = sha256("class");
+  job.fake = true;
   job.awaited = {sha256("gone")};
   job.totals.core_seconds = 12.125;
   job.totals.health.add(HealthCause::infinite, 3, {4, 5, 6});

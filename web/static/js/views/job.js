@@ -56,6 +56,7 @@ function alerts(job) {
   const warnings = job.warnings ?? [];
   return [
     job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? "The job failed" : "Something is wrong", h("pre", null, job.error))) : null,
+    job.fake === true ? h("p", { key: "fake", class: "notice warn" }, "Fake workers (--fake) make up the pixels of this job: it is no picture of the scene.") : null,
     job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} got too few hits for the error to be known there; the error map flags them.`) : null,
     job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, "The reference shares this job's seed: its noise is the same noise, and the true figures say nothing. Render it with another --seed.") : null,
     complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,

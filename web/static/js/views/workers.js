@@ -31,7 +31,8 @@ function card(state, worker) {
   const job = state.jobs?.get(frame ? frame.sequence : worker.job);
   const name = job ? jobName(job) + (frame ? `, frame ${frame.frame}` : "") : worker.job;
   return h("li", { key: worker.id, class: `panel worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
-    h("h2", null, workerMark(colourOf(state, worker.name), worker.name), worker.state === "connected" ? null : h("span", { class: "pill" }, worker.state)),
+    h("h2", null, workerMark(colourOf(state, worker.name), worker.name), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
+      worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It makes pixels up instead of rendering, for tests" }, "fake") : null),
     h("p", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
     h("dl", null,
       pair("Threads", count(worker.threads)),
