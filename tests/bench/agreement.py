@@ -7,8 +7,9 @@ TungstenRender.exr in the scene's own folder. A scene without one is rendered al
 Files that others include are not scenes.
 K seeds (4) are rendered with N samples each. Printed: the ratio of means per channel with its standard error, from the spread of our
 renders, for references don't tell their samples; the share of blocks of 16 x 16 pixels (8 x 8 in images below 160 pixels) with
-|z| > 4, z with a floor of 0.3 % of the block's mean; and a verdict: 'agrees' if every channel's mean lies within 0.5 % + 2 standard
-errors. References are renders by others: what they leave out, a verdict can't know. With --size a reference of a whole multiple of
+|z| > 4, z with a floor of 0.3 % of the block's mean; and a verdict (verdicts.py): 'agrees' if every channel's mean less and plus
+2 standard errors lies within 0.5 % of the reference's, 'differs' if a channel's interval lies outside of that band, else 'too few
+samples to say'. References are renders by others: what they leave out, a verdict can't know. With --size a reference of a whole multiple of
 that size is averaged down to it. With --mitsuba N the reference is a fresh render by Mitsuba 3 instead: K seeds of N samples with
 the scene's own integrator, at the same size, and its noise counts in the standard errors. The `moment` wrapper is left out; what
 Mitsuba does not load as it is, it is given as `lightshaft convert` writes it. Needs the mitsuba package and an LLVM library.
@@ -23,10 +24,11 @@ import tempfile
 
 import numpy as np
 import OpenEXR
+from verdicts import verdict
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ.get("LIGHTSHAFT_BIN", ROOT / "build" / "release" / "bin"))
-BAND, FLOOR = 5e-3, 3e-3
+FLOOR = 3e-3
 
 
 def load(path):
@@ -151,9 +153,9 @@ def row(scene, root, options, folder):
     if reference.shape != images[0].shape:
         return name, "OTHER SIZE", f"{images[0].shape[1]}x{images[0].shape[0]}, reference {reference.shape[1]}x{reference.shape[0]}"
     ratio, error, outliers = compare(images, references)
-    agrees = (np.abs(ratio - 1) < BAND + 2 * error).all()
+    channels = [(round(r - 1, 4), round(e, 4)) for r, e in zip(ratio, error)]  # as printed: who reads them comes to the same verdict
     figures = ", ".join(f"{100 * (r - 1):+.2f} ± {100 * e:.2f} %" for r, e in zip(ratio, error))
-    return name, "agrees" if agrees else "DIFFERS", f"{figures}; |z| > 4: {100 * outliers:.1f} %"
+    return name, verdict(channels), f"{figures}; |z| > 4: {100 * outliers:.1f} %"
 
 
 def main():
