@@ -11,6 +11,8 @@
 #include "cli/validate_file.h"
 #include "common/base/plain_text.h"
 #include "worker/machine.h"
+#include "worker/render/build_id.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {
@@ -22,14 +24,25 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
+// Which renderer the figures are of, and what was asked of it: a table without that can be spliced of
+// several.
+void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
+  json["build"] = render::kBuildId;
+  json["numeric_class"] = render::numeric_class().hex();
+  json["seed"] = flags.seed;
+  if (!flags.only.empty()) json["only"] = flags.only;
+}
+
 int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, const ValidateFlags& flags) {
   if (lines.empty()) return usage_error(fmt::format("--case {}: there is no such case", flags.only));
   std::size_t failed = 0;
   for (const ValidateCase& c : lines) failed += c.passed() ? 0 : 1;
   print(fmt::format("{} of {} cases passed", lines.size() - failed, lines.size()));
-  if (!flags.json.empty())
+  if (!flags.json.empty()) {
+    add_origin(json, flags);
     if (const auto saved = save_result(flags.json, json.dump(2) + "\n"); !saved)
       return say_error(saved.error());
+  }
   return failed > 0 ? kFailed : kOk;
 }
 

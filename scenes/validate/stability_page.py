@@ -4,7 +4,8 @@
     lightshaft validate --json TABLE.json
     scenes/validate/stability_page.py TABLE.json docs
 
-Of several tables (parts of one, run with --case) each case counts once, as the last of them has it.
+The page is of one whole run by one build, which it names: several tables, a table of chosen cases (--case) and one that does
+not name its build are refused.
 """
 import json
 import math
@@ -185,6 +186,7 @@ def page(table):
     lines = ["# Stiff and extreme cases", "",
              f"Made by `{how} and `scenes/validate/stability_page.py TABLE.json docs`; what the verdicts mean "
              "stands in [validate.md](validate.md).", "",
+             f"One run with seed {table['seed']}, by build `{table['build']}` in numeric class `{table['numeric_class']}`.", "",
              f"**{table['passed']} of {table['passed'] + table['failed']} figures pass**, {sum(c['nonfinite'] for c in cases)} samples went wrong, "
              f"{sum(c['paths'] for c in cases):.3g} paths. "
              f"Half of the intervals had to lie within {100 * bands[len(bands) // 2]:.2g} % of the answer, the widest within {100 * bands[-1]:.2g} %.", "",
@@ -266,17 +268,23 @@ def update_constants(cases, file):
     file.write_text(head + begin + "\n".join(measured(cases)) + end + rest.split(end, 1)[1])
 
 
-def whole(tables):
-    table = tables[-1]
-    cases = {case["name"]: case for part in tables for case in part["cases"]}
-    failed = sum(case["verdict"] != "pass" for case in cases.values())
-    return {**table, "cases": list(cases.values()), "passed": len(cases) - failed, "failed": failed}
+def read_table(files):
+    """The one table there is, or the end of the program: rows of several runs say nothing of any one build."""
+    if len(files) != 1:
+        sys.exit(f"stability_page.py: the page is of one run: give one table, not {len(files)}")
+    table = json.loads(pathlib.Path(files[0]).read_text())
+    lacking = [key for key in ("build", "numeric_class", "seed") if key not in table]
+    if lacking:
+        sys.exit(f"stability_page.py: {files[0]} does not say its {', '.join(lacking)}: run `lightshaft validate --json` again")
+    if table.get("only"):
+        sys.exit(f"stability_page.py: {files[0]} has the cases {table['only']} alone: run the whole table")
+    return table
 
 
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    table, docs = whole([json.loads(pathlib.Path(file).read_text()) for file in sys.argv[1:-1]]), pathlib.Path(sys.argv[-1])
+    table, docs = read_table(sys.argv[1:-1]), pathlib.Path(sys.argv[-1])
     (docs / "images").mkdir(parents=True, exist_ok=True)
     for draw, name in ((error_by_depth, "depth"), (error_by_scale, "scale"), (fluence, "fluence"), (all_z, "z")):
         draw(table["cases"], docs / "images" / f"stability-{name}.svg")

@@ -49,6 +49,17 @@ def test_a_wrong_reference_fails_its_case_alone(tests, tmp_path):
     assert "p = " in failed[0]["why"] and table["failed"] == 1
 
 
+def test_the_table_names_the_build_the_class_and_the_seed(tests, tmp_path):
+    file = tests / "test-medium-absorption.xml"
+    whole = cases_of(file, tmp_path, "--seed", 7)
+    part = cases_of(file, tmp_path, "--case", "scene 3, red")
+
+    assert whole["build"] in lightshaft("--version").stdout
+    assert len(whole["numeric_class"]) == 64 and whole["numeric_class"] == part["numeric_class"]
+    assert whole["seed"] == 7 and "only" not in whole
+    assert part["seed"] == 0 and part["only"] == "scene 3, red"
+
+
 def test_cases_are_chosen_by_name_and_seeds_change_what_is_drawn(tests, tmp_path):
     file = tests / "test-medium-scattering-distant.xml"
     first = cases_of(file, tmp_path, "--case", "scene 3, red")["cases"]
