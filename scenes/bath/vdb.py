@@ -1,4 +1,4 @@
-"""Writes a dense array as an OpenVDB file, without OpenVDB: one grid of type Tree_float_5_4_3, stored as half floats.
+"""Writes a dense array as an OpenVDB file, without OpenVDB: one grid of type Tree_float_5_4_3, stored as half floats or as floats.
 
 The layout is that of OpenVDB's file version 224 (openvdb/io/Archive.cc, tree/RootNode.h, tree/InternalNode.h,
 tree/LeafNode.h): a header, the grid's metadata and transform, the tree's topology from the root down, then the leaves'
@@ -39,12 +39,12 @@ def _blocks(array, edge):
     return array.reshape(n, edge, n, edge, n, edge).transpose(0, 2, 4, 1, 3, 5)
 
 
-def _tree(values):
+def _tree(values, stored_as):
     """Topology and leaf buffers of the non-zero voxels; indices start at 0 and end below SPAN."""
     if max(values.shape) > SPAN:
         raise ValueError(f"a grid of {values.shape} voxels is larger than {SPAN} along an axis")
     lower_span = LEAF * LOWER
-    padded = np.zeros([-(-n // lower_span) * lower_span for n in values.shape], dtype="<f2")
+    padded = np.zeros([-(-n // lower_span) * lower_span for n in values.shape], dtype=stored_as)
     padded[tuple(slice(n) for n in values.shape)] = values
     lower_there = np.zeros((UPPER,) * 3, dtype=bool)
     lower_topology, buffers = [], []
@@ -66,17 +66,17 @@ def _tree(values):
     return root + upper + b"".join(lower_topology), b"".join(buffers)
 
 
-def write_vdb(path, values, name, origin, voxel):
+def write_vdb(path, values, name, origin, voxel, half=True):
     """values[x, y, z] >= 0; the centre of voxel (0, 0, 0) lies at `origin`, in scene units; `voxel` is an edge's length."""
-    topology, buffers = _tree(values)
+    topology, buffers = _tree(values, "<f2" if half else "<f4")
     header = struct.pack("<q3IB", 0x56444220, FILE_VERSION, *LIBRARY_VERSION, 1)
     header += b"00000000-0000-0000-0000-000000000000"  # made at random by OpenVDB; the same bytes for the same steam here
     header += _metadata([]) + struct.pack("<I", 1)
-    descriptor = _text(name) + _text("Tree_float_5_4_3_HalfFloat") + _text("")
+    descriptor = _text(name) + _text("Tree_float_5_4_3" + ("_HalfFloat" if half else "")) + _text("")
     grid_at = len(header) + len(descriptor) + 24
     matrix = [voxel, 0, 0, 0, 0, voxel, 0, 0, 0, 0, voxel, 0, *map(float, origin), 1]  # applied to row vectors
     grid = struct.pack("<I", ACTIVE_MASK_COMPRESSION)
-    grid += _metadata([("class", "string", b"fog volume"), ("is_saved_as_half_float", "bool", b"\x01"),
+    grid += _metadata([("class", "string", b"fog volume"), ("is_saved_as_half_float", "bool", bytes([half])),
                        ("name", "string", name.encode("ascii"))])
     grid += _text("AffineMap") + struct.pack("<16d", *matrix) + topology
     blocks_at = grid_at + len(grid)
