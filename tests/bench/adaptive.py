@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Adaptive sampling beside uniform sampling at equal cost, and what a target error promises beside what it gives, on real scenes.
 
-usage: adaptive.py --scenes DIR [--names a,b,c] [--target E] [--seeds N] [--references DIR [--bin N] | --size WxH --reference-spp N]
-DIR holds NAME.xml. Each scene is rendered to the target, then uniformly with as many samples, by as many seeds. The truth is two
+usage: adaptive.py [--scenes DIR] [--names a,b,c] [--target E] [--seeds N] [--references DIR [--bin N] | --size WxH --reference-spp N]
+DIR holds NAME.xml; without, the bench scenes are made, and measured against their references. Each scene is rendered to the target, then uniformly with as many samples, by as many seeds. The truth is two
 independent references: NAME.0.exr and NAME.1.exr of --references, means of N x N of their pixels (whose size divided by N is rendered;
 the scenes' films have box filters), or else two renders of --reference-spp samples by seeds of their own. The true relMSE is
 (x - ref0)(x - ref1) / (ref^2 + 0.01): free of the references' noise in the mean; what chance is left of it stands behind +-.
@@ -17,6 +17,7 @@ import tempfile
 
 import numpy as np
 
+import bench_scenes
 from efficiency import BIN, NAMES, load, relmse
 
 
@@ -58,7 +59,7 @@ def row(scene, references, target, seeds, folder, size):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=pathlib.Path, required=True)
+    parser.add_argument("--scenes", type=pathlib.Path)
     parser.add_argument("--names", default=NAMES)
     parser.add_argument("--target", type=float, default=1e-3)
     parser.add_argument("--seeds", type=int, default=1)
@@ -67,13 +68,15 @@ def main():
     parser.add_argument("--size", default="160x96")
     parser.add_argument("--reference-spp", type=int, default=2048)
     asked = parser.parse_args()
+    references_of = asked.references or (None if asked.scenes else bench_scenes.REFERENCES)
+    scenes = bench_scenes.scenes(asked.scenes)
     print("| scene | target | samples a pixel | relMSE told (95 %) | true | true, uniform with as many samples | gain, per sample | gain, per core second |\n"
           "|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for name in asked.names.split(","):
-            scene, place, size = asked.scenes / f"{name}.xml", pathlib.Path(folder), ("--size", asked.size)
-            if asked.references:
-                references = [binned(load(asked.references / f"{name}.{i}.exr"), asked.bin) for i in (0, 1)]
+            scene, place, size = scenes / f"{name}.xml", pathlib.Path(folder), ("--size", asked.size)
+            if references_of:
+                references = [binned(load(references_of / f"{name}.{i}.exr"), asked.bin) for i in (0, 1)]
                 size = ("--size", f"{references[0].shape[1]}x{references[0].shape[0]}")
             else:
                 references = [render(scene, place, *size, "--spp", asked.reference_spp, "--seed", 1000 + i)[0] for i in (0, 1)]

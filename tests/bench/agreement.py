@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """Every scene under a folder: does it load, and does it agree with the reference image that lies beside it?
 
-usage: agreement.py --scenes DIR [--only TEXT] [--spp N] [--seeds K] [--size WxH] [--seconds S] [--load-only] [--markdown] [--mitsuba N]
-References are found by name: refs/NAME_ref_rgb.exr for a scene NAME_INTEGRATOR.xml, else ref/NAME_*spp.exr, else a
-TungstenRender.exr in the scene's own folder. A scene without one is rendered all the same, and its picture must be finite.
+usage: agreement.py [--scenes DIR] [--only TEXT] [--spp N] [--seeds K] [--size WxH] [--seconds S] [--load-only] [--markdown] [--mitsuba N]
+Without DIR the bench scenes are made and compared with their references. References are found by name: refs/NAME.0.exr and
+NAME.1.exr (independent of each other, so that their noise counts in the standard errors), else refs/NAME_ref_rgb.exr for a scene
+NAME_INTEGRATOR.xml, else ref/NAME_*spp.exr, else a TungstenRender.exr in the scene's own folder. A scene without one is rendered all the same, and its picture must be finite.
 Files that others include are not scenes.
 K seeds (4) are rendered with N samples each. Printed: the ratio of means per channel with its standard error, from the spread of our
-renders, for references don't tell their samples; the share of blocks of 16 x 16 pixels (8 x 8 in images below 160 pixels) with
+renders, for a single reference does not tell its samples; the share of blocks of 16 x 16 pixels (8 x 8 in images below 160 pixels) with
 |z| > 4, z with a floor of 0.3 % of the block's mean; and a verdict (verdicts.py): 'agrees' if every channel's mean less and plus
 2 standard errors lies within 0.5 % of the reference's, 'differs' if a channel's interval lies outside of that band, else 'too few
-samples to say'. References are renders by others: what they leave out, a verdict can't know. With --size a reference of a whole multiple of
-that size is averaged down to it. With --mitsuba N the reference is a fresh render by Mitsuba 3 instead: K seeds of N samples with
+samples to say'. References are renders by others: what they leave out, a verdict can't know. With --size a reference of a whole
+multiple of that size is averaged down to it. With --mitsuba N the reference is a fresh render by Mitsuba 3 instead: K seeds of N samples with
 the scene's own integrator, at the same size, and its noise counts in the standard errors. The `moment` wrapper is left out; what
 Mitsuba does not load as it is, it is given as `lightshaft convert` writes it. Needs the mitsuba package and an LLVM library.
 Needs numpy and the OpenEXR package of PyPI. A bench, not a test.
@@ -24,6 +25,8 @@ import tempfile
 
 import numpy as np
 import OpenEXR
+
+import bench_scenes
 from verdicts import verdict
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -39,11 +42,15 @@ def load(path):
     return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], -1)
 
 
-def reference_of(scene):
+def references_of(scene):
+    """The images beside it: none, one, or two independent ones."""
+    pair = bench_scenes.references(scene.parent, scene.stem)
+    if all(image.exists() for image in pair):
+        return pair
     stem = re.sub(r"_[a-z]+$", "", scene.stem)
     named = [scene.parent / "refs" / f"{stem}_ref_rgb.exr", *sorted((scene.parent / "ref").glob(f"{scene.stem}_*spp.exr")),
              scene.parent / "TungstenRender.exr"]
-    return next((image for image in named if image.exists()), None)
+    return [image for image in named if image.exists()][:1]
 
 
 def scenes_below(root):
@@ -136,19 +143,19 @@ def row(scene, root, options, folder):
         return name, "refused", refusal
     if options.load_only:
         return name, "loads", ""
-    image = reference_of(scene)
+    found = references_of(scene)
     try:
         images = render(scene, options, folder)
     except subprocess.CalledProcessError as e:
         return name, "FAILED", f"exit {e.returncode}"
     if not all(np.isfinite(i).all() for i in images):
         return name, "NOT FINITE", ""
-    if image is None and not options.mitsuba:
+    if not found and not options.mitsuba:
         return name, "renders", f"mean {' '.join(f'{x:.4g}' for x in images[0].mean((0, 1)))}"
     if options.mitsuba:
         references = render_by_mitsuba(scene, options, images[0].shape[1::-1], folder)
     else:
-        references = [fit(load(image), images[0].shape)]
+        references = [fit(load(image), images[0].shape) for image in found]
     reference = references[0]
     if reference.shape != images[0].shape:
         return name, "OTHER SIZE", f"{images[0].shape[1]}x{images[0].shape[0]}, reference {reference.shape[1]}x{reference.shape[0]}"
@@ -160,7 +167,7 @@ def row(scene, root, options, folder):
 
 def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    args.add_argument("--scenes", type=pathlib.Path, required=True)
+    args.add_argument("--scenes", type=pathlib.Path)
     args.add_argument("--only", default="")
     args.add_argument("--spp", type=int, default=128)
     args.add_argument("--seeds", type=int, default=4)
@@ -170,13 +177,14 @@ def main():
     args.add_argument("--load-only", action="store_true")
     args.add_argument("--markdown", action="store_true")
     options = args.parse_args()
+    scenes = bench_scenes.scenes(options.scenes)
     if options.markdown:
         print("| scene | verdict | ratio of means - 1 (red, green, blue), standard error |\n|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for scene in scenes_below(options.scenes):
+        for scene in scenes_below(scenes):
             if options.only not in str(scene):
                 continue
-            cells = row(scene, options.scenes, options, pathlib.Path(folder))
+            cells = row(scene, scenes, options, pathlib.Path(folder))
             print("| " + " | ".join(cells) + " |" if options.markdown else "  ".join(cells), flush=True)
 
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Agreement with references, and efficiency 1 / (relMSE x wall seconds) beside Mitsuba 3, on scenes that both load.
 
-usage: efficiency.py --scenes DIR [--names a,b,c] [--spp N] [--mitsuba-spp N] [--no-mitsuba]
-DIR holds NAME.xml and refs/NAME.0.exr, refs/NAME.1.exr (two independent references). Ours and Mitsuba's renders are taken in
+usage: efficiency.py [--scenes DIR] [--names a,b,c] [--spp N] [--mitsuba-spp N] [--no-mitsuba]
+DIR holds NAME.xml and refs/NAME.0.exr, refs/NAME.1.exr (two independent references); without, the bench scenes are made and measured. Ours and Mitsuba's renders are taken in
 turns, two seeds each, two threads, after load (Mitsuba: after a warm-up render). relMSE is (x - ref0)(x - ref1) / (ref^2 + 0.01):
 free of the references' own noise. Agreement: blocks of 16 x 16 pixels, z from both sides' noise and a floor of 0.3 %.
 Needs numpy and the OpenEXR package of PyPI; Mitsuba's part needs the mitsuba package and an LLVM library (Debian: libllvm19).
@@ -18,6 +18,8 @@ import time
 
 import numpy as np
 import OpenEXR
+
+import bench_scenes
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ.get("LIGHTSHAFT_BIN", ROOT / "build" / "release" / "bin"))
@@ -86,16 +88,17 @@ class Mitsuba:
 
 def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    args.add_argument("--scenes", type=pathlib.Path, required=True)
+    args.add_argument("--scenes", type=pathlib.Path)
     args.add_argument("--names", default=NAMES)
     args.add_argument("--spp", type=int, default=64)
     args.add_argument("--mitsuba-spp", type=int, default=16)
     args.add_argument("--no-mitsuba", action="store_true")
     options = args.parse_args()
+    scenes = bench_scenes.scenes(options.scenes)
     mitsuba = None if options.no_mitsuba else Mitsuba()
     for name in options.names.split(","):
-        scene = options.scenes / f"{name}.xml"
-        r0, r1 = (load(options.scenes / "refs" / f"{name}.{k}.exr") for k in (0, 1))
+        scene = scenes / f"{name}.xml"
+        r0, r1 = map(load, bench_scenes.references(scenes, name))
         with tempfile.TemporaryDirectory() as temporary:
             seconds, images = ours(scene, options.spp, pathlib.Path(temporary))
         error = np.mean([relmse(x, r0, r1) for x in images])

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """The time left that a farm tells against the time that was left.
 
-usage: eta.py --scenes DIR [--names a,b,c] [--size WxH] [--samples N] [--seeds N] [--workers N]
+usage: eta.py [--scenes DIR] [--names a,b,c] [--size WxH] [--samples N] [--seeds N] [--workers N]
        eta.py --more [--seeds N]
-DIR holds NAME.xml. Each scene is rendered to the error of --samples samples a pixel (of seed 1000), once for each seed, by a farm of
+DIR holds NAME.xml; without, the bench scenes are made. Each scene is rendered to the error of --samples samples a pixel (of seed 1000), once for each seed, by a farm of
 --workers one-thread workers on this machine, which needs as many cores and nothing else that runs. What the job's JSON says of the
 time left when it has a new checkpoint (`eta_seconds`, with `eta_ci95` if it has one) is held against its end. Prints a line per
 scene. With --more a worker whose renderer only sleeps (--fake) begins a job, and at one of its checkpoints eight more like it join:
@@ -22,6 +22,7 @@ import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
+import bench_scenes  # noqa: E402
 from forecasts import NAMES, render  # noqa: E402
 from local_farm import SCENE, LocalFarm, bin_dir  # noqa: E402
 
@@ -88,12 +89,13 @@ def told_for_more(scene, checkpoint, seed):
 
 
 def scenes(options):
+    folder = bench_scenes.scenes(options.scenes)
     within = every = 0
     print("| scene | target relMSE | seconds a job | intervals | within | median actual / told |\n|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name, LocalFarm() as farm:
         farm.add_workers(options.workers, fake=False)
         for scene in options.names.split(","):
-            path = options.scenes / f"{scene}.xml"
+            path = folder / f"{scene}.xml"
             target = render(path, pathlib.Path(name), options, "--spp", options.samples, "--seed", 1000)["relmse"]
             ratios, held, count, seconds = [], 0, 0, 0
             for seed in range(options.seeds):
@@ -140,10 +142,8 @@ def main():
     if options.more:
         within, every, ratio = more(options.seeds)
         print(f"median actual / told {ratio:.2f}")
-    elif options.scenes:
-        within, every = scenes(options)
     else:
-        parser.error("--scenes or --more")
+        within, every = scenes(options)
     print(f"\n{within} of {every} intervals held, {100 * within / max(1, every):.0f} %")
     return 0 if every >= LEAST and within >= SHARE * every else 1
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Predicted against actual time to a target error: every job says at its checkpoints when it will be there; was it?
 
-usage: forecasts.py --scenes DIR [--names a,b,c] [--size WxH] [--seeds N] [--samples N] [--threads N] [--keep DIR]
-DIR holds NAME.xml. Of each scene a first job of --samples samples a pixel (seed 1000) finds an error to aim for: what it ends
+usage: forecasts.py [--scenes DIR] [--names a,b,c] [--size WxH] [--seeds N] [--samples N] [--threads N] [--keep DIR]
+DIR holds NAME.xml; without, the bench scenes are made. Of each scene a first job of --samples samples a pixel (seed 1000) finds an error to aim for: what it ends
 with. Then each seed renders to that target, and its report holds what was predicted at every checkpoint (`forecast`: core
 seconds still to spend, with a 95 % interval) to be held against the core seconds that it took. Prints a line per scene and the
 share within; exits with 1 if it is below 90 % or there are fewer than 70 predictions. Core seconds are CPU time: other load on the machine
@@ -15,6 +15,8 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+
+import bench_scenes
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ.get("LIGHTSHAFT_BIN", ROOT / "build" / "release" / "bin"))
@@ -43,7 +45,7 @@ def predictions(report):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--scenes", type=pathlib.Path, required=True)
+    parser.add_argument("--scenes", type=pathlib.Path)
     parser.add_argument("--names", default=NAMES)
     parser.add_argument("--size", default="64x64")
     parser.add_argument("--seeds", type=int, default=3)
@@ -51,12 +53,13 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--keep", type=pathlib.Path, help="folder for every report")
     options = parser.parse_args()
+    scenes = bench_scenes.scenes(options.scenes)
     every = []
     print("| scene | target relMSE | predictions | within | median actual / predicted |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for scene in options.names.split(","):
-            path = options.scenes / f"{scene}.xml"
+            path = scenes / f"{scene}.xml"
             target = render(path, folder, options, "--spp", options.samples, "--seed", 1000)["relmse"]
             found = []
             for seed in range(options.seeds):
