@@ -1,19 +1,27 @@
 #!/bin/bash
 # Makes docs/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
 #
-# usage: benchmarks.sh SCENES [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
-# SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references.
+# usage: benchmarks.sh [SCENES] [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
+# SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references. Without it
+# the scenes and references are those of scenes/bench.
 # Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba (and there is an LLVM library for it)
 # and bpy; what is missing is said.
 # The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
-# seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu.
+# seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu. Races in docs/benchmarks
+# give README.md its table of figures (measured.py).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
 ADAPTERS=tests/bench/adapters
 clock=wall time=4 seeds=3 seed=0 only= out=docs/benchmarks
-[ $# -ge 1 ] && [ -d "$1" ] || { sed -n '4,9s/^# \?//p' "$0" >&2; exit 2; }
-scenes=$1; shift
+command="tests/bench/benchmarks.sh $*"
+if [ $# -ge 1 ] && [ "${1#--}" = "$1" ]; then
+  [ -d "$1" ] || { sed -n '4,11s/^# \?//p' "$0" >&2; exit 2; }
+  scenes=$1 references=$1/refs; shift
+else
+  scenes=build/bench references=scenes/bench/references
+  /usr/bin/python3 scenes/bench/make_bench.py "$scenes"
+fi
 while [ $# -ge 2 ]; do
   case $1 in
     --clock) clock=$2 ;; --time) time=$2 ;; --seeds) seeds=$2 ;; --seed) seed=$2 ;; --only) only=$2 ;; --out) out=$2 ;;
@@ -34,8 +42,13 @@ add_programs() {  # PACKAGE ADAPTER...
 if [ "$only" != curves ]; then
   if /usr/bin/python3 "$ADAPTERS/llvm_library.py"; then add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis; fi
   add_programs bpy cycles
-  "$BIN/lightshaft" compare "$scenes"/*.xml --references "$scenes/refs" --integrators volpath "${programs[@]}" \
+  "$BIN/lightshaft" compare "$scenes"/*.xml --references "$references" --integrators volpath "${programs[@]}" \
     --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/races" || status=$?
+  # The commit that last touched what the build's name is made of: it stays the renderer's, whatever pages are committed after it.
+  commit=$(git log -1 --format=%h -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake)
+  git diff --quiet HEAD -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake || commit="$commit, changed"
+  printf '{"commit": "%s", "command": "%s"}\n' "$commit" "${command% }" >"$out/races/run.json"
+  [ "$out" != docs/benchmarks ] || /usr/bin/python3 tests/bench/measured.py --write README.md
 fi
 if [ "$only" != races ]; then
   bath=build/benchmarks/bath
