@@ -71,12 +71,15 @@ class Rules(unittest.TestCase):
             "worker/render/accel.cpp": "#include <embree3/rtcore.h>\n",
             "coordinator/rpc/a.cpp": "#include <boost/asio.hpp>\n#include <grpcpp/grpcpp.h>\n",
             "coordinator/http/a.cpp": "#include <sqlite3.h>\n",
+            "cli/validate_stats.cpp": "#include <boost/math/distributions/students_t.hpp>\n",
+            "cli/validate_case.cpp": "#include <boost/math/distributions/normal.hpp>\n",
+            "cli/validate_file.cpp": "#include <boost/asio.hpp>\n",
             "coordinator/http/bundle.cpp": '#include "coordinator/http/archive.h"\n#include <archive_entry.h>\n',
             "common/scene/a.cpp": "#include <ImfHeader.h>\n#include <pugixml.hpp>\n#include <Imath/ImathVec.h>\n",
             "coordinator/store/redis.cpp": "#include <hiredis/hiredis.h>\n",
             "common/base/error.cpp": "#include <spdlog/spdlog.h>\n",
             "tests/unit/x_test.cpp": "#include <ImfHeader.h>\n",
-        }, "worker/render/world.cpp", "boost/asio.hpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
+        }, "worker/render/world.cpp", "boost/asio.hpp", "cli/validate_case.cpp", "cli/validate_file.cpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
 
     def test_library_types(self):
         self.assert_finds(architecture.library_types_stay_behind_their_doors, {
