@@ -23,6 +23,9 @@ constexpr double kLargeShare = 0.1;  // of one pixel, where there are many
 // variance: a Gaussian has 1, the low-discrepancy points of a smooth image up to 6 (tests/coverage).
 constexpr double kHeavy = 10;
 constexpr double kOneSided = 19;  // light of one half over that of the other: few hits
+// Of the last round, at least, for it to tell how uneven the noise is: with 8 samples a half, one that found
+// what the others miss does not stand for all.
+constexpr std::uint64_t kTellingSamples = 16;
 
 // What skewed noise takes off the sum of relative squares in the mean (the header has the derivation). Summed
 // by columns, so that the loop is one of vectors.
@@ -54,16 +57,36 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
   return std::accumulate(columns.begin(), columns.end(), 0.0);
 }
 
-// Standard deviation of (estimated - realised) sum of squares over the estimated sum; see the header for the
-// derivation.
-double relative_spread(const NoiseSums& s, bool trusted) {
-  if (!(s.squares > 0)) return 0;
+// Sum over pixels of tr(V^2), from fourth powers, and of a trusted image from pairs of neighbours, too; see
+// the header for the derivation.
+double trace_of_moments(const NoiseSums& s, bool trusted) {
   const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
   const double channel = trusted ? s.edge_channel_fourth : s.channel_fourth,
                pixel = trusted ? s.edge_pixel_fourth : s.pixel_fourth;
   const double cross = std::max(0.0, pixel - channel);
-  const double trace = channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
-  return std::sqrt(4 * trace) / s.squares;
+  return channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
+}
+
+// Standard deviation of (estimated - realised) sum of squares over the estimated sum.
+double relative_spread(const NoiseSums& s, bool trusted) {
+  if (!(s.squares > 0)) return 0;
+  return trusted ? 2 * std::sqrt(s.changes.products) / s.changes.squares
+                 : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
+}
+
+// `a`, `b`: what the halves' means changed by, three planes each, all times the root of `scale`.
+ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
+  const std::size_t n = a.size() / 3;
+  ChangeSums out;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double ar = a[i], ag = a[n + i], ab = a[2 * n + i], br = b[i], bg = b[n + i], bb = b[2 * n + i];
+    const double dot = ar * br + ag * bg + ab * bb;
+    out.squares += ar * ar + ag * ag + ab * ab + br * br + bg * bg + bb * bb;
+    out.products += dot * dot;
+  }
+  out.squares *= scale / 2;
+  out.products *= scale * scale;
+  return out;
 }
 
 // Fourth powers over pairs of neighbours where the picture is smooth; 0 where edges rule.
@@ -137,6 +160,8 @@ void NoiseSums::add(const NoiseSums& o) {
   edge_pixel_fourth += o.edge_pixel_fourth;
   flat_pairs += o.flat_pairs;
   largest = std::max(largest, o.largest);
+  changes.squares += o.changes.squares;
+  changes.products += o.changes.products;
 }
 
 void TileError::add(const TileError& o) {
@@ -177,6 +202,26 @@ void count_hits(const HalfMeans& h, TileError& out) {
 
 }  // namespace
 
+namespace {
+
+// Where the last round is long enough.
+void tell_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
+                  const std::vector<double>& roots, TileError& out) {
+  if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;
+  const std::size_t n = h.a.size();
+  const double scale = static_cast<double>(earlier.spp) / static_cast<double>(2 * (spp - earlier.spp));
+  std::vector<double> a(n), b(n);
+  for (std::size_t i = 0; i < n; ++i)
+    a[i] = h.a[i] - earlier.halves.a[i], b[i] = h.b[i] - earlier.halves.b[i];
+  const ChangeSums plain = change_sums(a, b, scale);
+  for (std::size_t i = 0; i < n; ++i) a[i] *= roots[i], b[i] *= roots[i];
+  const ChangeSums relative = change_sums(a, b, scale);
+  if (plain.squares > 0) out.plain.changes = plain;
+  if (relative.squares > 0) out.relative.changes = relative;
+}
+
+}  // namespace
+
 TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
@@ -189,6 +234,8 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   out.plain = noise_sums(d, w.edges, h.width, h.height);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);
+  for (NoiseSums* sums : {&out.plain, &out.relative})
+    sums->changes = {sums->squares, trace_of_moments(*sums, true)};
   if (!earlier) return out;
   CHECK(earlier->halves.a.size() == 3 * n && earlier->halves.b.size() == 3 * n && earlier->spp >= 2 &&
             earlier->spp < spp,
@@ -198,15 +245,19 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   // rule.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
+  tell_changes(h, spp, *earlier, w.roots, out);
   return out;
 }
 
 namespace {
 
 // Of the 95 % interval of the logarithm of a sum of squares; a log scale, so that the lower end stays above
-// zero. The spread is an estimate, too, from fourth powers: of n even Gaussian pixels these have a relative
+// zero. The spread is an estimate, too. From fourth powers: of n even Gaussian pixels these have a relative
 // variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so theirs is that of a chi square with e / 2
-// degrees of freedom. Student's t of these, to first order (Abramowitz and Stegun 26.7.5).
+// degrees of freedom. From changes: 4 products / squares^2 has a relative variance of (8 + 4 - 8) / n, those
+// of the products and of the square and their covariance, and so 3 e / 2 degrees; uneven noise has less, and
+// e / 2 is what the scenes of tests/coverage have at least. Student's t of these, to first order (Abramowitz
+// and Stegun 26.7.5).
 double half_width(const NoiseSums& s, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;

@@ -36,7 +36,21 @@
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b; over channels, 4 tr(V^2) with V the covariance of the channels of D.
-// Two ways lead to tr(V^2), and each pixel takes its share g^2 of the first and 1 - g^2 of the second:
+// Over the square of the sum of tr V that is a matter of how unevenly noise is spread over pixels and
+// channels, and of nothing else:
+//   relative variance = 4 sum tr(V^2) / (sum tr V)^2.
+// The last round tells it. With o samples before it and n in it, alpha = sqrt(o / 2n) (A - A_o) of the one
+// half and beta of the other are independent, since the halves are; each has the expectation 0 and the
+// covariance V (for independent samples: Var(A - A_o) = Var(A) n / o). So
+//   E[(alpha . beta)^2] = tr(V^2)   and   E[(alpha . alpha + beta . beta) / 2] = tr V,
+// of each pixel by itself, whatever the tails of its noise and whatever noise its neighbours have. Fourth
+// powers of D would ask for the tails, products of neighbours for noise that changes slowly, and a choice
+// between the two by a g that looks at the pixel's own D takes the large ones out of its sum. Points of low
+// discrepancy make the whole better than its parts by some factor: where it is the same for all pixels it
+// drops out.
+//
+// The first rounds, of too few samples to be told apart, and a last round that is cut to a few have two other
+// ways to tr(V^2), and each pixel takes its share g^2 of the first and 1 - g^2 of the second:
 //   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
 //   r^2), r the correlation of two channels, hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
@@ -61,6 +75,13 @@
 
 namespace ls {
 
+// Of how the means of the halves changed by the last round: alpha and beta of the derivation.
+struct ChangeSums {
+  double squares = 0;   // sum over pixels of (alpha . alpha + beta . beta) / 2
+  double products = 0;  // sum over pixels of (alpha . beta)^2
+  bool operator==(const ChangeSums&) const = default;
+};
+
 // Sums over the pixels of one tile (or of many: they add).
 struct NoiseSums {
   double squares = 0;                                     // sum over pixels and channels of D^2
@@ -70,6 +91,7 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;  // the fourth powers again, times g^2
   double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
   double largest = 0;     // largest sum over channels of D^2 of one pixel
+  ChangeSums changes;     // where the last round cannot tell: squares, and tr(V^2) in one of the other ways
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
 };
@@ -103,7 +125,7 @@ struct EarlierMeans {
   std::uint64_t spp = 0;  // at least 2, fewer than now
 };
 // `spp`: samples per pixel behind the means, both halves together. Without `earlier` skewed noise is not
-// corrected for.
+// corrected for, and the interval supposes Gaussian noise.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
 // 1 / (m^2 + 0.01) less what noise of m, of variance s2, adds to it in the mean.
 double relative_weight(double m, double s2);

@@ -1,11 +1,11 @@
 // The film as bytes, for restarts:
 //   film: "LSFILM01", i32 width, height, tile, u32 tiles present, then per tile u32 tile, u64 length, tile
-//   record; SHA-256 tile: "LSTILE02", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0:
-//   none), 32 bytes tail digest, f64 TileError::skew,
+//   record; SHA-256 tile: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0:
+//   none), 32 bytes tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64 relative.changes,
 //         6 planes of doubles, with a tail 6 planes of floats; SHA-256 of all that stands before
 //   With AOVs: "LSFILM02", a u32 more after the tile's side, which AOVs; the planes of their sums stand after
 //   the six, then those of identifiers in floats.
-// Little endian. The error figures are computed anew, but for the one that needs the tile before its last
+// Little endian. The error figures are computed anew, but for those that need the tile before its last
 // round.
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@ namespace ls {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE02";
+constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE03";
 
 class Writer {
  public:
@@ -95,6 +95,11 @@ bool read_finite(Reader& in, std::vector<T>& out, std::size_t count) {
   return true;
 }
 
+bool sound(const ChangeSums& sums) {
+  return sums.squares >= 0 && std::isfinite(sums.squares) && sums.products >= 0 &&
+         std::isfinite(sums.products);
+}
+
 }  // namespace
 
 std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
@@ -110,6 +115,8 @@ std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
   out.value(tail.samples.s1);
   out.value(tail.digest.bytes);
   out.value(tile->error.skew);
+  out.value(tile->error.plain.changes);
+  out.value(tile->error.relative.changes);
   out.put(std::as_bytes(std::span(tile->sums)));
   out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
@@ -130,13 +137,14 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   tail.samples.s1 = in.value<std::uint64_t>();
   tail.digest.bytes = in.value<decltype(Digest::bytes)>();
   const auto skew = in.value<double>();
+  const auto plain = in.value<ChangeSums>(), relative = in.value<ChangeSums>();
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
   const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
              ids = pixels * planes_.ids;
-  if (!in.ok() || !std::isfinite(skew) || !read_finite(in, tile->sums, sums) ||
-      !read_finite(in, tile->ids, ids) || (has_tail && !read_finite(in, tail.sums, sums + ids)) ||
-      in.left() != 0)
+  if (!in.ok() || !std::isfinite(skew) || !sound(plain) || !sound(relative) ||
+      !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
+      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
   const SampleRange full = round_range(tile->full_rounds);
   if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
@@ -145,6 +153,8 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   if (has_tail) tile->tail = std::move(tail);
   tile->error = estimate(*tile, nullptr, rect);
   tile->error.subtract_skew(skew);
+  tile->error.plain.changes = plain;
+  tile->error.relative.changes = relative;
   return tile;
 }
 

@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
+#include "cli/validate_stats.h"
 #include "common/image/convergence.h"
 #include "common/image/film.h"
 #include "common/scene/read.h"
@@ -94,6 +97,57 @@ Realised realised(const CoverageJob& job, const Truth& truth, std::size_t jobs, 
 
 }  // namespace
 
+namespace {
+
+bool holds(double lo, double value, double hi, double real, double width) {
+  return value * std::pow(lo / value, width) <= real && real <= value * std::pow(hi / value, width);
+}
+
+void count(Shares& shares, const ImageError& e, const Realised& real, double width) {
+  const double part = 1.0 / shares.jobs;
+  shares.rmse += holds(e.rmse_lo, e.rmse, e.rmse_hi, std::sqrt(std::max(0.0, real.mse)), width) ? part : 0;
+  shares.relmse += holds(e.relmse_lo, e.relmse, e.relmse_hi, real.relmse, width) ? part : 0;
+}
+
+// Jobs whose pixels take their halves from any of `jobs`.
+void pair_anew(const std::vector<CoverageJob>& jobs, std::uint64_t seed, Coverage& out) {
+  const std::size_t pixels = kSide * kSide, values = 3 * pixels;
+  std::vector<double> right(values);
+  for (const CoverageJob& job : jobs)
+    for (const auto& half : job.halves)
+      for (std::size_t i = 0; i < values; ++i) right[i] += half[i] / (2 * static_cast<double>(jobs.size()));
+  std::mt19937_64 random(seed);
+  std::uniform_int_distribution<std::size_t> any(0, 2 * jobs.size() - 1);
+  for (int n = 0; n < out.paired.jobs; ++n) {
+    std::array<std::vector<double>, 2> halves, earlier;
+    for (std::size_t h = 0; h < 2; ++h) halves[h].resize(values), earlier[h].resize(values);
+    Realised real;
+    for (std::size_t p = 0; p < pixels; ++p) {
+      for (std::size_t h = 0; h < 2; ++h) {
+        const std::size_t from = any(random);
+        const CoverageJob& job = jobs[from / 2];
+        for (std::size_t i = p; i < values; i += pixels) {
+          halves[h][i] = job.halves[from % 2][i];
+          earlier[h][i] = job.earlier[from % 2][i];
+        }
+      }
+      for (std::size_t i = p; i < values; i += pixels) {
+        const double d = (halves[0][i] + halves[1][i]) / 2 - right[i],
+                     square = d * d / static_cast<double>(values);
+        real.mse += square;
+        real.relmse += square / (right[i] * right[i] + kDark);
+      }
+    }
+    const EarlierMeans before{{kSide, kSide, earlier[0], earlier[1]}, jobs.front().earlier_spp};
+    const ImageError e =
+        image_error(estimate_error({kSide, kSide, halves[0], halves[1]}, jobs.front().spp, &before));
+    count(out.paired, e, real, 1);
+    count(out.paired_narrow, e, real, kNarrow);
+  }
+}
+
+}  // namespace
+
 CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t seed) {
   RenderSettings settings;
   settings.size = kGrid.frame;
@@ -106,6 +160,8 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
   CoverageJob job;
   std::vector<ErrorPoint> points;
   for (RoundIndex k = 0; k < round_count(spp); ++k) {
+    job.earlier = film.half_means(0);
+    job.earlier_spp = film.spp(0);
     const SampleRange range = cut_range(k, spp);
     Partial partial{{{}, {}, {}, kGrid.rect(0), range}, {}};
     partial.sums = render::render_tile(*world, kGrid.rect(0), range, nullptr, nullptr).sums;
@@ -114,6 +170,8 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
         {job.error.spp, job.error.spp, job.error.relmse, job.error.relmse_lo, job.error.relmse_hi});
   }
   job.image = film.pixels(0).mean;
+  job.halves = film.half_means(0);
+  job.spp = film.spp(0);
   job.heavy_tail = !job.error.trusted || judge(points, job.error.verdict).kind == Judgement::Kind::heavy_tail;
   return job;
 }
@@ -126,7 +184,8 @@ Ratio Quotient::ratio() const {
   return {r, std::sqrt(squares) / b};
 }
 
-Coverage measure_coverage(const CoverageScene& scene, int count, int threads, std::uint64_t first) {
+Coverage measure_coverage(const CoverageScene& scene, int count, int threads, std::uint64_t first,
+                          int paired) {
   const Scene description = parsed(scene);
   const bool stops = scene.target > 0;
   const std::vector<CoverageJob> jobs = run_jobs(count, threads, [&](std::size_t i) {
@@ -152,25 +211,40 @@ Coverage measure_coverage(const CoverageScene& scene, int count, int threads, st
   }
   out.mse_ratio = mse.ratio();
   out.relmse_ratio = relmse.ratio();
+  if (stops) return out;
+  out.paired.jobs = out.paired_narrow.jobs = paired;
+  pair_anew(jobs, first, out);
   return out;
 }
 
-// Share of jobs without fireflies that say "don't trust yet", at most.
-constexpr double kWronglyDoubted = .07;
+double share_slack(int n, double level) {
+  return kMayBeOff + cli::student_quantile(level, 1e9) * std::sqrt(kCovered * (1 - kCovered) / n);
+}
 
-bool as_promised(const CoverageScene& scene, const Coverage& c) {
-  if (scene.fireflies) return c.heavy_tail >= .95;
-  const auto covered = [](double share) { return share >= .93 && share <= .97; };
-  const auto right = [](const Ratio& r) { return std::abs(r.value - 1) <= .03; };
-  return covered(c.rmse) && covered(c.relmse) && right(c.mse_ratio) && right(c.relmse_ratio) &&
-         c.heavy_tail <= kWronglyDoubted;
+bool as_promised(const CoverageScene& scene, const Coverage& c, double level) {
+  const double z = cli::student_quantile(level, 1e9), n = c.jobs;
+  // Of fireflies the share that says so is .95 at least, of others .05 at most.
+  const double doubt = z * std::sqrt(kWronglyDoubted * (1 - kWronglyDoubted) / n);
+  if (scene.fireflies) return c.heavy_tail >= 1 - kWronglyDoubted - doubt;
+  const auto covered = [&](double share, int jobs) {
+    return std::abs(share - kCovered) <= share_slack(jobs, level);
+  };
+  const auto right = [&](const Ratio& r) {
+    return std::abs(r.value - 1) <= kRatioMayBeOff + cli::student_quantile(level, n - 1) * r.sigma;
+  };
+  const Shares& p = c.paired;
+  return covered(c.rmse, c.jobs) && covered(c.relmse, c.jobs) &&
+         (p.jobs == 0 || (covered(p.rmse, p.jobs) && covered(p.relmse, p.jobs))) && right(c.mse_ratio) &&
+         right(c.relmse_ratio) && c.heavy_tail <= kWronglyDoubted + doubt;
 }
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c) {
   return fmt::format(
-      "| {} | {:.0f} | {} | {:.2g} | {:.1f} % | {:.1f} % | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} | {:.1f} % |",
-      scene.name, c.spp, c.jobs, c.true_relmse, 100 * c.rmse, 100 * c.relmse, c.mse_ratio.value,
-      c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma, 100 * c.heavy_tail);
+      "| {} | {:.0f} | {} | {:.2g} | {:.1f} % | {:.1f} % | {} | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} | {:.1f} "
+      "% |",
+      scene.name, c.spp, c.jobs, c.true_relmse, 100 * c.rmse, 100 * c.relmse,
+      c.paired.jobs > 0 ? fmt::format("{:.1f} %, {:.1f} %", 100 * c.paired.rmse, 100 * c.paired.relmse) : "",
+      c.mse_ratio.value, c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma, 100 * c.heavy_tail);
 }
 
 }  // namespace ls::test

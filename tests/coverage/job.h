@@ -1,6 +1,7 @@
 // One job of a coverage scene.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -14,6 +15,10 @@ struct CoverageJob {
   std::vector<double> image;  // interleaved R, G, B
   ImageError error;           // as the job says it
   bool heavy_tail = false;
+  // Of the halves A and B, planar, as the film has them: at the end, and before the last round. Of jobs of 32
+  // x 32 pixels alone.
+  std::array<std::vector<double>, 2> halves, earlier;
+  std::uint64_t spp = 0, earlier_spp = 0;
 };
 
 // 32 x 32 pixels, rendered and folded round by round as the coordinator does.

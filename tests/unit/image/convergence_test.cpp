@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/image/rounds.h"
+#include "tests/support/significance.h"
 
 namespace ls {
 namespace {
@@ -101,9 +102,8 @@ TEST(Trend, IgnoresPointsThatAreNoFigures) {
   EXPECT_EQ(trend_of(points)->slope, before);
 }
 
-// Of n fair trials that succeed with probability .95, all but one in 1e4 runs of this test have a share
-// within 3.9 standard deviations, sqrt(.95 .05 / n).
-double spread(int n) { return 3.9 * std::sqrt(.95 * .05 / n); }
+// By which chance moves the share of n fair trials that succeed with probability .95.
+double spread(int n) { return test::kStandardErrors * std::sqrt(.95 * .05 / n); }
 
 TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
   constexpr int kJobs = 1000;

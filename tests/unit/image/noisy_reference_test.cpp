@@ -9,6 +9,7 @@
 #include "common/image/convergence.h"
 #include "common/image/error_estimate.h"
 #include "common/image/reference.h"
+#include "tests/support/significance.h"
 
 namespace ls {
 namespace {
@@ -113,7 +114,7 @@ TEST(NoisyReference, DoesNotBiasTheRelativeError) {
     sum += ratio, squares += ratio * ratio;
   }
   const double mean = sum / kTrials, sigma = std::sqrt((squares / kTrials - mean * mean) / kTrials);
-  EXPECT_NEAR(mean, 1, 4 * sigma + .004);
+  EXPECT_NEAR(mean, 1, test::kStandardErrors * sigma + .004);
   EXPECT_LT(sigma, .008);  // or the bound would say nothing
 }
 

@@ -9,6 +9,7 @@
 #include "common/image/error_estimate.h"
 #include "common/image/final_image.h"
 #include "common/image/maps.h"
+#include "tests/support/significance.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -88,9 +89,9 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
     raw += std::pow(true_error(reference, image).rmse, 2);
   }
   const double mean = sum / kTrials, sigma = std::sqrt((squares / kTrials - mean * mean) / kTrials);
-  EXPECT_LT(std::abs(mean - .04), 4 * sigma);
-  EXPECT_LT(sigma, .0001);                     // or the bound would say nothing
-  EXPECT_GT(raw / kTrials, .045 - 4 * sigma);  // with the reference's noise left in
+  EXPECT_LT(std::abs(mean - .04), test::kStandardErrors * sigma);
+  EXPECT_LT(sigma, .0001);                                         // or the bound would say nothing
+  EXPECT_GT(raw / kTrials, .045 - test::kStandardErrors * sigma);  // with the reference's noise left in
 }
 
 TEST(Reference, RefusesWhatCannotBeOne) {
