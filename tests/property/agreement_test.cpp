@@ -1,7 +1,7 @@
 // Integrators that claim a scene give the same image: those of random scenes that someone could have meant
 // are compared in means over parts of the frame. Two stages: where a first look is suspicious, a second with
 // fresh numbers and 16 times as many decides, at a level that keeps a right renderer from failing anywhere in
-// the whole run with probability kFalsePositives. The seeds are fixed.
+// the whole run with more than this file's share of the suite's rate. The seeds are fixed.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +53,7 @@ SceneKit quarter(const RandomScene& s, const IntegratorSettings& integrator, int
 TEST(RandomScenes, GiveTheSameImageByEveryIntegrator) {
   const auto [first, count] = scenes_to_try(kScenes);
   // Three channels, one quarter of the frame and one rival for a scene.
-  const double level = level_of(3. * static_cast<double>(count));
+  Tests tests("property/agreement");
   std::uint64_t with_media = 0, undecided = 0;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
@@ -76,13 +76,15 @@ TEST(RandomScenes, GiveTheSameImageByEveryIntegrator) {
     ++with_media;
     const auto all = rivals(base);
     const Rival& rival = all[(seed / 4) % all.size()];
-    const Comparison c = look(quarter(s, base, part), quarter(s, rival.settings, part), 10 * seed, level);
+    const Comparison c =
+        look(quarter(s, base, part), quarter(s, rival.settings, part), 10 * seed, tests.level(3));
     undecided += c.verdict == Verdict::undecided;
     if (c.verdict == Verdict::different)
       ADD_FAILURE() << "volpath and " << rival.name << " differ in quarter " << part << "\n"
                     << c.told << told(s);
   }
   fmt::print("{} scenes, {} with media, {} of them undecided\n", count, with_media, undecided);
+  if (count == kScenes) tests.close();
   EXPECT_GE(4 * with_media, count);
   EXPECT_LE(10 * undecided, with_media + 10);
 }

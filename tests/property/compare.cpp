@@ -13,17 +13,6 @@ constexpr double kLeastFreedom = 25;
 // Of float32 along paths of a dozen vertices, see tests/statistical/closed_forms_test.cpp.
 constexpr double kRounding = 0x1p-16;
 
-// x with P(|Z| > x) = p for a standard normal Z, and Student's t from it (Cornish and Fisher).
-double quantile(double p, double freedom) {
-  double lo = 0, hi = 20;
-  for (int i = 0; i < 100; ++i) {
-    const double mid = (lo + hi) / 2;
-    (std::erfc(mid / std::sqrt(2.)) > p ? lo : hi) = mid;
-  }
-  const double z = lo, z3 = z * z * z, z5 = z3 * z * z;
-  return z + (z3 + z) / (4 * freedom) + (5 * z5 + 16 * z3 + 3 * z) / (96 * freedom * freedom);
-}
-
 }  // namespace
 
 Comparison compare(const Estimate& a, const Estimate& b, double level) {
@@ -36,7 +25,7 @@ Comparison compare(const Estimate& a, const Estimate& b, double level) {
     // Whatever the tails are, what is within two standard errors is no news.
     if (freedom < kLeastFreedom && off > 2 * se) {
       all.verdict = std::max(all.verdict, Verdict::undecided);
-    } else if (off > quantile(level, freedom) * se + rounding) {
+    } else if (off > cli::student_quantile(level, freedom) * se + rounding) {
       all.verdict = Verdict::different;
       all.told += fmt::format("channel {}: {} +- {} and {} +- {}, freedom {:.0f}\n", c, a.mean[c],
                               a.standard_error[c], b.mean[c], b.standard_error[c], freedom);
@@ -52,7 +41,5 @@ Comparison look(const SceneKit& a, const SceneKit& b, std::uint64_t seed, double
   const Comparison first = at(looks.first, seed, .01);
   return first.verdict == Verdict::alike ? first : at(looks.second, seed + 5, level);
 }
-
-double level_of(double checks) { return -std::expm1(std::log1p(-kFalsePositives) / checks); }
 
 }  // namespace ls::test

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "tests/support/render_check.h"
+#include "tests/support/significance.h"
 
 namespace ls::test {
 
@@ -14,16 +15,13 @@ struct Comparison {
   std::string told;
 };
 
-// Of two estimates; a right renderer is called different with probability `level` at most, for each channel.
+// Of two estimates; a right renderer is called different with probability `level` at most, for each channel:
+// three tests.
 Comparison compare(const Estimate& a, const Estimate& b, double level);
 
 struct Looks {
   std::uint64_t first = 64, second = 1024;  // samples per pixel
 };
 Comparison look(const SceneKit& a, const SceneKit& b, std::uint64_t seed, double level, Looks looks = {});
-
-// Of each of n checks, so that all together fail a right renderer with probability kFalsePositives (Sidak).
-inline constexpr double kFalsePositives = 1e-3;
-double level_of(double checks);
 
 }  // namespace ls::test

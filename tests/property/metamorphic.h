@@ -31,24 +31,30 @@ inline std::vector<NamedScene> scenes() {
   return all;
 }
 
-// All of the scenes against what `change` makes of them (nothing: not of this one), with one false-positive
-// rate over all.
+// All of the scenes against what `change` makes of them (nothing: not of this one).
 template <class Change>
-void expect_alike(const std::vector<NamedScene>& all, Change change, Looks looks = {}) {
-  const double level = level_of(3. * static_cast<double>(all.size()));
+void expect_alike(Tests& tests, const std::vector<NamedScene>& all, Change change, Looks looks = {}) {
   std::uint64_t compared = 0, undecided = 0, seed = 1000;
   for (const NamedScene& s : all) {
     seed += 10;
     const std::optional<SceneKit> other = change(s.kit);
     if (!other) continue;
     ++compared;
-    const Comparison c = look(s.kit, *other, seed, level, looks);
+    const Comparison c = look(s.kit, *other, seed, tests.level(3), looks);
     undecided += c.verdict == Verdict::undecided;
     EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
   }
   fmt::print("{} scenes compared, {} undecided\n", compared, undecided);
   EXPECT_GE(compared, 2u);
   EXPECT_LE(4 * undecided, compared + 4);
+}
+
+// With a share of their own.
+template <class Change>
+void expect_alike(std::string_view share, const std::vector<NamedScene>& all, Change change) {
+  Tests tests(share);
+  expect_alike(tests, all, change);
+  tests.close();
 }
 
 }  // namespace ls::test

@@ -11,10 +11,9 @@
 namespace ls::test {
 namespace {
 
-const double kLevel = level_of(30);
-
-void expect_alike(const SceneKit& a, const SceneKit& b, std::uint64_t seed, Looks looks = {256, 4096}) {
-  const Comparison c = look(a, b, seed, kLevel, looks);
+void expect_alike(Tests& tests, const SceneKit& a, const SceneKit& b, std::uint64_t seed,
+                  Looks looks = {256, 4096}) {
+  const Comparison c = look(a, b, seed, tests.level(3), looks);
   EXPECT_EQ(c.verdict, Verdict::alike) << c.told;
 }
 
@@ -52,6 +51,7 @@ std::vector<float> refined(int n, const std::vector<float>& v) {
 }
 
 TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
+  Tests tests("property/twice_the_grid");
   std::mt19937 random(4);
   std::vector<float> values(5 * 5 * 5);
   for (float& v : values) v = static_cast<float>(random() % 64) / 16;
@@ -63,8 +63,9 @@ TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
       kit.scene.integrator.name = integrator;
       return kit;
     };
-    expect_alike(with(5, values), with(9, refined(5, values)), 1);
+    expect_alike(tests, with(5, values), with(9, refined(5, values)), 1);
   }
+  tests.close();
 }
 
 // Half the size and twice the density: the same optical depths. Seen from as near, in the same bits.
@@ -87,6 +88,7 @@ TEST(Metamorphic, HalfTheSizeAtTwiceTheDensityIsTheSame) {
 // Density beyond the container that no ray meets, in the macro cells that they cross: majorants are four
 // orders of magnitude too large.
 TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
+  Tests tests("property/majorant");
   for (const char* integrator : {"volpath", "volpath_distant_mis"}) {
     const auto with = [&](float outside) {
       std::vector<float> values(12 * 12 * 12, 1);
@@ -100,11 +102,13 @@ TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
       kit.scene.integrator.name = integrator;
       return kit;
     };
-    expect_alike(with(1), with(1e4f), 20, {64, 256});
+    expect_alike(tests, with(1), with(1e4f), 20, {64, 256});
   }
+  tests.close();
 }
 
 TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
+  Tests tests("property/boundaries");
   std::uint64_t seed = 40;
   for (const NamedScene& s : different_scenes()) {
     SceneKit more = s.kit;
@@ -113,12 +117,14 @@ TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
     for (const double r : {.25, .7, 1.2, 9.})
       more.shape(SphereShape{}, translate({.1, .05, 0}) * scale(r), null);
     more.shape(RectangleShape{}, rotate_x(30) * scale(3), null);
-    expect_alike(s.kit, more, seed += 10, {64, 1024});
+    expect_alike(tests, s.kit, more, seed += 10, {64, 1024});
   }
+  tests.close();
 }
 
 // Radiance towards b of a slab lit from a, by irradiance on the slab, is that towards a lit from b.
 TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
+  Tests tests("property/both_ways");
   const auto direction = [](double degrees) {
     return Vec3{std::sin(degrees * kPi / 180), 0, std::cos(degrees * kPi / 180)};
   };
@@ -138,7 +144,8 @@ TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
   std::uint64_t seed = 200;
   for (const char* integrator : {"volpath", "volpath_distant_mis"})
     for (const bool beyond : {false, true})
-      expect_alike(seen(20, 65, beyond, integrator), seen(65, 20, beyond, integrator), seed += 10);
+      expect_alike(tests, seen(20, 65, beyond, integrator), seen(65, 20, beyond, integrator), seed += 10);
+  tests.close();
 }
 
 // A sample is its own: alone, in any order and in any company it is the same.

@@ -34,7 +34,7 @@ TEST(Metamorphic, ScalingByPowersOfTwoChangesNoBit) {
 
 TEST(Metamorphic, ScalingChangesNothing) {
   int i = 0;
-  expect_alike(scenes(), [&](const SceneKit& kit) {
+  expect_alike("property/scaling", scenes(), [&](const SceneKit& kit) {
     constexpr double kScales[] = {1e-4, 1e-2, 7, 1e3, 1e6};
     return std::optional(moved(kit, {{}, kScales[i++ % 5]}));
   });
@@ -49,20 +49,21 @@ TEST(Metamorphic, ShiftingByAPowerOfTwoChangesNoBitOfExactCoordinates) {
 }
 
 TEST(Metamorphic, ShiftingChangesNothing) {
-  expect_alike(scenes(), [](const SceneKit& kit) {
+  expect_alike("property/shifting", scenes(), [](const SceneKit& kit) {
     return std::optional(moved(kit, {{}, 1, {1e5, -1e5, 1e5}}));
   });
 }
 
 TEST(Metamorphic, TurningChangesNothing) {
   const Transform turn = rotate_x(37) * rotate_y(101) * rotate_x(-15);
-  expect_alike(scenes(), [&](const SceneKit& kit) { return std::optional(moved(kit, {turn})); });
+  expect_alike("property/turning", scenes(),
+               [&](const SceneKit& kit) { return std::optional(moved(kit, {turn})); });
 }
 
 // The hero channel is chosen by position, so it is exact for no scene.
 TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
   const std::vector<NamedScene> all = scenes();
-  const double level = level_of(3. * static_cast<double>(all.size()));
+  Tests tests("property/channels");
   std::uint64_t seed = 5000, compared = 0;
   for (const NamedScene& s : all) {
     if (!can_be_permuted(s.kit.scene)) continue;
@@ -76,16 +77,18 @@ TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
         *list = {(*list)[1], (*list)[2], (*list)[0]};
       return compare(a, b, alpha);
     };
+    const double level = tests.level(3);
     Comparison c = at(64, .01);
     if (c.verdict != Verdict::alike) c = at(1024, level);
     EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
   }
+  tests.close();
   EXPECT_GE(compared, 4u);
 }
 
 // ---- light
 TEST(Metamorphic, ALightOfTwoHalvesIsTheLight) {
-  expect_alike(scenes(), [](const SceneKit& kit) -> std::optional<SceneKit> {
+  expect_alike("property/two_halves", scenes(), [](const SceneKit& kit) -> std::optional<SceneKit> {
     SceneKit out = kit;
     const std::size_t n = kit.scene.emitters.size();
     for (std::size_t i = 0; i < n; ++i) {
@@ -100,7 +103,7 @@ TEST(Metamorphic, ALightOfTwoHalvesIsTheLight) {
 TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
   std::uint64_t seed = 9000;
   const std::vector<NamedScene> all = scenes();
-  const double level = level_of(3. * static_cast<double>(all.size()));
+  Tests tests("property/sum_of_lights");
   for (const NamedScene& s : all) {
     const Scene& scene = s.kit.scene;
     if (scene.emitters.size() < 2) continue;
@@ -130,10 +133,12 @@ TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
       }
       return compare(sum, estimate(s.kit, spp, ++seed), alpha);
     };
+    const double level = tests.level(3);
     Comparison c = at(64, .01);
     if (c.verdict != Verdict::alike) c = at(1024, level);
     EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
   }
+  tests.close();
 }
 
 }  // namespace

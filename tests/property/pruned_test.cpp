@@ -27,7 +27,7 @@ SceneKit kit_of(const RandomScene& s, const Scene& scene) {
 
 TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
   const auto [first, count] = scenes_to_try(kPrunedScenes);
-  const double level = level_of(3. * static_cast<double>(count));
+  Tests tests("property/pruned");
   std::uint64_t pruned_ones = 0, by_bits = 0, undecided = 0;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
@@ -44,7 +44,7 @@ TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
       ++by_bits;
       continue;
     }
-    const Comparison c = look(whole, part, 10 * seed, level);
+    const Comparison c = look(whole, part, 10 * seed, tests.level(3));
     undecided += c.verdict == Verdict::undecided;
     if (c.verdict == Verdict::different) {
       std::string out;
@@ -54,6 +54,7 @@ TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
   }
   fmt::print("{} scenes, of {} something is left out, {} the same bits, {} undecided\n", count, pruned_ones,
              by_bits, undecided);
+  if (count == kPrunedScenes) tests.close();
   EXPECT_GE(20 * pruned_ones, count);
   EXPECT_LE(10 * undecided, pruned_ones + 10);
 }

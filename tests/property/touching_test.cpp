@@ -23,10 +23,12 @@ std::optional<SceneKit> with_twins(const SceneKit& kit, bool first) {
 }
 
 TEST(Touching, ATwinThatNobodySeesChangesNothing) {
+  Tests tests("property/twins");
   for (const bool first : {true, false}) {
     SCOPED_TRACE(first ? "listed before" : "listed after");
-    expect_alike(scenes(), [&](const SceneKit& kit) { return with_twins(kit, first); });
+    expect_alike(tests, scenes(), [&](const SceneKit& kit) { return with_twins(kit, first); });
   }
+  tests.close();
 }
 
 // Fog in a corner of a room, in boxes between these places of each axis.
@@ -64,28 +66,31 @@ SceneKit fog_in_a_corner(const Cuts& cuts, bool grid, const std::string& integra
 }
 
 // One box against others, in both integrators and kinds of media.
-void expect_same_fog(const std::vector<Cuts>& others) {
-  const double level = level_of(3. * 4. * static_cast<double>(others.size()));
+void expect_same_fog(std::string_view share, const std::vector<Cuts>& others) {
+  Tests tests(share);
   std::uint64_t seed = 700;
   for (const bool grid : {false, true})
     for (const char* integrator : {"volpath", "volpath_distant_mis"})
       for (const Cuts& other : others) {
-        const Comparison c = look(fog_in_a_corner({}, grid, integrator),
-                                  fog_in_a_corner(other, grid, integrator), seed += 10, level, {256, 4096});
+        const Comparison c =
+            look(fog_in_a_corner({}, grid, integrator), fog_in_a_corner(other, grid, integrator), seed += 10,
+                 tests.level(3), {256, 4096});
         EXPECT_EQ(c.verdict, Verdict::alike)
             << integrator << (grid ? ", grid: " : ", homogeneous: ") << c.told;
       }
+  tests.close();
 }
 
 TEST(Touching, BoxesThatShareFacesAreOneBox) {
-  expect_same_fog({{{-1, .25, 1}, {-1, 1}, {-1, 1}}, {{-1, 0, 1}, {-1, -.5, 1}, {-1, .125, .75, 1}}});
+  expect_same_fog("property/shared_faces",
+                  {{{-1, .25, 1}, {-1, 1}, {-1, 1}}, {{-1, 0, 1}, {-1, -.5, 1}, {-1, .125, .75, 1}}});
 }
 
 // A hair takes 1.2e-4 of the fog from each face, in place of which light may come through: some 4e-4 of the
 // image. The standard error of a second look is 1e-3 of it or more.
 TEST(Touching, AHairBetweenFogAndWallsChangesNothing) {
   constexpr double kHair = 0x1p-13;
-  expect_same_fog({{{-1, 1 - kHair}, {-1, 1 - kHair}, {-1 + kHair, 1}}});
+  expect_same_fog("property/hair", {{{-1, 1 - kHair}, {-1, 1 - kHair}, {-1 + kHair, 1}}});
 }
 
 }  // namespace

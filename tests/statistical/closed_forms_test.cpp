@@ -3,12 +3,18 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "cli/cases/level.h"
 #include "cli/cases/run.h"
 #include "cli/validate_table.h"
 #include "tests/statistical/case.h"
+#include "tests/support/significance.h"
 
 namespace ls::test {
 namespace {
+
+// Both tables share the product's rate among their own intervals, as many as there are.
+static_assert(cases::kWrongVerdicts <= rate_of(Family::table));
+static_assert(cases::kWrongVerdicts <= rate_of(Family::closed_forms));
 
 const cases::Table& table() {
   static const cases::Table table = [] {

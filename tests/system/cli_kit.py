@@ -2,10 +2,11 @@
 
 import json
 import math
+import re
 import struct
 import subprocess
 
-from local_farm import PATIENCE, bin_dir
+from local_farm import PATIENCE, ROOT, bin_dir
 
 FOG = """<scene version="3.0.0">
   <default name="density" value="2"/>
@@ -78,3 +79,9 @@ def digest(done):
 
 def load(path):
     return json.loads(path.read_text())
+
+
+def rate_of(family):
+    """What a family of statistical tests may spend of the suite's one rate of false alarms."""
+    table = (ROOT / "tests" / "support" / "significance.h").read_text()
+    return float(re.search(rf"Rate{{Family::{family}, ([0-9.e-]+)}}", table)[1])
