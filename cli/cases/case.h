@@ -42,7 +42,7 @@ class Maker {
   std::function<SceneKit()> make_;
 };
 
-// What a band is where nothing is said.
+// The band where a case states none.
 inline constexpr double kBand = .003;
 
 // The interval of the mean must lie within `band` (a share of the answer) around the answer, and must not
@@ -85,6 +85,7 @@ struct Bench {
   std::uint64_t seed = 0;
   int threads = 1;
   std::string id = {};  // the case's
+  double gain = 1;      // RunOptions::gain
 };
 struct Exact {
   std::function<Figure(const Bench&)> check;

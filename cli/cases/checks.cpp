@@ -10,19 +10,26 @@
 
 namespace ls::cases {
 
+namespace {
+constexpr std::uint64_t kMostBrokenSpp = 64;  // of a broken renderer's frames: no more show that it is broken
+}
+
 double Picture::mean(std::size_t pixel, std::size_t channel) const {
   const std::size_t count = sums.size() / 6;
   return (double{sums[channel * count + pixel]} + double{sums[(3 + channel) * count + pixel]}) /
          static_cast<double>(spp);
 }
 
-Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed, int threads) {
+Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, const Bench& bench) {
   const auto scene = cli::as_sent(kit.scene);
   if (!scene) return tl::unexpected(scene.error());
-  const RenderSettings settings = cli::settings_of(*scene, seed);
-  const auto world = render::build_world(*scene, settings, kit.files, threads);
+  const RenderSettings settings = cli::settings_of(*scene, bench.seed);
+  const auto world = render::build_world(*scene, settings, kit.files, bench.threads);
   if (!world) return tl::unexpected(world.error());
-  render::TileResult frame = cli::render_frame(**world, settings.size, {0, spp}, threads);
+  if (bench.gain != 1) spp = std::min(spp, kMostBrokenSpp);
+  render::TileResult frame = cli::render_frame(**world, settings.size, {0, spp}, bench.threads);
+  if (bench.gain != 1)
+    for (float& sum : frame.sums) sum *= static_cast<float>(bench.gain);
   return Picture{settings.size, spp, std::move(frame.sums), frame.health,
                  render::describe(**world).clamped_inputs};
 }
@@ -43,7 +50,7 @@ std::optional<std::string> what_is_lost(const std::string& id, const SceneKit& k
 Figure every_value(const Bench& bench, const SceneKit& kit, std::uint64_t spp, const Channels& expected,
                    double tolerance) {
   if (const auto lost = what_is_lost(bench.id, kit)) return {.why = *lost};
-  const auto p = shoot(kit, spp, bench.seed, bench.threads);
+  const auto p = shoot(kit, spp, bench);
   if (!p) return {.why = p.error().message};
   Figure f{expected[0], expected[0], tolerance * (expected[0] != 0 ? std::abs(expected[0]) : 1), {}, 0};
   f.unhealthy = cli::samples_gone_wrong(p->health);
@@ -63,7 +70,7 @@ Figure every_value(const Bench& bench, const SceneKit& kit, std::uint64_t spp, c
 Figure same_bits(const Bench& bench, const SceneKit& a, const SceneKit& b, std::uint64_t spp) {
   if (const auto lost = what_is_lost(bench.id, a)) return {.why = *lost};
   if (const auto lost = what_is_lost(bench.id, b)) return {.why = *lost};
-  const auto p = shoot(a, spp, bench.seed, bench.threads), q = shoot(b, spp, bench.seed, bench.threads);
+  const auto p = shoot(a, spp, bench), q = shoot(b, spp, bench);
   if (!p) return {.why = p.error().message};
   if (!q) return {.why = q.error().message};
   if (p->sums.size() != q->sums.size()) return {.why = "the frames are not of one size"};

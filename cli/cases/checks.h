@@ -20,7 +20,7 @@ struct Picture {
   // Of a pixel and channel, over both halves.
   double mean(std::size_t pixel, std::size_t channel) const;
 };
-Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed, int threads);
+Result<Picture> shoot(const SceneKit& kit, std::uint64_t spp, const Bench& bench);
 
 // What a case with this id asks of media (".../homogeneous...", ".../grid...") and what is left of them in a
 // job: if nothing is, it asks nothing, and this says so.

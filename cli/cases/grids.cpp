@@ -338,7 +338,7 @@ void no_densities(Table& t) {
           });
   t.exact("N14-negatives-are-counted/grid", "N14", "The report counts the one negative density.",
           [](const Bench& b) -> Figure {
-            const auto p = shoot(with_voxel(-.5f), 2, b.seed, b.threads);
+            const auto p = shoot(with_voxel(-.5f), 2, b);
             if (!p) return {.why = p.error().message};
             return {1, static_cast<double>(p->clamped_inputs), 0, {}, 0};
           });

@@ -45,7 +45,7 @@ void closed(Table& t) {
       [](const Bench& b) {
         Figure f{.expected = 0, .got = 0};
         for (const double size : {1e-4, 1e-2, 1., 1e2, 1e4, 1e6}) {
-          const auto p = shoot(room(CubeShape{}, size), 2048, b.seed, b.threads);
+          const auto p = shoot(room(CubeShape{}, size), 2048, b);
           if (!p) return Figure{.why = p.error().message};
           for (const float sum : p->sums) f.got += sum > 1e4;
           f.unhealthy += p->health.nonfinite;

@@ -25,6 +25,8 @@ constexpr std::uint64_t kPilotPaths = 1 << 13;
 // more, or the first run's variance was far off. Then the case is run again with as many paths as the better
 // figures ask for: so many times as many at least and at most.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
+// Degrees of freedom that plans reckon with.
+constexpr double kPlannedFreedom = 1e3;
 // Of two one-sided tests, as a two-sided level.
 constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
@@ -79,7 +81,7 @@ class Runner {
   }
 
   Result<Sight> with_expected(const Mean& mean, std::uint64_t paths, std::uint64_t seed) const {
-    const auto m = look(mean.scene, paths, seed);
+    const auto m = options_.gain ? broken(mean.expected) : look(mean.scene, paths, seed);
     if (!m) return tl::unexpected(m.error());
     Sight s{mean.expected, {}, {}, {}, m->health, m->paths, m->seconds};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -91,9 +93,13 @@ class Runner {
   }
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
-    const auto a = look(same.scene, paths, seed), b = look(same.other, paths, ~seed);
+    // No case of this kind knows its mean: 1 stands for it.
+    const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
+               b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
     if (!b) return tl::unexpected(b.error());
+    if (a->mean[1] == 0 && b->mean[1] == 0)
+      return fail(Errc::internal, "both scenes are black: nothing was compared");
     Sight s{{}, {}, {}, {}, a->health, a->paths + b->paths, a->seconds + b->seconds};
     cli::add(s.health, b->health);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -109,6 +115,22 @@ class Runner {
     return s;
   }
 
+  // What a renderer gives whose values are `gain` times the right ones. By the error that leaves room for
+  // kSpare more of it, as growth() plans; relative to the mean, that of the right renderer.
+  Result<Measured> broken(const Channels& expected) const {
+    Measured m;
+    m.paths = kPilotPaths;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double right = case_->options.complement ? 1 - expected[k] : expected[k];
+      const double room = band() * std::abs(expected[k]) - unknown(expected[k]);
+      m.mean[k] = *options_.gain * right;
+      m.standard_error[k] =
+          *options_.gain * room / (kSpare + cli::student_quantile(kBandLevel, kPlannedFreedom));
+      m.freedom[k] = kPlannedFreedom;
+    }
+    return m;
+  }
+
   double band() const { return case_->options.band * (options_.quick ? kQuickWidening : 1); }
   // What does not depend on chance, of an interval's half width.
   double unknown(double expected) const { return (kRounding + case_->options.slack) * std::abs(expected); }
@@ -120,7 +142,7 @@ class Runner {
       const std::size_t c = channel(k);
       const double room = band() * std::abs(s.expected[c]) - unknown(s.expected[c]);
       if (!(room > 0)) return 0;  // no number of paths will do
-      const double ratio = s.error[c] * (kSpare + cli::student_quantile(kBandLevel, 1e3)) / room;
+      const double ratio = s.error[c] * (kSpare + cli::student_quantile(kBandLevel, kPlannedFreedom)) / room;
       worst = std::max(worst, ratio * ratio);
     }
     return worst;
@@ -179,7 +201,8 @@ class Runner {
   void exact(const Exact& e) {
     const SystemClock clock;
     const TimePoint start = clock.now();
-    const Figure f = e.check({seed_of(case_->id, options_.seed, 0), options_.threads, case_->id});
+    const Figure f = e.check(
+        {seed_of(case_->id, options_.seed, 0), options_.threads, case_->id, options_.gain.value_or(1)});
     ValidateCase c = blank("");
     c.kind = "exact";
     c.expected = f.expected;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,10 @@ struct RunOptions {
   bool quick = false;
   std::string only;                                         // prefix or glob of ids; empty: all
   std::function<void(const cli::ValidateCase&)> done = {};  // after each line of the table
+  // Stands a broken renderer in for the real one, for the test that each case fails for it: every value comes
+  // out as this many times the right one. Statistical cases are then judged by the figures that such a
+  // renderer gives on average, without rendering, with the error that the case's paths are planned for.
+  std::optional<double> gain = {};
 };
 
 // The lines of the report; a case whose channels differ has one for each. A scene that can't be built is a

@@ -223,7 +223,7 @@ Figure more_light(const Bench& bench, int order) {
     SceneKit kit = column({}, {.9, 0, 1}, false);
     kit.scene.integrator.max_depth = 1 + order + more;
     kit.scene.integrator.rr_depth = 1000;
-    const auto p = shoot(kit, 64, bench.seed, bench.threads);
+    const auto p = shoot(kit, 64, bench);
     if (!p) return {.why = p.error().message};
     f.unhealthy += cli::samples_gone_wrong(p->health);
     for (std::size_t i = 0; i < p->sums.size() / 6; ++i) mean[more] += p->mean(i, 1);
