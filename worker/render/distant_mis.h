@@ -18,6 +18,7 @@
 #include <cmath>
 
 #include "worker/render/equiangular.h"
+#include "worker/render/mis.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
 #include "worker/render/stretch.h"
@@ -129,12 +130,6 @@ class SegmentLight {
     return v;
   }
 
-  // Of two proposals the share of the one with density `own`.
-  static float share(MisHeuristic heuristic, float own, float other) {
-    const float ratio = other / own;
-    return 1 / (1 + (heuristic == MisHeuristic::power ? ratio * ratio : ratio));
-  }
-
   // Light scattered once, from one point.
   template <class Path>
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
@@ -169,7 +164,7 @@ class SegmentLight {
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
     const float own = by_angle ? e_angle : e_depth;
     if (!(own > 0)) return;
-    float weight = both ? share(path.world_.heuristic, own, by_angle ? e_depth : e_angle) : 1.f;
+    float weight = both ? mis_weight(path.world_.heuristic, own, by_angle ? e_depth : e_angle) : 1.f;
     const float phase = medium.phase.value(path.d_, light->direction);
     if (!light->delta) {
       const float found = choice.has_place ? v.found_as_light(pivot) : v.found_as_light();

@@ -24,6 +24,7 @@
 #include "worker/render/built.h"
 #include "worker/render/light_split.h"
 #include "worker/render/media_state.h"
+#include "worker/render/mis.h"
 #include "worker/render/path_end.h"
 #include "worker/render/sampler.h"
 #include "worker/render/segment.h"
@@ -284,7 +285,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
-  const float weight = !kBuilt.found_lights || light->delta ? 1 : light->pdf / (light->pdf + f.pdf);
+  const float weight = !kBuilt.found_lights || light->delta ? 1 : balance_weight(light->pdf, f.pdf);
   const V3 p = offset_point(hit, light->direction);
   const Within medium = beyond(hit, surface, light->direction, d_, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
@@ -353,7 +354,7 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   float weight = 1;
   if (!last_.delta) {
     const float p_l = world_.lights.pdf(hit, last_.p, d_, last_.n);
-    weight = last_.pdf / (last_.pdf + p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
+    weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
   add(beta_ * emitted * weight);
 }

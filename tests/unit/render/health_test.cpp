@@ -97,6 +97,55 @@ TEST(Health, EveryKindOfBadSampleHasItsCause) {
   EXPECT_GT(below.negative, 0u);
 }
 
+// A cube whose density is greater than the bound of its cell, halved by hand: no grid that is read is so.
+struct OverItsBound {
+  const char* name;
+  VolumeFilter filter;
+  bool channels, several;
+};
+std::shared_ptr<const World> over_its_bound(const OverItsBound& how, bool spoil) {
+  SceneKit kit({4, 4});
+  const Transform cube = test::translate({-1, -1, -1}) * test::scale(2);
+  const int channels = how.channels ? 3 : 1;
+  std::vector<float> values;
+  for (int i = 0; i < 27 * channels; ++i) values.push_back(1 + .05f * static_cast<float>(i % 7));
+  const auto fog = [&] {
+    const VolumeIndex grid = kit.grid({3, 3, 3}, values, cube, channels);
+    std::get<GridVolume>(kit.scene.volumes[grid.value]).filter = how.filter;
+    return kit.heterogeneous(grid, {.5, .5, .5});
+  };
+  kit.container(CubeShape{}, {}, kit.null(), fog());
+  if (how.several) kit.container(CubeShape{}, test::scale(.9), kit.null(), fog());
+  kit.environment();
+  kit.look({0, -4, 0}, {0, 0, 0}, 10);
+  auto world = test::world_of(kit);
+  if (!spoil) return world;
+  for (const Medium& m : world->media)
+    for (const Grid* grid : {m.density, m.by_channel[0], m.by_channel[1], m.by_channel[2]})
+      if (grid != nullptr) const_cast<MacroCell&>(grid->cell(0, 0, 0)).hi *= .5f;
+  return world;
+}
+
+TEST(Health, DensitiesAboveTheirBoundAreCountedAndLocatedByEveryTracker) {
+  for (const OverItsBound& how : {OverItsBound{"trilinear", VolumeFilter::trilinear, false, false},
+                                  {"nearest", VolumeFilter::nearest, false, false},
+                                  {"of each channel", VolumeFilter::trilinear, true, false},
+                                  {"of several media", VolumeFilter::trilinear, false, true}}) {
+    const auto count = [&](bool spoil) {
+      return render_tile(*over_its_bound(how, spoil), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr).health;
+    };
+    EXPECT_TRUE(count(false).clean()) << how.name;
+    const Health health = count(true);
+    ASSERT_GT(health.majorant_violations, 0u) << how.name;
+    EXPECT_FALSE(health.clean()) << how.name;
+    for (const HealthSpot& s : health.causes.at(HealthCause::majorant_violation).first) {
+      const SampleValue again = render_sample(*over_its_bound(how, true), s.x, s.y, s.sample);
+      EXPECT_TRUE(again.finite) << "it is kept, and told of";
+      EXPECT_GT(again.health.majorant_violations, 0u) << how.name;
+    }
+  }
+}
+
 TEST(Health, TellsOfChangedInputsByCause) {
   SceneKit kit({2, 2});
   const VolumeIndex grid = kit.grid({2, 1, 1}, {-1, 1}, test::translate({-1, -1, -1}) * test::scale(2));
