@@ -48,6 +48,16 @@ TEST(LeaseBook, HoldsAUnitOnceWhenALaterLeaseNamesItAgain) {
   EXPECT_FALSE(book.take(any));
 }
 
+TEST(LeaseBook, ALeaseEndsWhenALaterOneHasTakenAllItsUnits) {
+  LeaseBook book;
+  book.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+
+  book.add(lease("b", kJob, {0, 1}), nothing_handed_in);
+
+  ASSERT_EQ(book.progress().size(), 1u);
+  EXPECT_EQ(book.progress()[0].lease, LeaseId{"b"});
+}
+
 TEST(LeaseBook, DoesNotRenderAgainWhatWaitsForItsAcknowledgementUnlessThatIsARefusal) {
   LeaseBook book;
   book.add(lease("a", kJob, {0, 1}), [](const UnitKey&) { return true; });

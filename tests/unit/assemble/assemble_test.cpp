@@ -68,6 +68,20 @@ TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
   EXPECT_EQ(RoundErrors::load(errors.save(), 2, true).value(), errors);
 }
 
+TEST(RoundErrors, ARoundThatIsFoldedAgainTakesThePlaceOfItsFirstFold) {
+  RoundErrors again(1, true), once(1, true);
+  TileError e;
+  e.relative.squares = 1;
+  again.folded(0, 0, e), again.folded(0, 1, e);
+  once.folded(0, 0, e);
+
+  e.relative.squares = 2;
+  again.folded(0, 1, e);
+  once.folded(0, 1, e);
+
+  EXPECT_EQ(again, once);
+}
+
 TEST(RoundErrors, RefusesBytesCutAnywhere) {
   RoundErrors errors(2, true);
   errors.folded(0, 0, {});
@@ -164,6 +178,25 @@ TEST(Assembly, ASnapshotOfAnEarlierProgramIsRead) {
   EXPECT_EQ(loaded->film(), assembly.film());
   EXPECT_EQ(loaded->errors(), assembly.errors());
   EXPECT_FALSE(load_snapshot(dir.path() / "film.snap", kGrid, false, "g"));
+}
+
+TEST(Assembly, APartialThatWaitsIsTakenForItsOwnRangeAlone) {
+  Assembly assembly(kGrid, false);
+  assembly.hold(0, 2, waiting(0, {4, 6}));
+  EXPECT_FALSE(assembly.take(0, 2, {4, 8}));
+  EXPECT_TRUE(assembly.take(0, 2, {4, 6}));
+}
+
+TEST(Assembly, ADiscardedTileHasNoErrorAnyMore) {
+  Assembly assembly(kGrid, false);
+  const std::vector<RoundIndex> first(kGrid.count(), 1);
+  ASSERT_TRUE(assembly.fold(0, 0, waiting(0, {0, 2})));
+  const TileError one = assembly.errors().at(first);
+  ASSERT_TRUE(assembly.fold(1, 0, waiting(1, {0, 2})));
+
+  assembly.discard(1);
+
+  EXPECT_EQ(assembly.errors().at(first), one);
 }
 
 TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {

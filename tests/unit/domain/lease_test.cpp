@@ -275,6 +275,19 @@ TEST(Deadline, ProgressRenewsItButNotForever) {
   EXPECT_LE(waited, kNoGrowthLimit + kDeadlineSlack + kLoadSlack + 1s);
 }
 
+TEST(Deadline, IsNeverMovedForwardByProgress) {
+  Rig rig;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 3, 2));
+  rig.render("w");
+  const LeaseId lease = rig.held[{"w"}].front().lease;  // made out before the job's world was loaded
+
+  rig.send(LeaseProgress{{"w"}, {{lease, 0}}});
+  rig.pass(kLoadSlack);
+
+  EXPECT_GT(rig.worker("w").units_out, 0u);
+}
+
 TEST(Deadline, FollowsTheMeasuredCost) {
   Rig rig;
   rig.cpu_seconds = 20;

@@ -54,6 +54,28 @@ TEST(Audit, TakesTheShareAskedFor) {
   EXPECT_EQ(work.rig.farm.audits().equal, work.rig.farm.audits().asked);
 }
 
+// What is audited of the first results of "a", while "b" does nothing.
+std::vector<JobRestored::Audit> opened(Farm::Options options, int results) {
+  Rig rig(std::move(options));
+  rig.join("a", 1);
+  rig.join("b", 1);
+  rig.submit(plan_of("j", 200, 2));
+  for (int i = 0; i < results; ++i) rig.render("a");
+  return rig.farm.open_audits({"j"});
+}
+
+TEST(Audit, HasABoundForEachJob) {
+  EXPECT_EQ(opened(audited_farm(1), kMaxAuditsOpen + 20).size(), kMaxAuditsOpen);
+}
+
+// Who knew which units are audited could lie about all others.
+TEST(Audit, ChoosesUnitsByASeedThatNoWorkerKnows) {
+  Farm::Options one = audited_farm(.5), other = one;
+  other.audit_seed = one.audit_seed + 1;
+  EXPECT_EQ(opened(one, 40), opened(one, 40));
+  EXPECT_NE(opened(one, 40), opened(other, 40));
+}
+
 TEST(Audit, ALoneWorkerIsNotAudited) {
   Clockwork work(audited_farm(1));
   work.join("a", 2);
@@ -121,6 +143,62 @@ TEST(Audit, IsGoneOnWithAfterARestart) {
 
   EXPECT_EQ(rig.job().state, JobState::done);
   EXPECT_EQ(rig.farm.audits().equal, 1u);
+}
+
+TEST(Audit, OfAResultWhoseDigestIsNotKnownAccusesNobody) {
+  Rig rig(audited_farm(0));
+  rig.send(restored(Digest{}, {0, 0, std::nullopt}));
+  rig.join("a", 1);
+  rig.join("b", 1);
+
+  const auto effects = rig.render_all();
+
+  EXPECT_TRUE(of<DigestMismatch>(effects).empty());
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
+TEST(Audit, IsNotEndedByTheWordOfAWorkerThatNobodyAsked) {
+  Rig rig(audited_farm(1));
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 6, 2));
+  rig.join("b", 1);
+  rig.join("c", 1);
+  const Rig::Held unit = rig.take("a");
+  rig.result("a", unit);
+  const auto& of_b = rig.held[{"b"}];
+  const bool b_is_asked =
+      std::any_of(of_b.begin(), of_b.end(), [&](const Rig::Held& h) { return h.key() == unit.key(); });
+
+  rig.result(b_is_asked ? "c" : "b", unit);
+
+  EXPECT_EQ(rig.farm.open_audits({"j"}).size(), 1u);
+  EXPECT_EQ(rig.farm.audits().equal, 0u);
+}
+
+TEST(Audit, DoesNotGoOnByTheWordOfABarredWorker) {
+  Rig rig(audited_farm(0));
+  rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
+  rig.join("a", 1);
+  rig.join("c", 1);
+
+  rig.send(WorkerBarred{{"b"}, "found out elsewhere"});
+
+  EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
+}
+
+TEST(Liar, WhatItsPixelsWereACheckpointOfIsOneAgain) {
+  Rig rig(audited_farm(0));
+  rig.join("a", 1);
+  rig.submit(plan_of("j", 2, 6));
+  rig.render("a");
+  ASSERT_EQ(of<Checkpoint>(rig.render("a")).size(), 1u);
+
+  rig.send(WorkerBarred{{"a"}, "found out elsewhere"});
+  rig.join("b", 1);
+  const auto effects = rig.render_all();
+
+  ASSERT_FALSE(of<Checkpoint>(effects).empty());
+  EXPECT_EQ(of<Checkpoint>(effects)[0].spp, 2);
 }
 
 TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {

@@ -1,0 +1,152 @@
+"""The mutants: small faults, put in one at a time, that some test must find.
+
+A row: number, file, the place with the text that is replaced between « and », what replaces it, what is broken by that, and
+the tests that should find it, in the order in which they are asked. Expressions are replaced by expressions of their type,
+statements (with their semicolon) by statements. The first 60 are five areas of twelve; they were chosen by reading the code
+alone, before the tests. From 101 on each drops or bends one term of the light: the quick table of `lightshaft validate` must
+turn red for it (docs/validate.md).
+"""
+import collections
+
+Mutant = collections.namedtuple("Mutant", "number file place new breaks tests")
+
+AREAS = {"render": range(1, 13), "fold": range(13, 25), "lease": range(25, 37), "audit": range(37, 49), "authorisation": range(49, 61),
+         "terms": range(101, 200)}
+
+RENDER = ("validate:seed*", "validate:N37*", "render_test")
+FOLD = ("image_test:Film*:Merge*:Aovs*:Partial*:Sums*:FinalImage*", "assemble_test")
+DOMAIN = ("domain_test:-Month*:Scale*:RandomWalk*:AdaptiveStop*",)
+HTTP = ("http_api_test",)
+TABLE = ("validate:seed*", "validate:N41*", "validate:N22*", "validate:7.6[abcg]*")
+
+ROWS = [
+    # ---- render
+    (1, "worker/render/path.h", "light->delta ? 1 : «balance_weight(light->pdf, f.pdf)»;", "1.f",
+     "next-event estimation at surfaces counts in full beside the directions that hit the light", RENDER),
+    (2, "worker/render/path.h", "if (!(u < q)) return false;\n  «beta_ /= q;»", ";", "survivors of roulette are not weighted up", RENDER),
+    (3, "worker/render/path.h", "if («(dot(w, hit.ng) > 0) != (s->wi.z > 0)») return std::nullopt;", "false",
+     "a leaning shading normal sends paths through the true surface", RENDER),
+    (4, "worker/render/medium.h", "} else if (f.scattered) {\n    for (int c = 0; c < 3; ++c) f.weight[c] = «m.sigma_s[c] / s»;", "1.f",
+     "grey media forget their albedo", RENDER),
+    (5, "worker/render/medium.h", "if (kBuilt.health && «rho > hi») ++counters", "false", "densities above their bound are not counted", RENDER),
+    (6, "worker/render/medium.h", "for (float& x : factor) «x /= q;»", ";", "shadow rays that survive roulette are not weighted up", RENDER),
+    (7, "worker/render/vertex_light.h", ": light->pdf / (light->pdf * with_focus + «phase»);", "2 * phase",
+     "in media, the weight of next-event estimation and that of found lights do not add up to 1", RENDER),
+    (8, "worker/render/lights.cpp", "if (i == kNone || «!(dot(hit.ng, w) > 0)») return {0, 0, 0};", "false", "lights shine from their back", RENDER),
+    (9, "worker/render/phase.h", "const V3 diff = «g >= 0 ? w - w1 : w + w1»;", "w - w1", "media that scatter backward are looked up as forward ones", RENDER),
+    (10, "worker/render/sampler.h", "(std::uint64_t{y} << 32) | x), «sample & 1»), sample >> 1) {}", "std::uint64_t{0}",
+     "both halves of a pixel draw the same numbers", RENDER),
+    (11, "worker/render/render.cpp", "if (!usable(out)) «continue;»", ";", "samples that are no numbers are added up", RENDER),
+    (12, "worker/render/path_shadow.h", "if (world_.accel.occluded(p, d, «left»)) return {0, 0, 0};", ".5f * left",
+     "what stands in the farther half of a shadow ray throws no shadow", RENDER),
+    # ---- fold
+    (13, "common/image/film.cpp", "got.s1 > full.s1 || «got.s1 % 2 != 0»)", "false", "a round with unequal halves is folded", FOLD),
+    (14, "common/image/film.cpp", "if (const auto cut = tail(index); cut && «got.s1 <= cut->s1»)", "got.s1 < cut->s1",
+     "the same cut round is folded twice", FOLD),
+    (15, "common/image/film.cpp", "«next->chain = chained(next->chain, digest);»", ";", "the sealed digest of a tile forgets its rounds", FOLD),
+    (16, "common/image/film.cpp", "out.standard_error[3 * p + c] = «0.5» * std::abs", "1.0", "standard errors are twice too large", FOLD),
+    (17, "common/image/film.cpp", "return «tile->tail ? chained(tile->chain, tile->tail->digest) : tile->chain»;", "tile->chain",
+     "the cut last round is not sealed", FOLD),
+    (18, "common/image/film.cpp", "out.sums[i] += «tile.tail->sums[colour + i]»;", "0.f", "AOVs miss the cut last round", FOLD),
+    (19, "coordinator/assemble/assembly.cpp", "if (found == waiting_.end() || «found->second.samples != samples») return", "false",
+     "a waiting partial of another sample range is folded", FOLD),
+    (20, "coordinator/assemble/assembly.cpp", "film_.discard(tile);\n  «errors_.discard(tile);»", ";", "the errors of a discarded tile stay", FOLD),
+    (21, "coordinator/assemble/round_errors.cpp", "while (!t.rounds.empty() && «t.rounds.back().first >= round»)", "t.rounds.back().first > round",
+     "a round that is folded again counts twice among the errors", FOLD),
+    (22, "common/image/merge.cpp", "return «std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1)»;",
+     "std::tie(a.samples.s0, a.samples.s1) < std::tie(b.samples.s0, b.samples.s1)", "of a cut round and the whole one, merge takes the cut one", FOLD),
+    (23, "coordinator/assemble/verify.cpp", "if (const Digest digest = unit_digest(*partial); «digest != result.digest»)", "false",
+     "a result whose pixels are not those of its digest is accepted", FOLD),
+    (24, "coordinator/assemble/health_book.cpp", "«tails_.erase(tile);»\n  if (health.clean()) return;", ";",
+     "a cut round that was rendered again in full stays among the faults", FOLD),
+    # ---- lease
+    (25, "coordinator/domain/farm_leases.cpp", "«(worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack})»;", "Duration{}",
+     "a first lease has no time to load its world", DOMAIN),
+    (26, "coordinator/domain/farm_leases.cpp", "«--job.lent;»", ";", "units that come back stay counted as lent", DOMAIN),
+    (27, "coordinator/domain/farm_leases.cpp", "«shares.lend(job, -lease.charge_per_unit);»", ";", "a user is charged for leases that came back", DOMAIN),
+    (28, "coordinator/domain/farm_leases.cpp", "room = std::min(room, «units - std::min(units, load.units)»);", "units",
+     "the limit of lent units does not count those that are lent", DOMAIN),
+    (29, "coordinator/domain/farm_leases.cpp", "if (lease->remaining == 0) close(*lease, «lease->worker != by»);", "false",
+     "who renders a unit that another has handed in is not told to stop", DOMAIN),
+    (30, "coordinator/domain/farm_leases.cpp", "leases.renew(lease, «std::max(lease.deadline, deadline)»);", "deadline", "a renewal may shorten a lease", DOMAIN),
+    (31, "coordinator/domain/lease_book.cpp", "«deadlines_.erase({lease.deadline, lease.seq});»", ";", "a renewed lease ends at its first deadline", DOMAIN),
+    (32, "coordinator/domain/lease_book.cpp", "error == std::errc{} && «end == text.data() + text.size()» ?", "true",
+     "a lease is known by an id with something behind it", DOMAIN),
+    (33, "coordinator/domain/farm_workers.cpp", "LeaseRecord* lease = leases.find(entry.lease);\n    if (lease == nullptr || «lease->worker != worker») continue;", "false",
+     "a worker renews the leases of another one", DOMAIN),
+    (34, "coordinator/domain/farm_workers.cpp", "if («now - worker->grown_at < kNoGrowthLimit») renew(*lease);", "true",
+     "a worker that finishes nothing holds its leases for ever", DOMAIN),
+    (35, "coordinator/domain/schedule.cpp", "if (!limit || job.frozen || «round_of(code) == 0») return false;", "false",
+     "a time budget ends before every tile has its first round", DOMAIN),
+    (36, "worker/agent/lease_book.cpp", "«if (!is_new) leave(entry.held.lease, false);»", ";", "a unit that is lent again stays counted in its old lease", ("agent_test",)),
+    # ---- audit
+    (37, "coordinator/domain/farm_trust.cpp", "mixed(mixed(«options.audit_seed ^ job.seq») ^ code)", "job.seq", "anybody can tell which units are audited", DOMAIN),
+    (38, "coordinator/domain/farm_trust.cpp", "if (!(draw < options.audit_rate) || «job.audits.size() >= kMaxAuditsOpen») return;", "false",
+     "open audits have no bound", DOMAIN),
+    (39, "coordinator/domain/farm_trust.cpp", "if (audit.lease == 0 && «audit.asks(worker.index)») return code;", "true", "a worker audits its own result", DOMAIN),
+    (40, "coordinator/domain/farm_trust.cpp", "first.digest == event.digest || «first.digest == Digest{}»;", "false",
+     "a result whose digest was not kept makes every other one differ", DOMAIN),
+    (41, "coordinator/domain/farm_trust.cpp", "«if (!asked) return;»", ";", "who was not asked confirms a result and ends its audit", DOMAIN),
+    (42, "coordinator/domain/farm_trust.cpp", "«if (!asked) return claimed(job, code, with);»", ";", "who was not asked has a vote against a result", DOMAIN),
+    (43, "coordinator/domain/farm_trust.cpp", "if («with.digest != said») return undecided(job, code);", "false",
+     "of three different results the first is held for the wrong one", DOMAIN),
+    (44, "coordinator/domain/farm_trust.cpp", "«if (by == first.worker) return distrust(with.unit, by, contradiction(with, first.digest));»", ";",
+     "a worker that contradicts itself is not found out by that", DOMAIN),
+    (45, "coordinator/domain/farm_trust.cpp", "binary_search(tiles.begin(), tiles.end(), tile_of(code)) ||\n           «(audit.second && audit.second->first == liar)»;", "false",
+     "an audit goes on by the word of a barred worker", DOMAIN),
+    (46, "coordinator/domain/farm_trust.cpp", "«if (!tiles.empty()) job.checkpoint_spp = 0;»", ";", "no checkpoint is made again of pixels that were wrong", DOMAIN),
+    (47, "coordinator/domain/farm_trust.cpp", "«while (!worker->leases.empty()) free_lease(*worker->leases.begin(), FreedCause::worker_barred, true);»", ";",
+     "a barred worker keeps its leases", DOMAIN),
+    (48, "coordinator/domain/farm_units.cpp", "if («barred.contains(event.worker)») return unwanted(\"the worker is barred\");", "false",
+     "results of a barred worker are accepted", DOMAIN),
+    # ---- authorisation
+    (49, "coordinator/http/auth.cpp", "if (unsafe(request.method) && («!same_site || cross_site(request)»))", "cross_site(request)",
+     "a cookie changes something without a word on where the request comes from", HTTP),
+    (50, "coordinator/http/auth.cpp", "if (site == \"cross-site\" || «site == \"same-site\"») return true;", "false", "pages of a sister domain act with the user's cookie", HTTP),
+    (51, "coordinator/http/auth.cpp", "if («expiry <= now_()») return std::nullopt;", "false", "sessions never end", HTTP),
+    (52, "coordinator/http/auth.cpp", "if («revoked_.find(session) != revoked_.end()») return std::nullopt;", "false", "a closed session goes on", HTTP),
+    (53, "coordinator/http/auth.cpp", "if («!equal_secret(session.substr(last + 1), mac(text))») return std::nullopt;", "false", "sessions may be forged", HTTP),
+    (54, "coordinator/http/auth.cpp", "«throttle_.failed(address, now);»", ";", "tokens may be guessed without end", HTTP),
+    (55, "coordinator/http/auth.cpp", "if («caller->role == Role::join») return problem(403,", "false", "a worker's join token opens the API", HTTP),
+    (56, "coordinator/http/api.cpp", "if (owner && «request.caller.sees(*owner)») return std::nullopt;", "true", "users read and change each other's jobs", HTTP),
+    (57, "coordinator/http/handlers_jobs.cpp", "std::erase_if(jobs, [&](const auto& job) { return «!request.caller.sees(job.owner)»; });", "false",
+     "users see each other's jobs in the list", HTTP),
+    (58, "coordinator/http/routes.cpp", "if (role == Role::read) return access == Access::token || «access == Access::see»;", "access != Access::admin",
+     "a token that only reads submits jobs", HTTP),
+    (59, "coordinator/http/visible.cpp", "if (!job->is_null() && «caller.sees(event.owner)») return event;", "true",
+     "events of workers tell users of each other's jobs", HTTP),
+    (60, "coordinator/http/submission.cpp", "if (caller.role != Role::submit || «priority <= api.limits().user_priority») return std::nullopt;", "true",
+     "a user may go before all others", HTTP),
+    # ---- terms
+    (101, "worker/render/path.h", "if («!world_.lights.can_sample() || !surface.smooth») return;\n  const Group g", "true", "no next-event estimation at surfaces", TABLE),
+    (102, "worker/render/vertex_light.h", "const Lights& lights = path.world_.lights;\n    if («!lights.can_sample()») return;", "true",
+     "no next-event estimation at vertices in media", TABLE),
+    (103, "worker/render/vertex_light.h", "if («!choice.has_place || (points_only(medium) && !choice.is_point)») return;", "true",
+     "no equi-angular sampling in media", TABLE),
+    (104, "worker/render/distant_mis.h", "const auto light = path.world_.lights.sample(choice, p);\n    if («!light») return;", "true",
+     "no next-event estimation in media by volpath_distant_mis", TABLE),
+    (105, "worker/render/path_glow.h", "if («medium.glow == Glow::none || (depth_ == 0 && world_.hide_emitters)») return;", "true", "media give off no light", TABLE),
+    (106, "worker/render/path.h", "if («!kBuilt.found_lights || !world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)»)\n    return;", "true",
+     "paths that leave the scene find no environment", TABLE),
+    (107, "worker/render/path.h", "if («depth_ == 0 && world_.hide_emitters») return;\n  const C3 emitted", "true", "paths find no lights with an extent", TABLE),
+    (108, "worker/render/path.h", "weight = balance_weight(last_.pdf, «p_l» * last_.in_medium", "p_l * p_l / last_.pdf",
+     "found lights are weighted by the power heuristic, next-event estimation by the balance heuristic", TABLE),
+    (109, "worker/render/medium.h", "f.weight[c] = f.weight[c] * «m.sigma_s[c]» / s;", "m.sigma_t[c]", "chromatic media forget their albedo", TABLE),
+    (110, "worker/render/medium.h", "f.weight[c] = «scattering[c]» / s;\n      }", "m.sigma_t[c]", "grey grids forget their albedo", TABLE),
+    (111, "worker/render/vertex_light.h", "const float phase = «medium.phase.value(d, light->direction)»;", "kInvFourPi",
+     "next-event estimation in media takes every phase function for an even one", TABLE),
+    (112, "worker/render/path.h", "const PhaseSample s = «medium.phase.sample(d_, {direction.u(0), direction.u(1)})»;",
+     "HenyeyGreenstein{0}.sample(d_, {direction.u(0), direction.u(1)})", "paths scatter evenly in all media", TABLE),
+    (113, "worker/render/path.h", "«beta_ *= s->weight;»\n  if (s->transmitted)", ";", "surfaces take nothing of the light that they scatter", TABLE),
+    (114, "worker/render/path_shadow.h", "«value *= through_media(medium, from, d, t, stream);»", ";", "media throw no shadow", TABLE),
+    (115, "worker/render/path.h", "bool may_scatter() const { return world_.depth_allows(depth_ + «1»); }", "2", "the last scattering in media is left out", TABLE),
+    (116, "worker/render/path.h", "if (!may_go_on(depth_ + «1», passed_)) return std::nullopt;\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
+    (117, "worker/render/path.h", "if (s->transmitted) eta_scale_ *= «s->eta * s->eta»;", "1.f", "roulette forgets what refraction does to radiance; unbiased", TABLE),
+    (118, "worker/render/mis.h", "heuristic == MisHeuristic::power ? «ratio * ratio» : ratio", "ratio", "the power heuristic has the exponent 1; unbiased", TABLE),
+]
+
+MUTANTS = [Mutant(*row) for row in ROWS]
+
+
+def area_of(number):
+    return next(area for area, numbers in AREAS.items() if number in numbers)
