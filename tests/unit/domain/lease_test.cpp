@@ -275,6 +275,25 @@ TEST(Deadline, ProgressRenewsItButNotForever) {
   EXPECT_LE(waited, kNoGrowthLimit + kDeadlineSlack + kLoadSlack + 1s);
 }
 
+TEST(Deadline, IsRenewedByItsHolderAndByItsFullNameAlone) {
+  for (const bool by_another : {true, false}) {
+    Rig rig;
+    rig.join("w", 1);
+    rig.submit(plan_of("j", 1, 2));
+    const LeaseId held = rig.held[{"w"}].front().lease;
+    rig.join("other", 1);
+    const LeaseId named = by_another ? held : LeaseId{held.value + "x"};
+
+    std::size_t expired = 0;
+    for (Duration waited{}; waited <= kDeadlineSlack + kLoadSlack; waited += 1s) {
+      rig.send(LeaseProgress{{by_another ? "other" : "w"}, {{named, 0}}});
+      for (const UnitsFreed& freed : of<UnitsFreed>(rig.pass(1s))) expired += freed.lease == held;
+    }
+
+    EXPECT_EQ(expired, 1u) << (by_another ? "by another" : "by another name");
+  }
+}
+
 TEST(Deadline, IsNeverMovedForwardByProgress) {
   Rig rig;
   rig.join("w", 1);

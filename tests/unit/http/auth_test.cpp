@@ -105,6 +105,9 @@ TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
   EXPECT_EQ(status(Method::put,
                    {{"cookie", session}, {"origin", "http://farm:8080"}, {"sec-fetch-site", "cross-site"}}),
             403);
+  EXPECT_EQ(status(Method::put,
+                   {{"cookie", session}, {"origin", "http://farm:8080"}, {"sec-fetch-site", "same-site"}}),
+            403);
 }
 
 TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {

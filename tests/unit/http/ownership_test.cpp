@@ -32,6 +32,17 @@ TEST_F(Ownership, IsThatOfTheTokenThatSubmits) {
   EXPECT_EQ(coordinator.last_request.owner, "");
 }
 
+TEST_F(Ownership, TheListHasTheCallersJobsAlone) {
+  submit_as(anna);
+  EXPECT_EQ(json_of(ask_as(anna, Method::get, "/api/v1/jobs"))["jobs"].size(), 1u);
+  EXPECT_EQ(json_of(ask_as(bert, Method::get, "/api/v1/jobs"))["jobs"].size(), 0u);
+}
+
+TEST_F(Ownership, ATokenThatReadsSubmitsNothing) {
+  const std::string reader = tokens.add(Role::read, "").value().token;
+  EXPECT_EQ(ask_as(reader, Method::post, "/api/v1/jobs", "<scene/>").status, 403);
+}
+
 TEST_F(Ownership, AJobThatAnotherCoordinatorHasIsAskedForThereWhoeverAsks) {
   coordinator.others["j-away"] = {.http = "http://other:8080", .alive = true};
   for (const std::string& token : {anna, bert, std::string(kToken)}) {

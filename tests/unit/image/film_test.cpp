@@ -74,6 +74,7 @@ TEST(Film, RefusesPartialsOfAnotherTileOrRound) {
   EXPECT_EQ(film.fold(0, 0, make_partial(kGrid, 1, {0, 2})).error().code, Errc::invalid_argument);
   EXPECT_EQ(film.fold(0, 0, make_partial(kGrid, 0, {2, 4})).error().code, Errc::invalid_argument);
   EXPECT_EQ(film.fold(0, 0, make_partial(kGrid, 0, {0, 4})).error().code, Errc::invalid_argument);
+  EXPECT_EQ(film.fold(0, 0, make_partial(kGrid, 0, {0, 1})).error().code, Errc::invalid_argument);
   EXPECT_EQ(film.fold(99, 0, make_partial(kGrid, 0, {0, 2})).error().code, Errc::invalid_argument);
   Partial small = make_partial(kGrid, 0, {0, 2});
   small.sums.pop_back();
