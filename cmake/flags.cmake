@@ -1,11 +1,12 @@
 # Flags that every target shares. The numerical ones are part of the law of determinism: no contraction, no fast-math. Nobody
 # reads errno or traps of arithmetic (after -fno-fast-math, which would reset it). GCC 12's superword vectoriser forgets the
 # rounding of double -> float -> double within a function, so that two compilations of one formula may differ: it stays off.
+# An unused function is an error: where files are compiled together, it may be one whose calls now find another file's.
 add_library(ls_flags INTERFACE)
 target_include_directories(ls_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(ls_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-fast-math -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize)
-if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3")
+  -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -Werror=unused-function -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-fast-math -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize)
+if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3" AND NOT LIGHTSHAFT_SANITIZE)
   # The loader, not a SIGILL in a static initialiser, tells the user that the CPU is too old.
   add_link_options(-Wl,-z,x86-64-v3)
 endif()

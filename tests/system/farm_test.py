@@ -19,7 +19,6 @@ def expected(tmp_path_factory):
         return farm.pixels(farm.submit(SCENE, **SPEC))
 
 
-@pytest.mark.threads
 @pytest.mark.parametrize("workers, threads", [(1, 2), (2, 1), (5, 1)])
 def test_the_pixels_do_not_depend_on_workers_or_threads(farm, expected, workers, threads):
     farm.add_workers(workers, threads=threads)
@@ -33,7 +32,6 @@ def test_another_seed_gives_other_pixels(farm, expected):
     assert farm.pixels(farm.submit(SCENE, **dict(SPEC, seed=6))) != expected
 
 
-@pytest.mark.threads
 def test_workers_killed_at_random_change_nothing(farm, expected):
     dice = random.Random(20240601)
     farm.add_workers(3, *DELAY)
@@ -48,7 +46,6 @@ def test_workers_killed_at_random_change_nothing(farm, expected):
     assert farm.pixels(job) == expected
 
 
-@pytest.mark.threads
 def test_the_coordinator_killed_twice_changes_nothing(farm, expected):
     farm.add_workers(2, *DELAY)
     job = farm.submit(SCENE, **SPEC)
@@ -75,7 +72,6 @@ def test_a_worker_that_is_frozen_holds_nothing_up_and_its_late_results_change_no
     assert farm.pixels(job) == expected
 
 
-@pytest.mark.threads
 def test_a_drained_worker_ends_cleanly_and_what_it_finished_counts(farm, expected):
     leaver = farm.add_worker(*DELAY, threads=2)
     job = farm.submit(SCENE, **SPEC)

@@ -33,10 +33,6 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-tl::unexpected<Error> io_error(const char* what, const fs::path& path) {
-  return fail(Errc::internal, fmt::format("{} {}: {}", what, path.string(), std::strerror(errno)));
-}
-
 // What the coordinator cannot give now, as it is missing there, damaged or refused to this worker, it may
 // give later.
 Error passing(Error error) {

@@ -19,6 +19,8 @@ namespace {
 
 constexpr std::size_t kReadBytes = 1 << 20;
 
+}  // namespace
+
 tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path) {
   const int error = errno;
   const Errc code = error == ENOSPC || error == EDQUOT ? Errc::resource_exhausted : Errc::internal;
@@ -26,8 +28,6 @@ tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::p
               fmt::format("{} {}: {}{}", what, path.string(), std::strerror(error),
                           code == Errc::resource_exhausted ? "; make room, or choose another --cache" : ""));
 }
-
-}  // namespace
 
 Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);

@@ -10,11 +10,15 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
 
 namespace ls::worker {
+
+// What errno says of `path`: resource_exhausted if the disk is full, else internal.
+tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path);
 
 class PartialFile {
  public:

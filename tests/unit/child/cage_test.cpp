@@ -63,7 +63,7 @@ class Cage : public testing::Test {
 };
 
 // Which version of Landlock the kernel has; less than 1: none.
-long landlock() {
+[[maybe_unused]] long landlock() {
   return ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
 }
 

@@ -26,15 +26,15 @@ std::string refusal(const std::string& objects) {
   const ReadResult r = read(with_sensor(objects));
   return r.scene ? "" : messages(r);
 }
-std::string number(const std::string& name, const std::string& value) {
+std::string float_named(const std::string& name, const std::string& value) {
   return "<float name=\"" + name + "\" value=\"" + value + "\"/>";
 }
 
 TEST(Emitters, ASunHasAnAngularRadius) {
   EXPECT_EQ(emitter<DirectionalEmitter>("", "directional").angular_radius, 0);
-  EXPECT_EQ(emitter<DirectionalEmitter>(number("angular_radius", ".267"), "directional").angular_radius,
+  EXPECT_EQ(emitter<DirectionalEmitter>(float_named("angular_radius", ".267"), "directional").angular_radius,
             .267);
-  EXPECT_THAT(refusal("<emitter type=\"directional\">" + number("angular_radius", "91") + "</emitter>"),
+  EXPECT_THAT(refusal("<emitter type=\"directional\">" + float_named("angular_radius", "91") + "</emitter>"),
               HasSubstr("out of its range 0 <= angular_radius <= 90"));
 }
 
@@ -42,20 +42,20 @@ TEST(Emitters, AnAreaLightMayBeABeam) {
   const AreaEmitter plain = area("");
   EXPECT_EQ(plain.cutoff_angle, 90);
   EXPECT_EQ(plain.beam_width, 90);
-  const AreaEmitter cut = area(number("cutoff_angle", "40")),
-                    both = area(number("cutoff_angle", "40") + number("beam_width", "10") +
-                                number("falloff", "2.5"));
+  const AreaEmitter cut = area(float_named("cutoff_angle", "40")),
+                    both = area(float_named("cutoff_angle", "40") + float_named("beam_width", "10") +
+                                float_named("falloff", "2.5"));
   EXPECT_EQ(cut.beam_width, 30);
   EXPECT_EQ(both.beam_width, 10);
   EXPECT_EQ(both.falloff, 2.5);
-  EXPECT_EQ(area(number("beam_width", "10")).cutoff_angle, 90);
+  EXPECT_EQ(area(float_named("beam_width", "10")).cutoff_angle, 90);
   const auto refused = [](const std::string& p) {
     return refusal("<shape type=\"disk\"><emitter type=\"area\">" + p + "</emitter></shape>");
   };
-  EXPECT_THAT(refused(number("cutoff_angle", "40") + number("beam_width", "50")),
+  EXPECT_THAT(refused(float_named("cutoff_angle", "40") + float_named("beam_width", "50")),
               HasSubstr("beam_width 50 is wider than cutoff_angle 40"));
-  EXPECT_THAT(refused(number("falloff", "2")), HasSubstr("'falloff' of emitter \"area\" lies between"));
-  EXPECT_THAT(refused(number("cutoff_angle", "120")), HasSubstr("out of its range"));
+  EXPECT_THAT(refused(float_named("falloff", "2")), HasSubstr("'falloff' of emitter \"area\" lies between"));
+  EXPECT_THAT(refused(float_named("cutoff_angle", "120")), HasSubstr("out of its range"));
 }
 
 TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
@@ -65,13 +65,14 @@ TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
   for (const char* name : {"angular_radius", "cutoff_angle", "beam_width", "falloff"})
     EXPECT_THAT(plain, Not(HasSubstr(name)));
   const std::string own =
-      written(disk + number("cutoff_angle", "30") + number("falloff", "3") + end +
-              "<emitter type=\"directional\">" + number("angular_radius", "5") + "</emitter>");
+      written(disk + float_named("cutoff_angle", "30") + float_named("falloff", "3") + end +
+              "<emitter type=\"directional\">" + float_named("angular_radius", "5") + "</emitter>");
   for (const char* name : {"angular_radius", "cutoff_angle", "beam_width", "falloff"})
     EXPECT_THAT(own, HasSubstr(name));
-  EXPECT_EQ(must_read(own), must_read(written(disk + number("cutoff_angle", "30") + number("falloff", "3") +
-                                              end + "<emitter type=\"directional\">" +
-                                              number("angular_radius", "5") + "</emitter>")));
+  EXPECT_EQ(must_read(own),
+            must_read(written(disk + float_named("cutoff_angle", "30") + float_named("falloff", "3") + end +
+                              "<emitter type=\"directional\">" + float_named("angular_radius", "5") +
+                              "</emitter>")));
 }
 
 const std::string kImage =
@@ -82,14 +83,15 @@ TEST(Emitters, AProjectorIsGivenAsACamera) {
   EXPECT_EQ(plain.scale, 1);
   EXPECT_EQ(plain.fov_axis, FovAxis::diagonal) << "50 mm, over the diagonal of 36 mm x 24 mm";
   EXPECT_NEAR(plain.fov, 46.7930, 1e-3);
-  const auto given = emitter<ProjectorEmitter>(
-      kImage + number("fov", "30") + number("scale", "15") + "<string name=\"fov_axis\" value=\"smaller\"/>",
-      "projector");
+  const auto given =
+      emitter<ProjectorEmitter>(kImage + float_named("fov", "30") + float_named("scale", "15") +
+                                    "<string name=\"fov_axis\" value=\"smaller\"/>",
+                                "projector");
   EXPECT_EQ(given.fov, 30);
   EXPECT_EQ(given.fov_axis, FovAxis::smaller);
   EXPECT_EQ(given.scale, 15);
-  const Scene s =
-      must_read(with_sensor("<emitter type=\"projector\">" + kImage + number("fov", "30") + "</emitter>"));
+  const Scene s = must_read(
+      with_sensor("<emitter type=\"projector\">" + kImage + float_named("fov", "30") + "</emitter>"));
   EXPECT_EQ(must_read(write_xml(s)), s);
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
@@ -99,7 +101,7 @@ TEST(Emitters, AProjectorNeedsAnImageAndIsNotStretched) {
   EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage +
                       "<transform name=\"to_world\"><scale value=\"2\"/></transform></emitter>"),
               HasSubstr("to_world of a projector may only move, turn and mirror"));
-  EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage + number("fov", "30") +
+  EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage + float_named("fov", "30") +
                       "<string name=\"focal_length\" value=\"50mm\"/></emitter>"),
               HasSubstr("gives both fov and focal_length"));
 }
