@@ -50,7 +50,8 @@ class MemoryWriter final : public Imf::OStream {
   void write(const char c[], int n) override {
     const auto end = position_ + static_cast<std::uint64_t>(n);
     if (end > bytes_.size()) bytes_.resize(end);
-    if (n > 0) std::memcpy(bytes_.data() + position_, c, static_cast<std::size_t>(n));  // c may be null
+    if (n > 0)
+      std::memcpy(bytes_.data() + position_, c, static_cast<std::size_t>(n));  // no bytes yet: no address
     position_ = end;
   }
   std::uint64_t tellp() override { return position_; }
