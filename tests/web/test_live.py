@@ -231,7 +231,7 @@ def test_the_image_is_not_asked_for_with_every_tile(farm, dashboard):
 
     page.wait("Number(document.querySelector('live-image').dataset.painted) >= 2")
     elapsed_s = (page.evaluate("performance.now()") - began) / 1000
-    assert 1 <= farm.asked("GET", "/api/v1/jobs/j-1/image.png") - before <= 2 + elapsed_s / 0.4 < 40
+    assert 1 <= farm.asked("GET", "/api/v1/jobs/j-1/image.png") - before <= 2 + elapsed_s / 0.4
 
 
 def test_the_error_plot_grows_with_the_report(farm, dashboard):
