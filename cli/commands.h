@@ -21,7 +21,7 @@ void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
 
-// "lightshaft 0.1.0, build ..."
+// "lightshaft 0.2.0, build ..."
 std::string version_text();
 
 }  // namespace ls::cli

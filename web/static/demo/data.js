@@ -69,7 +69,7 @@ export const tiles = [[103, "lab-01"], [104, "lab-01"], [105, "lab-02"], [106, "
 export const foldedTile = (tile, worker) => ({ job: "j-7f3a91c2", tile, rect: tileRect(tile), state: "folded", spp: 192, worker });
 
 const worker = (id, name, more = {}) => ({
-  id, name, build: "lightshaft 0.1.0", numeric_class: "9c41f0aa27d3b85e", threads: 8, tags: [], state: "connected", activity: "rendering tile 104, round 6",
+  id, name, build: "lightshaft 0.2.0", numeric_class: "9c41f0aa27d3b85e", threads: 8, tags: [], state: "connected", activity: "rendering tile 104, round 6",
   job: "j-7f3a91c2", units_done: 341, cpu_seconds: 1480, rss_bytes: 412 * 2 ** 20, last_seen_seconds: 0.4, ...more,
 });
 export const workers = [
