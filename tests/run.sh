@@ -94,10 +94,20 @@ run_compose() {
   else count 0 1 0; tail -n 40 "$logs/compose.log"; echo "compose: failed"; fi
 }
 
+run_packages() {
+  tests/packages/run.sh --prebuilt >"$logs/packages.log" 2>&1
+  case $? in
+    0) count 1 0 0; echo "packages: passed" ;;
+    77) echo "packages: not part of this run: $(tail -n 1 "$logs/packages.log")" ;;
+    *) count 0 1 0; tail -n 40 "$logs/packages.log"; echo "packages: failed" ;;
+  esac
+}
+
 waiting_lane() {
   step "system tests" run_pytest system tests/system
   step "browser tests" run_pytest web tests/web
   step "compose" run_compose
+  step "packages" run_packages
 }
 
 computing_lane() {

@@ -3,7 +3,7 @@
 # worker as their units say, and compares the pixels of a job of theirs with those of `lightshaft render`. Removes its container.
 #   tests/packages/run.sh [--prebuilt] [--no-packages] [--network NET] [--base IMAGE]
 # --prebuilt: of deploy/package.sh. --no-packages: take those of build/packages. The container installs what the packages
-# depend on with apt-get, over Docker's network NET (default: bridge, the usual one).
+# depend on with apt-get, over Docker's network NET (default: bridge, or host where that does not reach Debian's archive).
 # Exit codes: 0 all is so, 1 something is not, 77 it cannot be run here.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
