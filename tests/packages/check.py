@@ -154,7 +154,7 @@ def install(box):
     files = box.must("sh", "-c", "ls /packages/*.deb").split()
     so(sorted(pathlib.Path(f).name.split("_")[0] for f in files) == PACKAGES, f"there are the packages {', '.join(PACKAGES)}")
     box.must(*APT, "install", "-y", "--no-install-recommends", *files)
-    so(box.run("dpkg", "--verify", *PACKAGES).stdout == "", "they install with what they depend on, and nothing else")
+    so(box.run("dpkg", "--verify", *PACKAGES).stdout == "", "they install with what they depend on")
     found = [name for name in COMPILERS if box.run("sh", "-c", f"command -v {name}").returncode == 0]
     so(not found, f"the container has no compiler {found or ''}")
     for name, folder in SERVICES.items():
@@ -193,8 +193,8 @@ def render_on_farm(box, services):
     box.must("lightshaft", "submit", "/scene/bath.xml", *OPTIONS, "--wait", "-o", "/tmp/farm.exr", "--report", "/tmp/farm.json",
              user="nobody", environment=farm)
     so(True, "a job of the command line is rendered by the worker, which runs as its unit says")
-    workers = json.loads(box.must("lightshaft", "workers", "--json", user="nobody", environment=farm))
-    print(f"    {json.dumps(workers)[:300]}")
+    workers = json.loads(box.must("lightshaft", "workers", "--json", user="nobody", environment=farm))["workers"]
+    so(len(workers) == 1 and not workers[0]["fake"], f"it is one worker, of version {workers[0]['build']}")
     found = pixels(box, "/tmp/farm.json")
     so(worker.terminate() == 0, "a worker that is stopped drains and ends with 0")
     so(coordinator.terminate() == 0, "a coordinator that is stopped ends with 0")
