@@ -5,6 +5,7 @@ import json
 import pathlib
 import re
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -38,7 +39,7 @@ def say_ended(done, what):
 
 
 def docker(*arguments):
-    return subprocess.run(["docker", *map(str, arguments)], capture_output=True, text=True)
+    return subprocess.run(["docker", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE)
 
 
 class Container:
@@ -190,11 +191,12 @@ def render_on_farm(box, services):
     worker = Service(box, "lightshaft-worker")
     services.append(worker)
     farm = [f"LIGHTSHAFT_URL=http://127.0.0.1:{ports['http']}", f"LIGHTSHAFT_TOKEN={box.read(f'{data}/token')}"]
+    workers = lambda: json.loads(box.must("lightshaft", "workers", "--json", user="nobody", environment=farm))["workers"]
+    joined = wait_until(lambda: workers() or not worker.alive() and [{}], "the worker joins", PATIENCE)
+    so(worker.alive() and joined[0].get("fake") is False, f"the worker runs as its unit says, and joins with version {joined[0].get('build')}")
     box.must("lightshaft", "submit", "/scene/bath.xml", *OPTIONS, "--wait", "-o", "/tmp/farm.exr", "--report", "/tmp/farm.json",
              user="nobody", environment=farm)
-    so(True, "a job of the command line is rendered by the worker, which runs as its unit says")
-    workers = json.loads(box.must("lightshaft", "workers", "--json", user="nobody", environment=farm))["workers"]
-    so(len(workers) == 1 and not workers[0]["fake"], f"it is one worker, of version {workers[0]['build']}")
+    so(True, "it renders a job of the command line")
     found = pixels(box, "/tmp/farm.json")
     so(worker.terminate() == 0, "a worker that is stopped drains and ends with 0")
     so(coordinator.terminate() == 0, "a coordinator that is stopped ends with 0")
@@ -226,6 +228,7 @@ def main():
     args.add_argument("--network", help="default: bridge, or host where that does not reach Debian's archive")
     options = args.parse_args()
     services = []
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the container is removed
     box = open_box(options.base, [options.network] if options.network else ["bridge", "host"])
     try:
         install(box)
