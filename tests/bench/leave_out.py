@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a scene does not need, measured: writes docs/leave-out.md.
+"""What a scene does not need, measured: writes docs/measurements/leave-out.md.
 
 usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone] [--bits SCENE...]
 N = 0: with what was built before, which must be of these sources.
@@ -87,7 +87,7 @@ Taken out of a scene before it is stored or sent is what no pixel depends on, wi
 | instance | nothing of its group can be seen |
 | shape of the lens | the camera is a pinhole |
 
-What stays although it may not be seen, and why: [decisions/0012](decisions/0012-what-a-scene-needs.md).
+What stays although it may not be seen, and why: [decisions/0012](../decisions/0012-what-a-scene-needs.md).
 """
 
 
@@ -373,7 +373,7 @@ def page(rows, bytes_alone, bits):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "leave-out.md")
+    options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "measurements" / "leave-out.md")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
     options.add_argument("--skip", default="")
