@@ -185,7 +185,7 @@ def page(table):
     how = "lightshaft validate --quick --json TABLE.json` (without `--quick`: narrower bands and the longest cases, too)" if table["left_out"] else "lightshaft validate --json TABLE.json`"
     lines = ["# Stiff and extreme cases", "",
              f"Made by `{how} and `scenes/validate/stability_page.py TABLE.json docs`; what the verdicts mean "
-             "stands in [validate.md](../guide/validate.md).", "",
+             "stands in [validation](../design/validation.md).", "",
              f"One run with seed {table['seed']}, by build `{table['build']}` in numeric class `{table['numeric_class']}`.", "",
              f"**{table['passed']} of {table['passed'] + table['failed']} figures pass**, {sum(c['nonfinite'] for c in cases)} samples went wrong, "
              f"{sum(c['paths'] for c in cases):.3g} paths. "
