@@ -42,7 +42,7 @@ def navigation():
         if row:
             title, target, about = row.groups()
             page = (ROOT / "docs" / target).resolve().relative_to(ROOT).as_posix()
-            next(iter(sections[-1].values())).append({f"{title}. {about}" if title.isdigit() else title: page})
+            next(iter(sections[-1].values())).append({f"{title}. {about}" if title.isdigit() else title.replace("`", ""): page})
     sections[0]["Lightshaft"].append({"Index of the docs": "docs/README.md"})
     return sections
 
