@@ -22,6 +22,10 @@ if ! cmp -s docs/site/requirements.txt "$site/venv/installed.txt"; then
   cp docs/site/requirements.txt "$site/venv/installed.txt"
 fi
 "$site/venv/bin/python" docs/site/stage.py "$site"
-NO_MKDOCS_2_WARNING=1 "$site/venv/bin/mkdocs" build --quiet --strict --config-file "$site/mkdocs.yml"
+# Not --quiet, which would hide warnings from --strict, too.
+if ! NO_MKDOCS_2_WARNING=1 "$site/venv/bin/mkdocs" build --strict --config-file "$site/mkdocs.yml" >"$site/build.log" 2>&1; then
+  grep -E '^(WARNING|ERROR)|^Aborted' "$site/build.log" >&2 || cat "$site/build.log" >&2
+  exit 1
+fi
 echo "the site: $site/html/index.html"
 [ "$serve" -eq 0 ] || exec /usr/bin/python3 -m http.server --bind 127.0.0.1 --directory "$site/html" 8000
