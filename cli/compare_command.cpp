@@ -188,7 +188,7 @@ void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) 
       ->type_name("A,B");
   compare
       .add_option("--program", flags->programs,
-                  "another program that races, by its adapter (docs/compare.md); may be repeated")
+                  "another program that races, by its adapter (docs/reference/compare.md); may be repeated")
       ->allow_extra_args(false)
       ->type_name("ADAPTER.json");
   compare.add_option("--time", flags->time, "that each entrant has for each seed, after loading")

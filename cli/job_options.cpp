@@ -123,7 +123,7 @@ void JobOptions::add_to(CLI::App& app) {
   app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
   app.add_option("--integrator", integrator, "volpath, volpath_distant_mis or path instead of the scene's")
       ->type_name("NAME");
-  app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/aovs.md)")
+  app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAME,...");

@@ -31,7 +31,7 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// What is lent at once (docs/scheduling.md).
+// What is lent at once (docs/design/scheduling.md).
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
@@ -140,7 +140,7 @@ std::variant<Flags, int> parse_flags(int argc, char** argv) {
   add_shares(app, flags);
   app.add_option(
       "--webhook", flags.webhooks,
-      "address that is told of every change of a job's state (docs/operations.md); may be repeated");
+      "address that is told of every change of a job's state (docs/guide/operations.md); may be repeated");
   app.add_option("--log-format", log_format, "text, or json: an object a line")
       ->check(CLI::IsMember({"text", "json"}));
   app.set_config("--config", "", "file with these options, one 'name = value' a line");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Writes docs/dependencies.md: what deploy/packages.txt installs, in the versions of this machine.
-#   deploy/install-deps.sh --tests && deploy/dependencies.sh > docs/dependencies.md
+# Writes docs/reference/dependencies.md: what deploy/packages.txt installs, in the versions of this machine.
+#   deploy/install-deps.sh --tests && deploy/dependencies.sh > docs/reference/dependencies.md
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 

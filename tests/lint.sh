@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks the form of the code: clang-format on every source file, clang-tidy on those that changed since BASE.
-#   tests/lint.sh            format only
+# Checks the form of the code: the links of its pages, clang-format on every source file, clang-tidy on those that changed since BASE.
+#   tests/lint.sh            links and format only
 #   tests/lint.sh BASE       clang-tidy too, on files that differ from the commit BASE (needs the dev preset configured)
 #   tests/lint.sh --fix      formats in place
 set -euo pipefail
@@ -15,4 +15,5 @@ case "${1:-}" in
     [ "${#changed[@]}" -eq 0 ] || clang-tidy-14 -p build/dev --quiet "${changed[@]}"
     ;;
 esac
+/usr/bin/python3 tests/lint/links.py
 clang-format-14 --dry-run --Werror "${files[@]}" && echo "${#files[@]} files are formatted"

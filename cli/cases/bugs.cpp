@@ -1,5 +1,6 @@
-// Three bugs that other renderers have had, each with cases that it turns red (docs/validate.md says how that
-// was seen): a phase function clamped to |g| = .99, 1 - exp of a thin depth, and 0 / 0 at null collisions.
+// Three bugs that other renderers have had, each with cases that it turns red
+// (docs/measurements/validation.md says how that was seen): a phase function clamped to |g| = .99, 1 - exp of
+// a thin depth, and 0 / 0 at null collisions.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Adapters: how another program is asked for a picture, as JSON. The whole format is described in
-// docs/compare.md.
+// docs/reference/compare.md.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // The further outputs of an image (AOVs): their names, what a partial carries of each, how much that is. What
-// each of them means is in docs/aovs.md.
+// each of them means is in docs/reference/aovs.md.
 //
 // A partial has, after its six planes of colour, first the planes of sums of those that are asked for, then
 // those of identifiers (id_slots.h); within each kind they are sorted by name, which is the file's order,

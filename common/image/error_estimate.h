@@ -7,7 +7,7 @@
 //
 // What stands for m must be free of the noise that is being measured: S = (A+B)/2 itself would let a firefly
 // enlarge its own denominator and hide most of its error, and the average W of the neighbours alone is wrong
-// wherever a picture has edges (docs/error.md has figures of both). So, per channel,
+// wherever a picture has edges (docs/measurements/error.md has figures of both). So, per channel,
 //   m = W + g (S - W),   g = T / (T + v),
 // local Wiener filtering (Lee 1980) with
 //   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
@@ -23,9 +23,9 @@
 //
 // Where g is near 1 the pixel's value is in its own weight, and the noise of rendered pixels is skewed: a
 // bright sample raises D^2 and S alike, and the sum of f D^2 comes out too low, to first order by f'(m) g
-// cov(D^2, S), which falls like 1/N as a share (2 % at 64 samples, docs/error.md). The samples of the last
-// round, independent of those before, tell it: with n of N samples in the last round, o before it, and D, S
-// of the parts so named,
+// cov(D^2, S), which falls like 1/N as a share (2 % at 64 samples, docs/measurements/error.md). The samples
+// of the last round, independent of those before, tell it: with n of N samples in the last round, o before
+// it, and D, S of the parts so named,
 //   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
 // k the third cumulant of a sample; the pixel's right value drops out of the difference. cov(D^2, S) is k /
 // N^2, so

@@ -25,7 +25,8 @@ Digest pixels_sha256(const Film& film);
 // Of `notes`, by the name `fake`: what to know of an image that fake workers had a hand in.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
-// The header strings `lightshaft:...` of the final EXR; docs/error.md lists them. `:relmse`, `:relmse_ci95`
+// The header strings `lightshaft:...` of the final EXR; docs/reference/image-file.md lists them. `:relmse`,
+// `:relmse_ci95`
 // ("LOW HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or why not in words) and
 // `:tiles` come from the film; of one without a sample only the last. `:pixels_without_samples` stands there
 // if there are any.

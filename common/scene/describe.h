@@ -1,7 +1,7 @@
 // The one table of the scene language: for every type of scene.h its name, and for every field its name,
 // unit, range, default (the value in a default-constructed struct, or Field::fallback for textures) and
-// meaning. Reading of parameters, canonical JSON, hashing, docs/scene-format.md and the random tests all
-// visit it:
+// meaning. Reading of parameters, canonical JSON, hashing, docs/reference/scene-format.md and the random
+// tests all visit it:
 //
 //   describe(visitor, value)  calls  visitor.field(Field{...}, value.member)  for each member.
 //

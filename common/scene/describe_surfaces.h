@@ -10,7 +10,7 @@ template <class V, class T>
 void describe_multiple_scattering(V& v, T& b) {
   v.field({.name = "multiple_scattering",
            .doc = "our own: light that microfacets throw onto each other is not lost (see "
-                  "docs/multiple-scattering.md); needs one roughness that is no texture",
+                  "docs/design/multiple-scattering.md); needs one roughness that is no texture",
            .elided = true},
           b.multiple_scattering);
 }

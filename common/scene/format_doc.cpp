@@ -290,7 +290,7 @@ std::string integrators_section() {
     out += row.name == "aov"
                ? fmt::format(
                      "| `aov` | the integrator within it; its channels {} become layers of the image "
-                     "(docs/aovs.md) |\n",
+                     "(docs/reference/aovs.md) |\n",
                      channel_names())
                : fmt::format("| `{}` | the integrator within it, with a warning: {} |\n", row.name, row.lost);
   return out +

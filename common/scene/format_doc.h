@@ -1,4 +1,4 @@
-// docs/scene-format.md, out of the table that reads scenes.
+// docs/reference/scene-format.md, out of the table that reads scenes.
 #pragma once
 
 #include <string>

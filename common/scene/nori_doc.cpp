@@ -1,4 +1,4 @@
-// The section on Nori of docs/scene-format.md, out of the table of words.
+// The section on Nori of docs/reference/scene-format.md, out of the table of words.
 #include <fmt/format.h>
 
 #include "common/scene/nori_words.h"

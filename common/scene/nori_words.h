@@ -1,5 +1,5 @@
 // The words of Nori's scene files: its objects with their parameters, and its integrators. One table, which
-// reading, suggestions and docs/scene-format.md use.
+// reading, suggestions and docs/reference/scene-format.md use.
 #pragma once
 
 #include <optional>
@@ -63,7 +63,7 @@ struct IntegratorRow {
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);
 
-// The section of docs/scene-format.md.
+// The section of docs/reference/scene-format.md.
 std::string markdown();
 
 }  // namespace ls::scene::nori

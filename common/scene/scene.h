@@ -64,7 +64,7 @@ using Texture =
 // ---- surfaces
 enum class Microfacet { beckmann, ggx };
 // Rough surfaces with multiple_scattering also send on the light that microfacets throw onto each other,
-// which the model leaves out (docs/multiple-scattering.md). Their roughness is one constant.
+// which the model leaves out (docs/design/multiple-scattering.md). Their roughness is one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -177,7 +177,8 @@ enum class VolumeFilter { nearest, trilinear };
 enum class GridOrder { x_fastest, z_fastest };
 // A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With
 // use_grid_bbox the file's own bounding box is placed first. VDB and NanoVDB grids are placed by their own
-// transform, raw `.bin` grids by their box with the outermost values on its faces (see docs/scene-format.md).
+// transform, raw `.bin` grids by their box with the outermost values on its faces (see
+// docs/reference/scene-format.md).
 struct GridVolume {
   AssetIndex file;
   std::string grid_name;  // for files with named grids; empty: the only one, or "density"

@@ -28,7 +28,7 @@ struct JobPlan {
   int priority = 0;                                // higher first
   std::vector<std::string> tags;                   // a worker must carry all of them
   std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
-  // ---- whose turn it is, and how much at once (share_book.h, docs/scheduling.md) ----
+  // ---- whose turn it is, and how much at once (share_book.h, docs/design/scheduling.md) ----
   std::string owner;  // the user (JobView::owner); empty: the administrator, whom no limit of users holds
   std::string group;  // jobs of one owner that share their turns and go in order: a sequence; empty: itself
   // Limits of the job, or of all jobs of its group together.

@@ -1,4 +1,4 @@
-// Who asks, and what a role may do. The whole of it as a table: docs/authorisation.md.
+// Who asks, and what a role may do. The whole of it as a table: docs/reference/authorisation.md.
 #pragma once
 
 #include <optional>

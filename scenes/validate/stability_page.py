@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the page of the validation table and its plots.
+"""Writes the page of the validation table (measurements/stability.md below the folder given) and its plots.
 
     lightshaft validate --json TABLE.json
     scenes/validate/stability_page.py TABLE.json docs
@@ -185,15 +185,15 @@ def page(table):
     how = "lightshaft validate --quick --json TABLE.json` (without `--quick`: narrower bands and the longest cases, too)" if table["left_out"] else "lightshaft validate --json TABLE.json`"
     lines = ["# Stiff and extreme cases", "",
              f"Made by `{how} and `scenes/validate/stability_page.py TABLE.json docs`; what the verdicts mean "
-             "stands in [validate.md](validate.md).", "",
+             "stands in [validation](../design/validation.md).", "",
              f"One run with seed {table['seed']}, by build `{table['build']}` in numeric class `{table['numeric_class']}`.", "",
              f"**{table['passed']} of {table['passed'] + table['failed']} figures pass**, {sum(c['nonfinite'] for c in cases)} samples went wrong, "
              f"{sum(c['paths'] for c in cases):.3g} paths. "
              f"Half of the intervals had to lie within {100 * bands[len(bands) // 2]:.2g} % of the answer, the widest within {100 * bands[-1]:.2g} %.", "",
              "z is the distance from the answer in units of both what chance and what float32 (and an answer that is known to some digits) may do: "
              "sqrt(standard error^2 + allowance^2). Wrong: samples that were rejected or negative. Seconds: by the clock, of the attempt that counts, on all cores.", "",
-             "![Error by depth](images/stability-depth.svg)", "![Error by scale](images/stability-scale.svg)",
-             "![Fluence](images/stability-fluence.svg)", "![z](images/stability-z.svg)", ""]
+             "![Error by depth](../images/stability-depth.svg)", "![Error by scale](../images/stability-scale.svg)",
+             "![Fluence](../images/stability-fluence.svg)", "![z](../images/stability-z.svg)", ""]
     groups = {}
     for case in cases:
         groups.setdefault((subject(case), case["about"]), []).append(case)
@@ -209,7 +209,7 @@ def page(table):
     return "\n".join(lines) + "\n"
 
 
-# What a constant of docs/constants.md does where it does most, by the case that asks for it.
+# What a constant of docs/reference/constants.md does where it does most, by the case that asks for it.
 MEASURED = (
     ("forced roulette: `kForcedRouletteDepth`, `kLastSurvival`", "N17-white-slab-256/homogeneous/volpath"),
     ("", "N17-white-slab-64/grid/volpath"),
@@ -245,7 +245,7 @@ MEASURED = (
 
 
 def measured(cases):
-    """Rows of the table of docs/constants.md; of what the table of cases leaves out, none."""
+    """Rows of the table of docs/reference/constants.md; of what the table of cases leaves out, none."""
     found = {case["name"]: case for case in cases}
     rows, what = [], ""
     for constant, name in MEASURED:
@@ -285,12 +285,14 @@ def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     table, docs = read_table(sys.argv[1:-1]), pathlib.Path(sys.argv[-1])
-    (docs / "images").mkdir(parents=True, exist_ok=True)
+    for folder in ("images", "measurements"):
+        (docs / folder).mkdir(parents=True, exist_ok=True)
     for draw, name in ((error_by_depth, "depth"), (error_by_scale, "scale"), (fluence, "fluence"), (all_z, "z")):
         draw(table["cases"], docs / "images" / f"stability-{name}.svg")
-    (docs / "stability.md").write_text(page(table))
-    if (docs / "constants.md").exists():
-        update_constants(table["cases"], docs / "constants.md")
+    (docs / "measurements" / "stability.md").write_text(page(table))
+    constants = docs / "reference" / "constants.md"
+    if constants.exists():
+        update_constants(table["cases"], constants)
 
 
 if __name__ == "__main__":

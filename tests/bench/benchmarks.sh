@@ -1,5 +1,5 @@
 #!/bin/bash
-# Makes docs/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
+# Makes docs/measurements/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
 #
 # usage: benchmarks.sh [SCENES] [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
 # SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references. Without it
@@ -7,13 +7,13 @@
 # Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba (and there is an LLVM library for it)
 # and bpy; what is missing is said.
 # The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
-# seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu. Races in docs/benchmarks
+# seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu. Races in docs/measurements/benchmarks
 # give README.md its table of figures (measured.py).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
 ADAPTERS=tests/bench/adapters
-clock=wall time=4 seeds=3 seed=0 only= out=docs/benchmarks
+clock=wall time=4 seeds=3 seed=0 only= out=docs/measurements/benchmarks
 command="tests/bench/benchmarks.sh $*"
 if [ $# -ge 1 ] && [ "${1#--}" = "$1" ]; then
   [ -d "$1" ] || { sed -n '4,11s/^# \?//p' "$0" >&2; exit 2; }
@@ -48,7 +48,7 @@ if [ "$only" != curves ]; then
   commit=$(git log -1 --format=%h -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake)
   git diff --quiet HEAD -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake || commit="$commit, changed"
   printf '{"commit": "%s", "command": "%s"}\n' "$commit" "${command% }" >"$out/races/run.json"
-  [ "$out" != docs/benchmarks ] || /usr/bin/python3 tests/bench/measured.py --write README.md
+  [ "$out" != docs/measurements/benchmarks ] || /usr/bin/python3 tests/bench/measured.py --write README.md
 fi
 if [ "$only" != races ]; then
   bath=build/benchmarks/bath

@@ -5,7 +5,7 @@ usage: distances.py [--spp N] [--voxel SIZE] [--threads N] [--keep DIR] [--pictu
 Renders the demo scene by its sun and window, and by a lamp in the steam instead of the sun, with `volpath` and with each setting
 of `volpath_distant_mis`, at the same samples a pixel. Prints relMSE with its 95 % interval (the renderer's own estimate, which
 needs no reference), core seconds, and efficiency 1 / (relMSE x core seconds) over that of `exponential`. --keep keeps the pictures,
-in which the settings differ by noise alone; --picture makes one of docs/distances.md of them: the lamp by `exponential`, `mis` and
+in which the settings differ by noise alone; --picture makes one of docs/measurements/distances.md of them: the lamp by `exponential`, `mis` and
 `volpath` (needs numpy and, of PyPI, OpenEXR and mitsuba, which writes the JPEG). A bench, not a test.
 """
 import argparse

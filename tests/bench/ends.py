@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the settings that end paths do to an image: writes their table into docs/constants.md.
+"""What the settings that end paths do to an image: writes their table into docs/reference/constants.md.
 
 usage: ends.py [--spp N] [--seeds K] [--size WxH] [--print]
 Three scenes in which light is scattered often: a white room lit by a small lamp, a cloud of albedo .999 and optical depth 20 under
@@ -98,7 +98,7 @@ def main():
     args = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="lightshaft-ends-") as folder:
         text = table(args, pathlib.Path(folder))
-    file = ROOT / "docs" / "constants.md"
+    file = ROOT / "docs" / "reference" / "constants.md"
     if args.print:
         print(text)
     else:

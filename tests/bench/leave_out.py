@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a scene does not need, measured: writes docs/leave-out.md.
+"""What a scene does not need, measured: writes docs/measurements/leave-out.md.
 
 usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone] [--bits SCENE...]
 N = 0: with what was built before, which must be of these sources.
@@ -69,26 +69,7 @@ WORKS = {"vacuum": {"shadow_rays"}, "textured": {"shadow_rays", "texels"},
          "grid": {"shadow_rays", "phase", "density", "macro_cells", "boundary_rays"}}
 WORKS["delta"] = WORKS["homogeneous"]
 
-# Of common/scene/prune.cpp.
-TAKEN_OUT = """## What is taken out
-
-Taken out of a scene before it is stored or sent is what no pixel depends on, with every file that only it named; `lightshaft inspect` and the report list it with the reason:
-
-| what | why |
-|---|---|
-| branch of a blend | its weight is 0 |
-| mask | its opacity is 0 or 1 everywhere |
-| light | it is black |
-| light given off by a medium | its strength is 0 |
-| medium | it neither takes light nor gives any; for `path`, any |
-| medium | no light gets into what it fills: an opaque body, or what is behind a black back |
-| phase function | its medium scatters no light |
-| surface | light passes it unchanged, and there is no medium on either side |
-| instance | nothing of its group can be seen |
-| shape of the lens | the camera is a pinhole |
-
-What stays although it may not be seen, and why: [decisions/0012](decisions/0012-what-a-scene-needs.md).
-"""
+TAKEN_OUT = "What is left out, and how: [design/leave-out.md](../design/leave-out.md).\n"
 
 
 def scene_text(name):
@@ -373,7 +354,7 @@ def page(rows, bytes_alone, bits):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "leave-out.md")
+    options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "measurements" / "leave-out.md")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
     options.add_argument("--skip", default="")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The README's table of figures, from the races of one run (docs/benchmarks/races): errors and efficiency beside other programs'.
+"""The README's table of figures, from the races of one run (docs/measurements/benchmarks/races): errors and efficiency beside other programs'.
 
 usage: measured.py [--races DIR] [--write README.md]
 Prints the table, or writes it between the marks of a page. Every figure is computed from points.csv, the picture at the end of each
@@ -16,7 +16,7 @@ import pathlib
 import statistics
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-RACES = ROOT / "docs" / "benchmarks" / "races"
+RACES = ROOT / "docs" / "measurements" / "benchmarks" / "races"
 BEGIN, END = "<!-- the table of tests/bench/measured.py -->\n", "<!-- end of the table -->\n"
 # Of Student's t, two-sided 95 %, by degrees of freedom from 1.
 T = (12.7062, 4.30265, 3.18245, 2.77645, 2.57058, 2.44691, 2.36462, 2.30600, 2.26216, 2.22814, 2.20099, 2.17881, 2.16037, 2.14479,

@@ -1,4 +1,5 @@
-// What the stop rule gains and what it costs, on images whose truth is known: docs/stopping.md is made by it.
+// What the stop rule gains and what it costs, on images whose truth is known: docs/measurements/stopping.md
+// is made by it.
 //   stopping_bench [JOBS] [SEED]     jobs of each image and target, 100 unless told otherwise; seeds from
 //   SEED on (1)
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 """The chaos suite: every storm of storms.py, again and again, with an image-hash check after each.
 
-    tests/chaos/chaos.py [--seed S] [--repetitions N] [--only TEXT] [--write docs/chaos.md]
+    tests/chaos/chaos.py [--seed S] [--repetitions N] [--only TEXT] [--write docs/measurements/chaos.md]
 
 Ends with 1 if any image was another one, or a storm broke what it must not. A storm that cannot be made here says why.
 """
@@ -84,7 +84,7 @@ def line(name, right, count, again, lost):
 
 PAGE = """# Storms
 
-`/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
+`/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/measurements/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
 same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. In the storms "with real pixels" workers render fog, and the pixels must be those of `lightshaft render`. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
 
 *Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun; after a takeover also what the dead owner had done. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
@@ -94,7 +94,7 @@ same question: are the pixels those of one worker that nothing happened to? Work
 {table}
 
 "Killed at STEP": the process kills itself with SIGKILL when it comes to that step of a unit's life for the n-th time, n random (`common/base/step.h`). Workers behind bad networks are in a network namespace, and every packet of theirs passes through `tests/chaos/weather.py`; full disks are small file systems; the wall clock is libfaketime's.
-A lease that is cut in its middle may still read as a shorter one: its other units wait for its deadline, ten seconds at least. A takeover takes some six seconds ([decisions/0024](decisions/0024-several-coordinators.md)). "Older": Redis is killed and started with what it had saved before, as a replica that was behind.
+A lease that is cut in its middle may still read as a shorter one: its other units wait for its deadline, ten seconds at least. A takeover takes some six seconds ([decisions/0024](../decisions/0024-several-coordinators.md)). "Older": Redis is killed and started with what it had saved before, as a replica that was behind.
 {skipped}"""
 
 

@@ -63,8 +63,8 @@ inline constexpr double kNarrow = .79326;
 Coverage measure_coverage(const CoverageScene& scene, int jobs, int threads, std::uint64_t first, int paired);
 
 std::string coverage_line(const CoverageScene& scene, const Coverage& c);  // for tables
-// What docs/error.md promises of each row. Not every scene's noise is told of equally well by its last round:
-// a share may be off by kMayBeOff, the mean of all rows by kMeanMayBeOff.
+// What docs/measurements/error.md promises of each row. Not every scene's noise is told of equally well by
+// its last round: a share may be off by kMayBeOff, the mean of all rows by kMeanMayBeOff.
 inline constexpr double kCovered = .95, kMayBeOff = .02, kMeanMayBeOff = .005;
 inline constexpr double kRatioMayBeOff = .03;
 inline constexpr double kWronglyDoubted = .05;  // of jobs without fireflies, "don't trust yet"

@@ -1,4 +1,4 @@
-// The short look at tests/coverage: a few seconds. docs/error.md has the long one.
+// The short look at tests/coverage: a few seconds. docs/measurements/error.md has the long one.
 #include "tests/coverage/coverage.h"
 #include "tests/coverage/denominators.h"
 #include "tests/support/significance.h"
@@ -79,8 +79,8 @@ TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
   EXPECT_LT(c.relmse_ratio.sigma, .05);
 }
 
-// Of 24 jobs that each say it with probability .99 (docs/error.md: 992 of 1,000) fewer than 19 do once in 8
-// million runs (binomial), less than the level of one figure.
+// Of 24 jobs that each say it with probability .99 (docs/measurements/error.md: 992 of 1,000) fewer than 19
+// do once in 8 million runs (binomial), less than the level of one figure.
 TEST(ShortCoverage, FirefliesAreNotTrusted) {
   const CoverageScene scene = scene_of("fireflies", 64);
   EXPECT_GT(Tests("coverage/fireflies").level(), 1.3e-7);

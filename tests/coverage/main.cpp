@@ -1,6 +1,6 @@
-// error_coverage [JOBS] [THREADS] [NAME] [SEED]: the tables of docs/error.md, or those rows of the first
-// whose name begins so; with JOBS seeds from SEED on (1), and 10,000 jobs paired anew of those. Exit code 1:
-// a row, or the mean of all, is not what docs/error.md promises.
+// error_coverage [JOBS] [THREADS] [NAME] [SEED]: the tables of docs/measurements/error.md, or those rows of
+// the first whose name begins so; with JOBS seeds from SEED on (1), and 10,000 jobs paired anew of those.
+// Exit code 1: a row, or the mean of all, is not what docs/measurements/error.md promises.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
       if (!scene.fireflies && found.paired.jobs > 0)
         covered += found.paired.rmse + found.paired.relmse, shares += 2;
       if (as_promised(scene, found, level)) continue;
-      fmt::print(stderr, "{}: not what docs/error.md promises\n", scene.name);
+      fmt::print(stderr, "{}: not what docs/measurements/error.md promises\n", scene.name);
       right = false;
     }
     if (!wanted.empty()) return right ? 0 : 1;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Puts the faults of table.py into a copy of the sources, one at a time, and asks the named tests whether they find them.
 
-usage: run.py [--only NUMBER,...] [--area NAME,...] [--jobs N] [--build-only] [--table docs/mutants.md]
+usage: run.py [--only NUMBER,...] [--area NAME,...] [--jobs N] [--build-only] [--table docs/measurements/mutants.md]
 
 All faults are compiled into one build of the copy, beside the right code, and chosen by LIGHTSHAFT_MUTANT (mutant.h): a run
 of sixty costs one build of some forty files. The checkout itself is not touched: the copy and its build are in build/mutation,

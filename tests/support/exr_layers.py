@@ -100,7 +100,7 @@ def write_rgb(path, layers):
 
 
 def seal(header, rows):
-    """What `lightshaft:seal` of this picture would be, by the words of docs/error.md and none of the program's code."""
+    """What `lightshaft:seal` of this picture would be, by the words of docs/reference/image-file.md and none of the program's code."""
     left_out = ("compression", "lineOrder", "lightshaft:seal")
     lines = [f"{hashlib.sha256(kind.encode() + bytes(1) + value).hexdigest()} header {name}"
              for name, (kind, value) in sorted(header.items()) if name not in left_out]

@@ -1,6 +1,6 @@
 """JSON schemas of the Kubernetes objects that deploy/kubernetes uses, down to the fields that it uses: a name that is misspelt or
 in the wrong place, a missing one, or a wrong type is found. They say less than Kubernetes' own schemas, which need a download
-(docs/operations.md says how to check against those)."""
+(docs/guide/operations.md says how to check against those)."""
 
 TEXT, WHOLE, FLAG = {"type": "string"}, {"type": "integer"}, {"type": "boolean"}
 NAME = {"type": "string", "pattern": "^[a-z0-9]([-a-z0-9]*[a-z0-9])?$"}

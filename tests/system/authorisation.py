@@ -1,4 +1,4 @@
-"""Who may do what: the table that test_authorisation.py holds the coordinator to, and docs/authorisation.md is made from.
+"""Who may do what: the table that test_authorisation.py holds the coordinator to, and docs/reference/authorisation.md is made from.
 
 A row for every operation of the OpenAPI document and every RPC of proto/farm.proto: what each caller is answered. It is
 written by hand, apart from the route table of the coordinator, so that the two check each other.
@@ -104,7 +104,7 @@ def cells(entry, callers):
 
 
 def page():
-    """docs/authorisation.md."""
+    """docs/reference/authorisation.md."""
     out = [
         "# Who may do what",
         "",

@@ -1,4 +1,4 @@
-"""Agreement with other renderers: three verdicts, and docs/agreement.md has those of the figures that it prints."""
+"""Agreement with other renderers: three verdicts, and docs/measurements/agreement.md has those of the figures that it prints."""
 
 import re
 import sys
@@ -31,7 +31,7 @@ def test_more_samples_decide_and_never_turn_a_verdict_round():
 
 
 def rows():
-    for line in (ROOT / "docs" / "agreement.md").read_text().splitlines():
+    for line in (ROOT / "docs" / "measurements" / "agreement.md").read_text().splitlines():
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)]
         figures = cells[-2].split(";")[0] if len(cells) > 4 else ""
         if "±" in figures:

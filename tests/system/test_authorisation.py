@@ -1,4 +1,4 @@
-"""Every route and every RPC, asked by everybody: what docs/authorisation.md says is what the coordinator answers."""
+"""Every route and every RPC, asked by everybody: what docs/reference/authorisation.md says is what the coordinator answers."""
 
 import hashlib
 import http.client
@@ -245,7 +245,7 @@ def test_rpcs_answer_each_caller_as_the_table_says(door, caller):
 
 
 def test_the_page_says_what_the_table_says():
-    file = Path(ROOT / "docs/authorisation.md")
+    file = Path(ROOT / "docs/reference/authorisation.md")
     if os.environ.get("LIGHTSHAFT_UPDATE_DOCS"):
         file.write_text(page())
     assert file.read_text() == page(), "LIGHTSHAFT_UPDATE_DOCS=1 pytest tests/system/test_authorisation.py writes it anew"

@@ -51,7 +51,7 @@ def test_a_hungry_worker_ends_neither_redis_nor_the_coordinator():
     worker = SERVICES["worker"]
     variable = re.fullmatch(r"\$\{(\w+):-(\d+)g\}", worker["mem_limit"])
 
-    assert variable and int(variable[2]) >= 2 and variable[1] in (ROOT / "docs" / "operations.md").read_text()
+    assert variable and int(variable[2]) >= 2 and variable[1] in (ROOT / "docs" / "guide" / "operations.md").read_text()
     assert worker["memswap_limit"] == worker["mem_limit"], "no swap besides"
     assert worker["oom_score_adj"] > max(SERVICES[name].get("oom_score_adj", 0) for name in ("redis", "coordinator"))
     # Docker's client of docker-compose 1.29 takes an int only, and a variable's value is text.

@@ -1,4 +1,4 @@
-"""README's table of figures is that of the races in docs/benchmarks, and its means and intervals are right."""
+"""README's table of figures is that of the races in docs/measurements/benchmarks, and its means and intervals are right."""
 
 import csv
 import math

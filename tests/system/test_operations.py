@@ -1,4 +1,4 @@
-"""What docs/operations.md promises: metrics and the dashboard that shows them, logs, webhooks, backup and restore."""
+"""What docs/guide/operations.md promises: metrics and the dashboard that shows them, logs, webhooks, backup and restore."""
 
 import hashlib
 import hmac
@@ -84,7 +84,7 @@ def test_units_of_a_cancelled_job_are_counted_under_a_cause_that_is_documented(f
     farm.request("PATCH", f"/api/v1/jobs/{job}", b'{"state": "cancelled"}')
 
     freed = {cause: count for name, count in metrics(farm).items() for cause in re.findall(r'units_freed_total\{cause="(.*)"', name)}
-    (row,) = [line for line in (ROOT / "docs" / "operations.md").read_text().splitlines() if line.startswith("| `lightshaft_units_freed_total{cause}`")]
+    (row,) = [line for line in (ROOT / "docs" / "guide" / "operations.md").read_text().splitlines() if line.startswith("| `lightshaft_units_freed_total{cause}`")]
     assert freed["job ended"] > 0
     assert set(re.findall(r"`([a-z ]+)`", row.split("|")[2])) == set(freed), "documented are those that there are"
 

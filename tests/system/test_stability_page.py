@@ -26,7 +26,7 @@ def write_page(folder, *tables):
         files[-1].write_text(json.dumps(table))
     docs = folder / "docs"
     run = subprocess.run([sys.executable, "-B", ROOT / "scenes" / "validate" / "stability_page.py", *files, docs], capture_output=True, text=True)
-    return run, docs / "stability.md"
+    return run, docs / "measurements" / "stability.md"
 
 
 def test_the_page_names_the_build_the_class_and_the_seed(tmp_path):

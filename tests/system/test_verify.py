@@ -163,7 +163,7 @@ def test_a_seal_made_anew_does_not_hide_an_error_once_all_tiles_are_rendered(lay
         code, said = verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")
 
         assert code == 1 and f"not as sealed: header lightshaft:{name}\n" in said and "6 of 6 tiles are as sealed" in said
-    # What no rendering can tell again is no safer than the seal: docs/error.md says so.
+    # What no rendering can tell again is no safer than the seal: docs/guide/verify.md says so.
     forged = resealed({**header, "lightshaft:seconds": ("string", b"0.001")}, rows)
     assert verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")[0] == 0
 

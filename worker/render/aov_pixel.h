@@ -1,4 +1,4 @@
-// The AOVs of a pixel while its samples are rendered. What each is exactly: docs/aovs.md.
+// The AOVs of a pixel while its samples are rendered. What each is exactly: docs/reference/aovs.md.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // Which optional parts of the renderer this build has: all of them. Only the experiment behind
-// docs/leave-out.md builds without some (cmake -DLIGHTSHAFT_WITHOUT=grids,textures), to see what their
-// presence costs a scene that does not use them; such a build refuses scenes that do.
+// docs/measurements/leave-out.md builds without some (cmake -DLIGHTSHAFT_WITHOUT=grids,textures), to see what
+// their presence costs a scene that does not use them; such a build refuses scenes that do.
 #pragma once
 
 #include <string_view>

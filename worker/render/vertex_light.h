@@ -1,7 +1,7 @@
 // The default strategy of path.h for light in media: (1) next-event estimation at each vertex, and (3)
 // next-event estimation at points placed equi-angularly about the light on each segment: in homogeneous media
 // about every light with a place; in grids, on the part of a segment that has any density, about lights
-// without an extent (docs/decisions/0011).
+// without an extent (docs/decisions/0011-equi-angular-points-in-grids.md).
 // With (2), directions from the phase function that hit a light: for a vertex at distance t of a segment, (1)
 // and (2) share the density f(t) of free flight and (3) has e(t); with p_l, p_s the solid-angle densities of
 // light and direction sampling the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only

@@ -307,7 +307,7 @@ def exceptions_are_files(tree):
 
 # Numbers that decide pixels: named constants of the renderer, and literals that have no name and either an exponent or a
 # value of .01 or less. (Larger ones, such as .5, are nearly always arithmetic.) Grids' file formats are not pixels.
-CONSTANTS_PAGE = "docs/constants.md"
+CONSTANTS_PAGE = "docs/reference/constants.md"
 DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb[/_])")
 NAMED_NUMBER = re.compile(r"\bconstexpr\s+(?:static\s+)?(?:float|double|int|std::\w+)\s+(k[A-Z]\w*)\s*(?:\[|=)")
 BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+|0?\.0(?:10*|0\d*[1-9]\d*))f?\b")

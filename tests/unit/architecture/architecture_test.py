@@ -130,7 +130,7 @@ class Rules(unittest.TestCase):
     def test_constants(self):
         page = "| `a.h` `b.h` | `kDepth` `1e-7` | why |\n| `gone.h` | `kOld` | why |\n"
         self.assert_finds(architecture.constants_are_listed, {
-            "docs/constants.md": page, "worker/render/vdb/c.cpp": "constexpr int kMany = 5;", "worker/agent/d.cpp": "x = 1e-9;",
+            "docs/reference/constants.md": page, "worker/render/vdb/c.cpp": "constexpr int kMany = 5;", "worker/agent/d.cpp": "x = 1e-9;",
             "worker/render/a.h": "inline constexpr float kDepth = 4;  // 1e-3\nif (x < 1e-7f) y = .5f;",
             "worker/render/b.h": "constexpr double kNew = 1e-30;\nstatic constexpr std::size_t kDepth = 1;\nx += 0x1p-20f; y = 1e-7;\n"
                                  "z = std::max(.001f, x) + .02 + .25f + 0.0 + .05;  // .002\nfmt(\"0.003\");"},

@@ -1,7 +1,7 @@
 // The table of `lightshaft validate` is asked of broken renderers: every case must fail for one that renders
 // black and for one that renders everything twice as bright. Cases that cannot see one of them are listed
 // here, each with a case that stands in for it. Renderers that drop a single term: tests/mutation,
-// docs/validate.md.
+// docs/design/validation.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -9,8 +9,8 @@ constexpr int kHours = 12;
 constexpr int kHours = 96;
 #endif
 
-// docs/soak.md has thirty days: tests/bench/month.cpp. The sizes are looked at every hour; what is in flight
-// scatters, by less than half of the largest value of many hours.
+// docs/measurements/soak.md has thirty days: tests/bench/month.cpp. The sizes are looked at every hour; what
+// is in flight scatters, by less than half of the largest value of many hours.
 TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
   Month month(1);
   std::map<std::string, std::pair<std::size_t, std::size_t>> most;  // of the first and of the second half

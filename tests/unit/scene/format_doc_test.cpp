@@ -12,7 +12,7 @@ namespace ls {
 namespace {
 
 TEST(SceneFormatPage, IsWhatTheTableSays) {
-  const std::string path = LS_SOURCE_DIR "/docs/scene-format.md";
+  const std::string path = LS_SOURCE_DIR "/docs/reference/scene-format.md";
   if (std::getenv("LIGHTSHAFT_UPDATE_DOCS")) std::ofstream(path) << scene_format_markdown();
   std::ifstream in(path);
   const std::string committed{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

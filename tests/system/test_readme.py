@@ -1,0 +1,66 @@
+"""README's shell blocks do what README says.
+
+Every ```sh block is run as it stands, one after the other in one shell as a reader would, in a folder that looks like a
+checkout with the demo's farm running: build/demo/data is the data of a farm of this test, build/release/bin the programs under
+test. One block is not run: the one of deploy/demo.sh and tests/run.sh, which install packages, build for minutes and run this
+very test. Of those two only this is checked: the scripts are there, may be executed, and their own list of flags (the comment
+at their top, and the usage that an unknown flag prints) has each flag that README names.
+"""
+
+import os
+import re
+import subprocess
+
+import exr_layers
+import pytest
+from local_farm import PATIENCE, ROOT
+
+README = (ROOT / "README.md").read_text()
+SCRIPTS = ("deploy/demo.sh", "tests/run.sh")  # not run here
+BLOCKS = re.findall(r"^```sh\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+RUN = [block for block in BLOCKS if not any(script in block for script in SCRIPTS)]
+
+
+def test_every_block_is_marked_as_one_of_the_shell():
+    assert README.count("\n```") == 2 * len(BLOCKS), "a block of README is not marked ```sh, so that nobody runs it"
+    assert len(RUN) == len(BLOCKS) - 1, "only the block of the two scripts is not run"
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_scripts_are_there_and_know_their_flags(script):
+    path = ROOT / script
+    named = {flag for part in re.findall(rf"{re.escape(script)}[^`\n]*", README) for flag in re.findall(r"--[a-z-]+", part)}
+
+    usage = subprocess.run([path, "--no-such-flag"], cwd=ROOT, capture_output=True, text=True)
+
+    assert os.access(path, os.X_OK)
+    assert named and usage.returncode == 2
+    described = "\n".join(line for line in path.read_text().splitlines()[:12] if line.startswith("#"))
+    for flag in named:
+        assert flag in usage.stderr and flag in described, f"README names {script} {flag}"
+
+
+@pytest.mark.slow
+def test_the_blocks_run_as_they_stand(farm, tmp_path):
+    checkout = tmp_path / "checkout"
+    (checkout / "build" / "demo").mkdir(parents=True)
+    (checkout / "build" / "release").mkdir()
+    (checkout / "build" / "demo" / "data").symlink_to(farm.data)
+    (checkout / "build" / "release" / "bin").symlink_to(farm.bin)
+    farm.add_worker(fake=False)
+    farm.wait_for_workers(1)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("LIGHTSHAFT_")}
+
+    run = subprocess.run(["bash", "-euo", "pipefail", "-c", "\n".join(RUN)], cwd=checkout, env=environment, stdin=subprocess.DEVNULL,
+                         capture_output=True, text=True, timeout=PATIENCE)
+
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert (checkout / "ball.png").read_bytes().startswith(b"\x89PNG")
+    of_the_farm, of_one_process = (exr_layers.read(checkout / name)[0] for name in ("ball.exr", "alone.exr"))
+    assert of_the_farm == of_one_process, "README: to the same pixels"
+    assert any(value > 0 for row in of_the_farm["R"] for value in row)
+
+
+def test_it_is_short():
+    words = re.sub(r"<!-- the table.*?<!-- end of the table -->", "", README, flags=re.DOTALL).split()
+    assert len(README.splitlines()) <= 120 and len(words) <= 900
