@@ -6,15 +6,14 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "cli/commands.h"
-#include "cli/local_farm.h"
-#include "cli/say.h"
+#include "cli/commands/commands.h"
+#include "cli/local/local_farm.h"
+#include "cli/output/console.h"
 #include "common/base/log.h"
 
 namespace {
 
-// What happens inside is told by the commands; the log of coordinator and worker is for those who look for a
-// fault.
+// Commands report what matters; the log of coordinator and worker is for debugging.
 void set_log_level() {
   const char* level = std::getenv("LIGHTSHAFT_LOG");
   const std::string_view wanted = level ? level : "off";

@@ -52,11 +52,11 @@ function(ls_seldom_run target)
   endif()
 endfunction()
 
-# ls_library(NAME DIR... [LINK libs...]): a static library of all .cpp files right under this folder.
+# ls_library(NAME [SOURCES files...] [LINK libs...]): a static library of all .cpp files in this folder and its rooms.
 function(ls_library name)
   cmake_parse_arguments(ARG "" "" "LINK;SOURCES" ${ARGN})
   if(NOT ARG_SOURCES)
-    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp ${CMAKE_CURRENT_SOURCE_DIR}/*/*.cpp)
   endif()
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
@@ -67,21 +67,29 @@ function(ls_library name)
   endif()
 endfunction()
 
-# ls_test(NAME [LOOPS] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files right under this folder.
-# LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label.
+# ls_test(NAME [LOOPS] [BOTH] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
+# LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label. Unit tests that a
+# whole test run asks under AddressSanitizer (asan) are not asked again in the release build, which has the label `release`
+# for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised.
 function(ls_test name)
-  cmake_parse_arguments(ARG "LOOPS" "" "LINK;LABELS;SOURCES" ${ARGN})
+  cmake_parse_arguments(ARG "LOOPS;BOTH" "" "LINK;LABELS;SOURCES" ${ARGN})
+  if("unit" IN_LIST ARG_LABELS AND (ARG_BOTH OR NOT "asan" IN_LIST ARG_LABELS))
+    list(APPEND ARG_LABELS release)
+  endif()
   if(NOT ARG_SOURCES)
-    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp ${CMAKE_CURRENT_SOURCE_DIR}/*/*_test.cpp)
   endif()
   if(ARG_SOURCES)
     add_executable(${name} ${ARG_SOURCES})
     target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main GTest::gmock ls_flags)
     # What is tested keeps its own flags. A test's own code is compiled at -O0, in three quarters of the time of -O1.
-    if(ARG_LOOPS)
+    if(ARG_LOOPS AND NOT LIGHTSHAFT_SANITIZE)
       target_compile_options(${name} PRIVATE -O1)
     else()
       target_compile_options(${name} PRIVATE -O0)
+    endif()
+    if(LIGHTSHAFT_SANITIZE MATCHES undefined)
+      target_compile_options(${name} PRIVATE -fno-sanitize=undefined)  # of the tests' own code; a third of its compile time
     endif()
     add_test(NAME ${name} COMMAND ${name})
     set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 1200)

@@ -21,14 +21,14 @@
 #include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/log.h"
-#include "coordinator/http/api.h"
-#include "coordinator/http/server.h"
-#include "coordinator/http/throttle.h"
-#include "coordinator/http/tls_identity.h"
-#include "coordinator/http/token_file.h"
+#include "coordinator/http/api/api.h"
+#include "coordinator/http/auth/throttle.h"
+#include "coordinator/http/auth/token_file.h"
+#include "coordinator/http/net/http_server.h"
+#include "coordinator/http/net/tls_identity.h"
 #include "coordinator/options.h"
-#include "coordinator/rpc/server.h"
-#include "coordinator/service.h"
+#include "coordinator/rpc/rpc_server.h"
+#include "coordinator/service/coordinator.h"
 #include "coordinator/tls/tls_files.h"
 #include "coordinator/webhooks/webhooks.h"
 
@@ -42,7 +42,7 @@ namespace fs = std::filesystem;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Held for the life of the process: two coordinators on one folder would destroy each other's work.
+// Held until the process ends: two coordinators on one folder would destroy each other's work.
 Result<int> lock_folder(const fs::path& folder) {
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -62,7 +62,7 @@ Result<int> lock_folder(const fs::path& folder) {
   return fd;
 }
 
-// A connection or a worker each needs a file: take what the system allows.
+// Every connection needs a file descriptor: raise the limit to what the system allows.
 void raise_file_limit() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
@@ -70,7 +70,7 @@ void raise_file_limit() {
   ::setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// For scripts and tests that asked for port 0. Renamed into place: whoever sees the file sees all of it.
+// For scripts and tests that use port 0. Renamed into place, so that readers see the whole file.
 Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   const fs::path aside = folder / "ports.json.new", file = folder / "ports.json";
   std::ofstream out(aside, std::ios::trunc);
@@ -82,8 +82,8 @@ Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   return {};
 }
 
-// Partials and films of 100 KB to some MB come and go many times a second: given back to the system each
-// time, every one of them would be paid for with page faults again.
+// Partials and films of 100 KB to some MB are allocated many times a second: returning them to the system
+// each time would cost page faults again and again.
 void keep_freed_memory() {
   ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
@@ -91,7 +91,7 @@ void keep_freed_memory() {
 
 fs::path secrets_of(const Flags& flags) { return flags.secrets.empty() ? flags.data : flags.secrets; }
 
-// Nothing: no TLS was asked for.
+// nullopt: TLS was not requested.
 Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
   const bool brought = !flags.tls_ca.empty();
   if (!brought && !flags.tls) return std::nullopt;
@@ -102,7 +102,7 @@ Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
   return std::move(*texts);
 }
 
-// Off this machine, what is not encrypted can be read and changed on the way, tokens first.
+// On a network, plain traffic can be read and changed, tokens first of all.
 void warn_of_open_lines(const std::string& address, std::string_view what) {
   const std::string host = address.substr(0, address.rfind(':'));
   if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
@@ -114,7 +114,7 @@ std::string with_port(const std::string& address, int port) {
   return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
 }
 
-// The receivers are the operator's alone; what they are told is signed with DIR/webhook-secret.
+// Only the operator names receivers; notifications are signed with DIR/webhook-secret.
 Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinator::Coordinator& coordinator,
                                                                   const Flags& flags, const fs::path& data) {
   if (flags.webhooks.empty()) return nullptr;
@@ -127,7 +127,7 @@ Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinato
                                                         std::make_shared<ls::SystemClock>(), unix_time});
 }
 
-// As many wrong join tokens of an address as HTTP takes of other ones.
+// Limits wrong join tokens per address as HTTP limits other wrong tokens.
 ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   const double a_minute = limits.wrong_tokens_per_minute;
   const auto throttle = std::make_shared<ls::http::Throttle>(
@@ -155,8 +155,8 @@ sigset_t block_signals() {
 
 Result<void> serve(const Flags& flags, const sigset_t& signals) {
   const fs::path data = flags.data;
-  // The port first: one that is taken is told before anything is touched. Connections wait until all is
-  // ready.
+  // The port first: if it is taken, this is reported before anything is changed. Connections wait until all
+  // is ready.
   auto http = ls::http::Server::listen(flags.http);
   if (!http) return tl::unexpected(http.error());
   if (auto lock = lock_folder(data); !lock) return tl::unexpected(lock.error());
@@ -164,8 +164,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   fs::remove(data / "ports.json", ignored);
   const fs::path secrets = secrets_of(flags);
   fs::create_directories(secrets, ignored);
-  std::optional<ls::http::FolderLock> others(secrets);  // that begin with the same folder at the same time
-  auto tokens = ls::http::TokenBook::open(secrets);
+  // Against coordinators that start with the same folder at the same time
+  std::optional<ls::http::FolderLock> others(secrets);
+  auto tokens = ls::http::TokenRegistry::open(secrets);
   if (!tokens) return tl::unexpected(tokens.error());
   const auto tls = tls_of(flags);
   if (!tls) return tl::unexpected(tls.error());
@@ -184,7 +185,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
     warn_of_open_lines(flags.http, "HTTP");
     warn_of_open_lines(flags.grpc, "the workers' port");
   }
-  const auto may_join = [book = tokens->get()](std::string_view token) { return book->may_join(token); };
+  const auto may_join = [registry = tokens->get()](std::string_view token) {
+    return registry->may_join(token);
+  };
 
   ls::coordinator::Coordinator::Options options;
   options.data = data;

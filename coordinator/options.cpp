@@ -9,8 +9,7 @@ namespace {
 
 constexpr int kUsage = 2;
 
-// How the HTTP door treats slow and greedy clients: for the config file, where an operator may need it and
-// tests do.
+// Limits of the HTTP server for slow and greedy clients: hidden options for the config file and tests.
 void add_limits(CLI::App& app, http::Limits& limits) {
   const auto hidden = [&app](const char* name, auto& value, double least) {
     app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
@@ -31,7 +30,7 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// What is lent at once (docs/design/scheduling.md).
+// Limits on what is leased at the same time (docs/design/scheduling.md).
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
@@ -94,7 +93,7 @@ void add_files(CLI::App& app, Flags& flags) {
                  "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
 }
 
-// Others must reach what this one writes, or they could take over nothing.
+// Others must be able to read what this coordinator writes, or they could not take anything over.
 Result<void> check_shared(const Flags& flags) {
   if (!flags.shared) return {};
   if (flags.store == "sqlite" || flags.blobs.empty())

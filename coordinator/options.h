@@ -1,4 +1,4 @@
-// The command line of lightshaft-coordinator, and its config file.
+// Command line and config file of lightshaft-coordinator.
 #pragma once
 
 #include <optional>
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/base/log.h"
-#include "coordinator/http/limits.h"
-#include "coordinator/service.h"
+#include "coordinator/http/message/limits.h"
+#include "coordinator/service/coordinator.h"
 
 namespace ls::coordinator {
 
@@ -23,8 +23,8 @@ struct Flags {
   std::string blobs;
   bool shared = false;
   std::string public_http, public_grpc;
-  std::string secrets;  // folder of tokens and TLS; empty: --data
-  // Not given: 24, and nothing is removed of a store that others may share.
+  std::string secrets;  // folder of tokens and TLS files; empty: --data
+  // nullopt: 24 hours, or for good if the blob store may be shared
   std::optional<double> keep_unused_hours;
   std::vector<std::string> webhooks;
   LogFormat log_format = LogFormat::text;
@@ -34,7 +34,7 @@ struct Flags {
   bool allow_fake = false;
 };
 
-// The exit code instead, when there is nothing to run (help) or the usage is wrong (2, said on stderr).
+// Returns the exit code if there is nothing to run: 0 for help, 2 for wrong usage (reported on stderr).
 std::variant<Flags, int> parse_flags(int argc, char** argv);
 
 }  // namespace ls::coordinator

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "common/base/error.h"
-#include "common/image/frame.h"
-#include "common/image/rounds.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "proto/convert.h"
 
 namespace ls::wire {

@@ -123,7 +123,9 @@ Result<Health> health_from(const pb::UnitResult& in) {
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
   // Of a program that knows no causes.
-  const auto rest = [](std::uint64_t told, std::uint64_t named) { return told > named ? told - named : 0; };
+  const auto rest = [](std::uint64_t stated, std::uint64_t named) {
+    return stated > named ? stated - named : 0;
+  };
   health->add(HealthCause::unnamed, rest(in.nonfinite(), health->nonfinite));
   health->add(HealthCause::negative, rest(in.negative(), health->negative));
   health->add(HealthCause::majorant_violation, rest(in.majorant_violations(), health->majorant_violations));

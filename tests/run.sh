@@ -112,12 +112,12 @@ waiting_lane() {
 
 computing_lane() {
   renice -n 5 "$BASHPID" >/dev/null  # what waits has short turns, and limits to its patience
-  step "release build: tests" build release
-  step "unit and architecture tests" run_ctest release unit unit
+  step "release build: tests" build release tests-release tests-statistical
+  step "unit and architecture tests" run_ctest release release unit
   step "statistical tests" run_ctest release statistical statistical
-  step "AddressSanitizer build" build asan tests-asan lightshaft lightshaft-coordinator lightshaft-worker
+  step "AddressSanitizer build" build asan tests-asan lightshaft-coordinator lightshaft-worker
   step "AddressSanitizer: unit tests" run_ctest asan asan unit-asan
-  LIGHTSHAFT_BIN="$PWD/build/asan/bin" step "AddressSanitizer: a farm" run_pytest farm-asan tests/system -m sanitized
+  LIGHTSHAFT_CLI="$LIGHTSHAFT_BIN/lightshaft" LIGHTSHAFT_BIN="$PWD/build/asan/bin" step "AddressSanitizer: a farm" run_pytest farm-asan tests/system -m sanitized
   step "ThreadSanitizer build" build tsan tests-tsan
   step "ThreadSanitizer: unit tests" run_ctest tsan tsan threads-tsan
 }

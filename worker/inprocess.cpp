@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "common/base/clock.h"
-#include "common/scene/integrators.h"
-#include "common/scene/needs.h"
-#include "common/scene/serialize.h"
-#include "worker/resident.h"
+#include "common/scene/analysis/needs.h"
+#include "common/scene/json/serialize.h"
+#include "common/scene/schema/integrators.h"
+#include "worker/agent/resident.h"
 
 namespace ls::worker {
 namespace {
@@ -24,15 +24,15 @@ double thread_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// invalid_argument is the scene's fault; anything else (memory, a file that cannot be read here) may go well
-// elsewhere.
+// invalid_argument is the scene's fault; anything else (memory, an unreadable file) may succeed on another
+// machine.
 tl::unexpected<UnitFailure> failed(const Error& error) {
   return tl::unexpected<UnitFailure>(
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// The coordinator chose what to send and this worker chooses what to leave out: both by the same rules, or
-// not at all.
+// The coordinator decides by these needs which files to send, and this worker which to leave out: both must
+// use the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =

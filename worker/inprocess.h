@@ -1,10 +1,10 @@
-// A backend over the renderer in this very process: what the render child serves, and what `lightshaft
-// render` uses directly.
+// A backend that renders in this process: served by the render child, and used directly by `lightshaft
+// render`.
 #pragma once
 
 #include <memory>
 
-#include "worker/backend.h"
+#include "worker/agent/backend.h"
 
 namespace ls::worker {
 

@@ -1,4 +1,4 @@
-// What a worker finds out about the machine that it runs on.
+// Properties of the machine that the worker runs on.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 namespace ls::worker {
 
 std::string host_name();
-int usable_cpus();                      // that this process may run on
-std::uint64_t usable_memory_bytes();    // of the machine, or of our control group if that is less
-std::filesystem::path default_cache();  // XDG_CACHE_HOME or ~/.cache, or the system's temporary folder
-void raise_file_limit();                // an open file for each blob in use
+int usable_cpus();                      // available to this process
+std::uint64_t usable_memory_bytes();    // of the machine, or of our control group if less
+std::filesystem::path default_cache();  // XDG_CACHE_HOME or ~/.cache, or else the system's temporary folder
+void raise_file_limit();                // for one open file per blob in use
 
 }  // namespace ls::worker

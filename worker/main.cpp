@@ -12,15 +12,15 @@
 #include "worker/agent/agent.h"
 #include "worker/agent/link_ring.h"
 #include "worker/cache/cache.h"
-#include "worker/child/cage.h"
 #include "worker/child/child.h"
+#include "worker/child/sandbox.h"
 #include "worker/child/serve.h"
 #include "worker/client/client.h"
 #include "worker/machine.h"
 #include "worker/options.h"
 #ifdef LIGHTSHAFT_RENDERER
 #include "worker/inprocess.h"
-#include "worker/render/thread_limit.h"
+#include "worker/render/base/thread_limit.h"
 #endif
 
 namespace {
@@ -36,12 +36,12 @@ std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& optio
 
 int run_child(const worker::Options& options) {
   worker::child::confine(options.memory_limit);
-  const auto caged = worker::child::shut_in({options.cache});
-  if (!caged.calls || !caged.files)
+  const auto sandboxed = worker::child::enter_sandbox({options.cache});
+  if (!sandboxed.calls || !sandboxed.files)
     log_warn("",
              fmt::format("this kernel cannot keep the renderer from {}: take care whose scenes it renders",
-                         caged.files ? "opening sockets" : "files that are not a scene's"));
-  else if (!caged.sizes)
+                         sandboxed.files ? "opening sockets" : "files that are not a scene's"));
+  else if (!sandboxed.sizes)
     log_warn("",
              "this kernel (before Linux 6.2) cannot keep the renderer from cutting cached files short: take "
              "care whose scenes it renders");
@@ -57,11 +57,11 @@ int failed(const Error& error) {
   return 1;
 }
 
-// The first SIGTERM or SIGINT drains, the second one stops at once.
+// The first SIGTERM or SIGINT drains, the second stops at once.
 void obey_signals(worker::Agent& agent, const sigset_t& signals) {
   int signal = 0;
   for (int count = 0; sigwait(&signals, &signal) == 0; ++count) {
-    if (signal == SIGUSR1) return;  // our own: the agent has ended
+    if (signal == SIGUSR1) return;  // sent by ourselves when the agent has ended
     count == 0 ? agent.drain() : agent.stop();
   }
 }
@@ -88,7 +88,7 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
         return link->fetch_blob(wanted, sink);
       });
   if (!cache) return failed(cache.error());
-  // After the cache: its folder is what the child may read, so it must be there.
+  // After the cache, because its folder, which the child may read, must exist.
   worker::ChildOptions child_options{.arguments = child_arguments(options),
                                      .slots = options.threads,
                                      .hang_limit = from_seconds(options.hang_seconds),
@@ -121,7 +121,7 @@ int main(int argc, char** argv) {
   const auto& options = std::get<ls::worker::Options>(parsed);
   log_format(options.log_format);
   if (options.render_child) return run_child(options);
-  // Blocked before any thread starts (gRPC's included), so that only obey_signals sees them.
+  // Blocked before any thread starts (including gRPC's), so that only obey_signals receives them.
   sigset_t signals;
   sigemptyset(&signals);
   for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);

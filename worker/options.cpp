@@ -16,8 +16,7 @@ namespace ls::worker {
 namespace {
 
 constexpr const char* kBuild = "lightshaft-worker " LIGHTSHAFT_VERSION;
-// Of the machine's memory, for the render child unless told otherwise: the system and the agent need the
-// rest.
+// Default share of the machine's memory for the render child; the system and the agent need the rest.
 constexpr double kMemoryShare = 0.9;
 
 struct Files {
@@ -142,7 +141,8 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
 std::vector<std::string> child_arguments(const Options& o) {
   std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads),
                                         "--memory-limit", std::to_string(o.memory_limit)};
-  if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});  // what it may read
+  // the folder that the child may read
+  if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});
   if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");
   arguments.insert(arguments.end(),

@@ -23,19 +23,20 @@ struct Options {
   std::string name;
   std::vector<std::string> tags;
   std::string join_token;
-  std::string tls_ca, tls_cert, tls_key;  // PEM texts; empty: nothing is encrypted
+  std::string tls_ca, tls_cert, tls_key;  // PEM texts; empty: no encryption
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;
-  std::string fake_class;  // another numeric class, named by the SHA-256 of this; empty: the usual one
+  std::string fake_class;  // uses the SHA-256 of this text as the numeric class; empty: the usual class
   LogFormat log_format = LogFormat::text;
-  bool render_child = false;  // this process is one; started by a worker only
+  bool render_child = false;  // this process is a render child; set by workers only
 };
 
-// The exit code instead, when there is nothing to run (help) or the usage is wrong (2, said on stderr).
+// Returns an exit code instead if there is nothing to run (help) or the usage is wrong (2, reported on
+// stderr).
 std::variant<Options, int> parse_options(int argc, char** argv);
 
-// What makes a child of this executable do the rendering of a worker with these options.
+// Arguments that make this executable a render child for a worker with these options.
 std::vector<std::string> child_arguments(const Options& options);
 
 }  // namespace ls::worker

@@ -1,4 +1,4 @@
-// Windows bitmaps as painting programs write them: 24 or 32 bits a pixel, neither packed nor with a palette.
+// Windows bitmaps as written by painting programs: 24 or 32 bits per pixel, uncompressed, without a palette.
 #include <fmt/format.h>
 
 #include "common/assets/bytes.h"
@@ -7,7 +7,7 @@
 namespace ls {
 namespace {
 
-// The parts of the two headers that matter, in their order.
+// The relevant fields of the two headers, in order.
 struct BmpHeader {
   std::uint32_t pixels_at = 0;
   std::int32_t width = 0, height = 0;  // rows from the bottom; from the top if the height is negative

@@ -1,4 +1,4 @@
-// Reading numbers from bytes that nobody vouches for.
+// Reads numbers from untrusted bytes.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline std::string_view as_text(std::span<const std::byte> b) {
   return {reinterpret_cast<const char*>(b.data()), b.size()};
 }
 
-// A cursor that never passes the end: take() of more than is left gives nothing and stays where it is.
+// A bounds-checked cursor: take() of more than is left returns nullopt and does not advance.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> data) : data_(data) {}
@@ -47,7 +47,7 @@ class ByteReader {
   std::size_t position_ = 0;
 };
 
-// The next run of characters that are not blank, cut off the front of `line`; empty at its end.
+// Cuts the next word (non-blank characters) off the front of `line`; empty at its end.
 inline std::string_view next_word(std::string_view& line) {
   const std::size_t a = line.find_first_not_of(" \t\r\v\f");
   if (a == line.npos) return line = {};
@@ -56,7 +56,7 @@ inline std::string_view next_word(std::string_view& line) {
   line.remove_prefix(b);
   return word;
 }
-// The text up to the next line feed, which is cut off with it.
+// Cuts the text up to and including the next line feed off the front; the line feed is not returned.
 inline std::string_view next_line(std::string_view& text) {
   const std::size_t n = std::min(text.find('\n'), text.size());
   const std::string_view line = text.substr(0, n);

@@ -1,5 +1,5 @@
-// What the decoders return, and the limits that hold for every file a scene names. Every size is checked
-// against a limit and against the bytes that are really there before anything is allocated.
+// Results of the decoders, and limits for every file that a scene names. Sizes are checked against a limit
+// and against the bytes present before anything is allocated.
 #pragma once
 
 #include <array>
@@ -23,24 +23,24 @@ inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 inline constexpr std::uint32_t kMaxGridSide = 1 << 13;
 inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 
-// What a mesh has of one name at each of its vertices, or triangles: one number or three.
+// A mesh attribute with one or three numbers per vertex or triangle.
 struct MeshAttribute {
   std::string name;  // "vertex_..." or "face_..."
   std::uint32_t components = 1;
-  bool bytes = false;         // from 0 to 255 in the file, and so here
+  bool bytes = false;         // values are 0 to 255, as in the file
   std::vector<float> values;  // components interleaved
 };
 
-// A triangle mesh. Three floats a vertex in positions and (if the file has any) normals, two in uvs; three
-// indices a triangle, all below vertex_count(). uvs are as in the file.
+// A triangle mesh. Three floats per vertex in positions and (if the file has any) normals, two in uvs; three
+// indices per triangle, all below vertex_count(). uvs are as in the file.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;  // the file wants its triangles flat
+  bool face_normals = false;  // the file asks for flat triangles
   std::uint64_t dropped_triangles =
-      0;  // of zero area or with a vertex that is not finite; none of them in indices
-  std::vector<MeshAttribute> attributes;     // those that were asked for
-  std::vector<std::string> attribute_names;  // all that the file has
+      0;  // triangles of zero area or with a non-finite vertex; left out of indices
+  std::vector<MeshAttribute> attributes;     // the requested ones
+  std::vector<std::string> attribute_names;  // all names in the file
 
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t triangle_count() const { return indices.size() / 3; }
@@ -57,15 +57,15 @@ struct ImageData {
   bool operator==(const ImageData&) const = default;
 };
 
-// A dense grid: x fastest, then y, then z, channels interleaved. All values finite and not negative.
+// A dense grid: x fastest, then y, then z, channels interleaved. All values are finite and not negative.
 struct GridData {
   std::uint32_t nx = 0, ny = 0, nz = 0, channels = 0;
   std::vector<float> values;
   std::array<float, 3> bbox_min{0, 0, 0}, bbox_max{1, 1, 1};
-  std::uint64_t negatives = 0;  // values below zero in the file: set to 0
+  std::uint64_t negatives = 0;  // values below zero in the file, set to 0
 };
 
-// The bytes of a file of at most `limit` bytes. `name` (as the scene writes it) is for messages.
+// Reads a file of at most `limit` bytes. `name` (as written in the scene) is for messages.
 Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name,
                                           std::uint64_t limit = kMaxAssetBytes);
 

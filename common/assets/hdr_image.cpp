@@ -19,7 +19,7 @@ struct HdrSize {
   std::uint32_t width = 0, height = 0;
 };
 
-// "-Y height +X width": rows from the top, the only orientation anybody writes.
+// "-Y height +X width": rows from the top, the only orientation in use.
 std::optional<HdrSize> resolution(std::string_view line) {
   const auto count = [](std::string_view w) -> std::uint32_t {
     std::uint32_t n = 0;
@@ -36,7 +36,8 @@ std::optional<HdrSize> resolution(std::string_view line) {
   return s;
 }
 
-// A row of four planes, each in runs: a length above 128 repeats one byte, one up to 128 copies that many.
+// A row of four planes, each run-length coded: a length above 128 repeats one byte, one up to 128 copies that
+// many.
 bool read_planes(ByteReader& r, std::vector<Rgbe>& row) {
   for (std::size_t plane = 0; plane < 4; ++plane)
     for (std::size_t x = 0; x < row.size();) {

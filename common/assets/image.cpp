@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/assets/bytes.h"
-#include "common/image/exr_file.h"
+#include "common/image/exr/exr_file.h"
 
 namespace ls {
 

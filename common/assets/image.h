@@ -1,5 +1,5 @@
-// PNG, JPEG, BMP, OpenEXR and Radiance HDR, told apart by their first bytes. An image of more than max_pixels
-// is refused (resource_exhausted) before memory is spent on it.
+// Decodes PNG, JPEG, BMP, OpenEXR and Radiance HDR, recognised by their first bytes. An image of more than
+// max_pixels is rejected (resource_exhausted) before memory is allocated for it.
 #pragma once
 
 #include <cstddef>
@@ -16,24 +16,25 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
 Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
-// One a format, for tests and for callers that know.
-// 1..16 bits, palette, alpha
+// Decoders of single formats, for tests and for callers that know the format.
+//
+// PNG: 1..16 bits, palette, alpha.
 Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// grey or colour, 8 bits
+// JPEG: grey or colour, 8 bits.
 Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file,
                               std::uint64_t max_pixels = kMaxImagePixels);
-// 24 and 32 bits, alpha left out
+// BMP: 24 and 32 bits; alpha is ignored.
 Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// R G B A, or Y; half and float
+// OpenEXR: R G B A, or Y; half and float.
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// RGBE
+// Radiance HDR: RGBE.
 Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
-// What they say of more than max_pixels.
+// Their error for more than max_pixels.
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
                                       std::uint64_t max_pixels);
 

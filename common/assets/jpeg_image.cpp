@@ -12,7 +12,7 @@ namespace ls {
 namespace {
 
 struct Failure {
-  jpeg_error_mgr base;  // first, so that the library's pointer to it is ours
+  jpeg_error_mgr base;  // first member, so that the library's pointer to it points to this struct
   std::jmp_buf escape;
   char message[JMSG_LENGTH_MAX];
 };
@@ -22,7 +22,7 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// The library mends truncated data with grey; for us a broken file is an error.
+// The library replaces missing data by grey; here a broken file is an error.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }
@@ -40,7 +40,7 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// No object with a destructor lives in these two: longjmp would skip it.
+// These two functions must not have objects with destructors, which longjmp would skip.
 bool read_header(Decoder& d, const unsigned char* data, unsigned long size) {
   if (setjmp(d.failure.escape)) return false;
   jpeg_create_decompress(&d.info);

@@ -59,7 +59,7 @@ class ObjReader {
     return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
   }
 
-  // N numbers, of which the first `needed` must be there; what follows (w, vertex colours) is not ours.
+  // Parses N numbers, of which the first `needed` are required; ignores what follows (w, vertex colours).
   template <std::size_t N>
   bool numbers(std::string_view line, std::vector<std::array<float, N>>& into, std::size_t needed) {
     std::array<float, N> a{};
@@ -69,7 +69,7 @@ class ObjReader {
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
       if (ec ==
-          std::errc::result_out_of_range)  // too small is 0; too large leaves a triangle that is dropped
+          std::errc::result_out_of_range)  // too small becomes 0; too large makes a triangle that is dropped
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())
         return complain(fmt::format("expected {} numbers, found '{}'", needed, w.substr(0, 40)));

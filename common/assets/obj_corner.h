@@ -1,4 +1,4 @@
-// A corner of a face of an OBJ file, and its place in a table.
+// A corner of a face of an OBJ file, and its hash.
 #pragma once
 
 #include <cstddef>
@@ -6,14 +6,14 @@
 
 namespace ls {
 
-// As written, from 0; -1: none.
+// Indices counted from 0; -1: none.
 struct Corner {
   std::int64_t v = -1, vt = -1, vn = -1;
   bool operator==(const Corner&) const = default;
 };
 
-// Which corners there are is the file's choice: with a secret, it cannot choose such as share a place. What a
-// mesh becomes does not depend on it: vertices are numbered as they appear.
+// Keyed by a secret, so that a file cannot choose corners whose hashes collide. The resulting mesh does not
+// depend on the secret: vertices are numbered in order of appearance.
 struct CornerHash {
   std::uint64_t secret = 0;
 

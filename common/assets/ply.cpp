@@ -40,14 +40,14 @@ const TypeName* type_named(std::string_view name) {
 struct Property {
   std::string_view name;
   const TypeName* type = nullptr;
-  const TypeName* count = nullptr;  // of a list; else null
+  const TypeName* count = nullptr;  // type of a list's length; null for other properties
 };
 struct Element {
   std::string_view name;
   std::uint64_t count = 0;
   std::vector<Property> properties;
 
-  // The fewest bytes that one of it can take.
+  // The least number of bytes that one element can take.
   std::uint64_t least_bytes(Coding c) const {
     if (c == Coding::ascii) return properties.size();
     std::uint64_t n = 0;
@@ -56,7 +56,7 @@ struct Element {
   }
 };
 
-// Where a vertex property goes: positions 0-2, normals 3-5, uvs 6-7; -1 nowhere.
+// Destination of a vertex property: positions 0-2, normals 3-5, uvs 6-7; -1: none.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -159,14 +159,14 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    for (const MeshAttribute& a : mesh_.attributes)  // of several elements 'face', say
+    for (const MeshAttribute& a : mesh_.attributes)  // the file may have several elements 'face', say
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
         return complain(fmt::format("not all of it has the attribute '{}'", a.name));
     return true;
   }
 
-  // The next number of the body; nothing at its end or if it is none.
+  // The next number of the body; nullopt at the end or if it is not a number.
   std::optional<double> number(const TypeName& t) {
     if (coding_ == Coding::ascii) {
       std::size_t a = rest_.find_first_not_of(" \t\r\n\v\f");
@@ -177,7 +177,7 @@ class PlyReader {
       const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
       if (ec == std::errc::invalid_argument) return std::nullopt;
       if (ec == std::errc::result_out_of_range)
-        v = 0;  // below or above what a double holds: no mesh means that
+        v = 0;  // outside the range of double: not a meaningful coordinate
       if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos)
         return std::nullopt;
       rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
@@ -305,9 +305,9 @@ class PlyReader {
     return true;
   }
 
-  // ---- attributes that are wanted: where each property of an element goes ----
+  // Requested attributes: the destination of each property of an element.
   struct Place {
-    int attribute = -1;  // of mesh_.attributes; -1 nowhere
+    int attribute = -1;  // index in mesh_.attributes; -1: none
     std::size_t component = 0;
   };
   std::vector<Place> attribute_places(const Element& e, std::string_view prefix) {
@@ -327,7 +327,7 @@ class PlyReader {
     }
     return places;
   }
-  // For one more vertex or face.
+  // Makes room for one more vertex or face.
   void make_room(const std::vector<Place>& places) {
     for (const Place& p : places)
       if (p.attribute >= 0 && p.component == 0) {
@@ -344,7 +344,7 @@ class PlyReader {
         static_cast<float>(decoded(p.type->type, *v));
     return true;
   }
-  // As Mitsuba 3.9: whole numbers are sRGB codes, all but bytes.
+  // As in Mitsuba 3.9: integers are sRGB codes, except bytes.
   static double decoded(Type t, double v) {
     constexpr std::pair<Type, double> kLargest[] = {{Type::i8, 127},
                                                     {Type::i16, 32767},
@@ -358,7 +358,7 @@ class PlyReader {
       }
     return v;
   }
-  // A face is as many triangles, which may be none.
+  // Repeats a face's attributes for each of its triangles, possibly none.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;
@@ -373,8 +373,8 @@ class PlyReader {
   std::string_view name_;
   std::span<const std::byte> file_;
   std::span<const std::string> wanted_;
-  ByteReader body_;        // what follows the header, binary
-  std::string_view rest_;  // the same, ascii
+  ByteReader body_;        // the bytes after the header, if binary
+  std::string_view rest_;  // the same, if ascii
   Coding coding_ = Coding::ascii;
   std::vector<Element> elements_;
   std::uint64_t vertex_count_ = 0;

@@ -24,7 +24,8 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// A run of properties of one prefix that continue a kind from its beginning.
+// Consecutive properties of one prefix whose last characters follow one of the known sequences from its
+// start.
 struct Run {
   std::string_view prefix;
   std::string_view kind;
@@ -60,7 +61,7 @@ std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names
       run = {prefix, *kind, {i}};
     } else if (run.properties.size() < 4 && run.kind[run.properties.size()] == name.back()) {
       run.properties.push_back(i);
-    } else {  // out of order: none of this name
+    } else {  // out of sequence: no attribute of this name
       done.insert(prefix);
       run = {};
     }

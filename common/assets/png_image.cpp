@@ -11,7 +11,7 @@ namespace ls {
 
 namespace {
 
-// What libpng's callbacks see. They must not throw: errors go back by longjmp, over plain data only.
+// Data for libpng's callbacks. They must not throw: errors return by longjmp, over plain data only.
 struct Source {
   const std::byte* data;
   std::size_t left;
@@ -43,7 +43,7 @@ struct PngShape {
   std::size_t row_bytes = 0;
 };
 
-// No object with a destructor lives in these two: longjmp would skip it.
+// These two functions must not have objects with destructors, which longjmp would skip.
 bool read_header(Png& p, PngShape& shape) {
   if (setjmp(png_jmpbuf(p.png))) return false;
   png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
@@ -82,8 +82,7 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   PngShape shape;
   if (!read_header(p, shape)) return bad(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 to 1 and a palette of one bit becomes four bytes: a file that claims more
-  // lies.
+  // Deflate packs at most 1032 to 1, and a palette of one bit expands to four bytes: larger claims are false.
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
     return bad("its size is not believable");

@@ -15,7 +15,7 @@ tl::unexpected<Error> bad_grid(std::string_view name, const std::string& text) {
   return fail(Errc::invalid_argument, fmt::format("'{}': {}", name, text));
 }
 
-// Without values.
+// Reads the header; the result has no values yet.
 Result<GridData> read_grid_header(std::string_view name, ByteReader& r, std::size_t size) {
   if (size < kHeader)
     return bad_grid(name,

@@ -1,6 +1,6 @@
 // Raw `.bin` grids, little endian: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box
-// in the world; nx ny nz float32 values, x fastest or (as some converters call "x-major") z fastest. The
-// values are nodes: the outermost ones lie on the faces of the box. Nothing comes after them.
+// in the world; nx ny nz float32 values, x fastest or (called "x-major" by some converters) z fastest. The
+// values are nodes: the outermost ones lie on the faces of the box. Nothing may follow.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace ls {
 
-// One channel. A value that is NaN or infinite is refused with its node; negative ones become 0 and are
-// counted. The result is x fastest, whatever the file is.
+// One channel. NaN and infinite values are rejected, naming the node; negative ones become 0 and are counted.
+// The result always has x fastest.
 Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byte> file, GridOrder order);
 Result<GridData> load_raw_grid(const std::filesystem::path& path, std::string_view name, GridOrder order);
 

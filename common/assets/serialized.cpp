@@ -1,5 +1,5 @@
-// The format is described in the documentation of Mitsuba's `serialized` shape. Version 3 differs in that
-// meshes have no names and the table at the end has offsets of 32 bits.
+// The format is described in the documentation of Mitsuba's `serialized` shape. In version 3 meshes have no
+// names, and the table at the end has 32-bit offsets.
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -26,8 +26,8 @@ enum Flags : std::uint32_t {
   kDouble = 0x2000  // else single precision
 };
 
-// A stream of zlib, unpacked as far as it is asked for: what a file claims to hold is never more in memory
-// than what was unpacked of it.
+// A zlib stream, unpacked on demand, so that memory use never exceeds the data actually unpacked, whatever
+// the file claims.
 class Inflater {
  public:
   explicit Inflater(std::span<const std::byte> data) : data_(data) { ok_ = inflateInit(&z_) == Z_OK; }
@@ -91,7 +91,7 @@ class SerializedReader {
     return false;
   }
 
-  // The bytes of the mesh from its packed part on; sets version_.
+  // The bytes of the mesh from its compressed part on; sets version_.
   std::optional<std::span<const std::byte>> find(int index) {
     if (!header(file_)) return std::nullopt;
     if (index == 0) return file_.subspan(4);
@@ -165,7 +165,7 @@ class SerializedReader {
     return false;
   }
 
-  // zlib packs by 1032 at most: counts beyond that are lies, told before memory is spent on them.
+  // zlib packs at most 1032 to 1: larger counts are false, and rejected before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

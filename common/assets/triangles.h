@@ -1,4 +1,4 @@
-// What both mesh readers do with a polygon.
+// Polygon handling shared by the mesh readers.
 #pragma once
 
 #include <cmath>
@@ -18,7 +18,7 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
       if (!std::isfinite(p[i][k])) return false;
     }
   double area2 = 0;
-  for (int k = 0; k < 3; ++k) {  // in double the products of float differences are far from underflow
+  for (int k = 0; k < 3; ++k) {  // in double, products of float differences cannot underflow
     const int u = (k + 1) % 3, v = (k + 2) % 3;
     const double n = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
     area2 += n * n;
@@ -26,8 +26,8 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
   return area2 > 0;
 }
 
-// The triangles (0, i, i + 1), those of no area or with a vertex that is not finite counted instead. Indices
-// are in range.
+// Adds the triangles (0, i, i + 1); counts instead those of zero area or with a non-finite vertex. Indices
+// must be in range.
 inline void add_polygon(MeshData& m, std::span<const std::uint32_t> corners) {
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     if (is_drawable(m, corners[0], corners[i], corners[i + 1]))

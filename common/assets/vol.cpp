@@ -17,7 +17,7 @@ std::size_t bytes_of(std::int32_t type) {
   return type == kFloat32 ? 4 : type == kFloat16 ? 2 : type == kUint8 ? 1 : 0;
 }
 
-float value(ByteReader& r, std::int32_t type) {  // the caller has checked that it is there
+float value(ByteReader& r, std::int32_t type) {  // the caller has checked that enough bytes are left
   if (type == kFloat32) return *r.take<float>();
   if (type == kUint8) return static_cast<float>(*r.take<std::uint8_t>()) / 255;
   Imath::half h;

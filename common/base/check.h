@@ -1,5 +1,5 @@
-// CHECK(cond, fmt, args...): a programming error ends the process with a message that names the values.
-// Active in release builds. Never for bad input: that gets an Error.
+// CHECK(cond, fmt, args...): a violated condition is a programming error and ends the process with a message
+// that names the values. Active in release builds. Not for bad input, which yields an Error.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Time as an argument: nothing outside main() and SystemClock reads a clock.
+// Time is passed as an argument: only main() and SystemClock read a clock.
 #pragma once
 
 #include <chrono>
@@ -6,7 +6,7 @@
 namespace ls {
 
 using Duration = std::chrono::nanoseconds;
-// Monotonic; its zero means nothing across processes.
+// Monotonic; not comparable between processes.
 using TimePoint = std::chrono::time_point<std::chrono::steady_clock, Duration>;
 
 class Clock {
@@ -22,7 +22,7 @@ class SystemClock final : public Clock {
   }
 };
 
-// Moves only when told to; for tests and simulation.
+// Advances only on request; for tests and simulation.
 class FakeClock final : public Clock {
  public:
   TimePoint now() const override { return now_; }

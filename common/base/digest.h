@@ -1,4 +1,4 @@
-// SHA-256 digests: the names of blobs, scenes, settings, units and pixels.
+// SHA-256 digests: they identify blobs, scenes, settings, units and pixels.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct Digest {
   std::array<std::uint8_t, 32> bytes{};
 
   std::string hex() const;                                   // 64 lower-case hexadecimal digits
-  static std::optional<Digest> parse(std::string_view hex);  // exactly 64 digits, else nothing
+  static std::optional<Digest> parse(std::string_view hex);  // nullopt unless exactly 64 digits
   auto operator<=>(const Digest&) const = default;
 };
 

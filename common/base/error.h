@@ -1,5 +1,5 @@
-// Errors as values. Every fallible function returns Result<T>; exceptions do not cross a folder boundary.
-// The message is for the person who must act: what happened, where, what to do.
+// Errors as values. Every fallible function returns Result<T>; exceptions do not cross a folder boundary. The
+// message is for the person who must act: what happened, where, and what to do.
 #pragma once
 
 #include <string>
@@ -9,17 +9,17 @@
 
 namespace ls {
 
-// The gRPC codes that we use; one table each maps them to gRPC and to HTTP.
+// The gRPC codes in use; one table each maps them to gRPC and to HTTP.
 enum class Errc {
   invalid_argument,  // the input is wrong; sending it again will not help
   not_found,         // no such job, blob, worker, file
   already_exists,
-  failed_precondition,  // right input, wrong state (cancelled job, other numeric class)
+  failed_precondition,  // valid input, but the wrong state (cancelled job, other numeric class)
   resource_exhausted,   // a limit or a full disk
   permission_denied,
   unauthenticated,
   unavailable,  // try again later
-  internal,     // a bug of ours
+  internal,     // a bug of this program
 };
 
 struct Error {

@@ -1,5 +1,5 @@
-// The frames of a sequence: "1-10", "1-10x2" (every second one), "7". And what a frame's number does to the
-// names of files: a run of # stands for it, zero-padded to the run's length.
+// The frames of a sequence: "1-10", "1-10x2" (every second one), "7". In file names a run of # stands for the
+// frame number, zero-padded to the run's length.
 #pragma once
 
 #include <cstdint>
@@ -25,13 +25,13 @@ struct FrameRange {
   bool operator==(const FrameRange&) const = default;
 };
 
-// invalid_argument: what was given, what is right and which limit it breaks.
+// invalid_argument: the message has the text, the correct syntax and any limit exceeded.
 Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 
 // "fog.####.vdb" of frame 7 is "fog.0007.vdb"; every run of # is replaced. A number longer than its run is
 // written in full.
 std::string numbered(std::string_view name, std::uint32_t frame);
-bool has_frame_number(std::string_view name);  // is there a # in it?
+bool has_frame_number(std::string_view name);  // true if it contains a #
 
 }  // namespace ls

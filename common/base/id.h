@@ -1,4 +1,4 @@
-// Typed identifiers, so that a job can't be passed where a worker is meant.
+// Typed identifiers, so that a job cannot be passed in place of a worker.
 #pragma once
 
 #include <compare>

@@ -28,15 +28,14 @@ spdlog::logger& logger() {
 
 bool control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
 
-// A name or a file's text in a message must not end the line and begin one of its own.
+// Prevents names and file contents in a message from forging log lines.
 std::string one_line(std::string_view text) {
   std::string line(text);
   std::replace_if(line.begin(), line.end(), control, ' ');
   return line;
 }
 
-// "a=1 b=two words c=3": a word without '=' belongs to the value before it. The first of two equal keys
-// stays.
+// "a=1 b=two words c=3": a word without '=' belongs to the value before it. Of equal keys the first is kept.
 void add_keys(nlohmann::ordered_json& line, std::string_view keys) {
   std::string key, value;
   const auto flush = [&] {
@@ -98,7 +97,7 @@ std::string log_line(LogFormat format, std::string_view keys, std::string_view t
   nlohmann::ordered_json line;
   line["text"] = text;
   add_keys(line, keys);
-  // Whatever bytes a name has, the line is JSON. The pattern has its beginning already.
+  // The line is valid JSON whatever bytes a name has. The pattern already contains its beginning.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);
 }
 

@@ -1,6 +1,5 @@
-// One line per event, with keys: log_info("job=j-12 tile=4 worker=w-3", "unit accepted").
-// info = a state changed, warn = something was retried, error = a person is needed. Never log and return the
-// same error.
+// One line per event, with keys: log_info("job=j-12 tile=4 worker=w-3", "unit accepted"). info = a state
+// changed, warn = something was retried, error = a person must act. Never both log and return an error.
 #pragma once
 
 #include <optional>
@@ -10,8 +9,8 @@
 namespace ls {
 
 enum class LogLevel { debug, info, warn, error, off };
-// text: "TIME LEVEL KEYS TEXT". json: an object a line, {"time", "level", "text"} and the keys, all texts;
-// the time is UTC.
+// text: "TIME LEVEL KEYS TEXT". json: one object per line, with {"time", "level", "text"} and the keys, all
+// strings; the time is in UTC.
 enum class LogFormat { text, json };
 
 void log_level(LogLevel level);
@@ -23,10 +22,11 @@ void log_info(std::string_view keys, std::string_view text);
 void log_warn(std::string_view keys, std::string_view text);
 void log_error(std::string_view keys, std::string_view text);
 
-// A text from outside as one value of a key: nothing in it can end the value, begin another key or a line.
+// Escapes external text for use as the value of a key, so that it cannot end the value or begin another key
+// or line.
 std::string log_value(std::string_view text);
 
-// A line as it is written after time and level; for tests.
+// The line without time and level; for tests.
 std::string log_line(LogFormat format, std::string_view keys, std::string_view text);
 
 }  // namespace ls

@@ -1,4 +1,4 @@
-// Text from elsewhere (a scene, a farm's answer) on its way to a terminal.
+// Makes external text (a scene, a farm's answer) safe for a terminal.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace ls {
 
-// The text without what could move the cursor, colour the terminal, forge lines or show letters in another
-// order: each control character (C0, DEL, C1, also as single bytes of no UTF-8), line and paragraph separator
-// and directional override becomes one space, so that columns stay.
+// Replaces what could move the cursor, colour the terminal, forge lines or reorder letters: each control
+// character (C0, DEL, C1, also single bytes that are not UTF-8), line and paragraph separator and directional
+// override becomes one space, so that columns are kept.
 std::string plain_text(std::string_view text);
 
 }  // namespace ls

@@ -11,7 +11,8 @@
 namespace ls {
 
 bool equal_secret(std::string_view a, std::string_view b) {
-  return equal_secret(sha256(a), sha256(b));  // of one length, and unpredictable to who guesses
+  // digests have equal length, and are unpredictable for an attacker
+  return equal_secret(sha256(a), sha256(b));
 }
 
 bool equal_secret(const Digest& a, const Digest& b) {
@@ -21,7 +22,7 @@ bool equal_secret(const Digest& a, const Digest& b) {
 std::string hmac_sha256(std::string_view key, std::string_view text) {
   Digest mac;
   unsigned int length = 0;
-  // Fails only when there is no memory; then no signature is better than a weak one.
+  // Fails only without memory; then no signature is better than a weak one.
   if (!HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
             reinterpret_cast<const unsigned char*>(text.data()), text.size(),
             reinterpret_cast<unsigned char*>(mac.bytes.data()), &length))

@@ -1,4 +1,4 @@
-// Secrets: reading and comparing them.
+// Reading and comparing secrets.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace ls {
 
-// Equality whose run time tells neither where the texts differ nor how long the secret is.
+// Equality whose run time reveals neither where the texts differ nor the secret's length.
 bool equal_secret(std::string_view a, std::string_view b);
 bool equal_secret(const Digest& a, const Digest& b);
 
@@ -21,7 +21,7 @@ std::string hmac_sha256(std::string_view key, std::string_view text);
 inline constexpr std::size_t kSecretBytes = 4096;
 Result<std::string> read_secret(const std::filesystem::path& file);
 
-// A PEM file whole: certificates or a key, at most kPemBytes. invalid_argument: it is none.
+// A whole PEM file, certificates or a key, of at most kPemBytes. invalid_argument: not PEM.
 inline constexpr std::size_t kPemBytes = 1u << 20;
 Result<std::string> read_pem(const std::filesystem::path& file);
 

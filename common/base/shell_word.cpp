@@ -18,7 +18,7 @@ bool plain(char c) {
 
 std::string shell_word(std::string_view text) {
   if (!text.empty() && std::all_of(text.begin(), text.end(), plain)) return std::string(text);
-  const bool escapes = plain_text(text) != text;  // it has what a terminal must not see
+  const bool escapes = plain_text(text) != text;  // contains characters that are unsafe for a terminal
   std::string word = escapes ? "$'" : "'";
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);

@@ -1,4 +1,4 @@
-// Text as one word of a command that a person copies into a shell.
+// Quotes text as one word of a shell command that a person copies.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace ls {
 
-// As it is where no shell sees more in it; else in quotes. Control characters are written as escapes ($'...',
-// as bash, zsh and ksh read them): the word can stand on a terminal and in a log line.
+// Unchanged if the shell gives nothing in it a meaning; otherwise quoted. Control characters are written as
+// escapes ($'...', as bash, zsh and ksh read them), so the word can be shown on a terminal and in a log line.
 std::string shell_word(std::string_view text);
 
 }  // namespace ls

@@ -20,12 +20,12 @@ void FrameDiagnostics::add(std::uint32_t frame, const std::vector<Diagnostic>& f
 
 std::vector<Diagnostic> FrameDiagnostics::take() const {
   std::vector<Diagnostic> out;
-  for (const Told& told : all_) {
-    Diagnostic d = told.diagnostic;
-    if (told.frames < read_ || read_ == 1)
-      d.text = told.frames == 1
-                   ? fmt::format("frame {}: {}", told.first_frame, d.text)
-                   : fmt::format("frame {} and {} more: {}", told.first_frame, told.frames - 1, d.text);
+  for (const Reported& reported : all_) {
+    Diagnostic d = reported.diagnostic;
+    if (reported.frames < read_ || read_ == 1)
+      d.text = reported.frames == 1 ? fmt::format("frame {}: {}", reported.first_frame, d.text)
+                                    : fmt::format("frame {} and {} more: {}", reported.first_frame,
+                                                  reported.frames - 1, d.text);
     out.push_back(std::move(d));
   }
   return out;

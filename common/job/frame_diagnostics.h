@@ -1,5 +1,5 @@
-// What is wrong with a scene that is read once per frame: told once where all frames share it, and by frame
-// where they don't (a file that is missing in the middle).
+// Diagnostics of a scene that is read once per frame: reported once if all frames share them, otherwise by
+// frame (such as a file missing in the middle).
 #pragma once
 
 #include <cstdint>
@@ -14,23 +14,23 @@ namespace ls {
 
 class FrameDiagnostics {
  public:
-  // A frame that was read, with or without complaints.
+  // Adds the diagnostics of a frame, possibly none.
   void add(std::uint32_t frame, const std::vector<Diagnostic>& found);
-  // As many different ones as are ever shown: reading on would tell nobody more.
+  // As many distinct ones as are ever shown: no need to read on.
   bool full() const { return all_.size() >= kMost; }
   bool empty() const { return all_.empty(); }
-  // In order of appearance. Of one that not all frames have the text begins with "frame 5: " or
-  // "frame 5 and 3 more: ".
+  // In order of appearance. The text of one that not all frames share begins with "frame 5: " or "frame 5 and
+  // 3 more: ".
   std::vector<Diagnostic> take() const;
 
  private:
   static constexpr std::size_t kMost = 20;
-  struct Told {
+  struct Reported {
     Diagnostic diagnostic;
     std::uint32_t first_frame = 0, frames = 0;
   };
   using Key = std::tuple<Diagnostic::Severity, std::string, int, int, std::string>;
-  std::vector<Told> all_;
+  std::vector<Reported> all_;
   std::map<Key, std::size_t> known_;
   std::uint32_t read_ = 0;
 };

@@ -22,7 +22,7 @@ std::vector<HealthNote> health_notes(const Health& health, const std::string& co
   for (const auto& [cause, entry] : health.causes) {
     notes.push_back({cause, entry.count, entry.first, {}, {}});
     if (entry.first.empty()) continue;
-    const HealthSpot& s = entry.first.front();
+    const HealthLocation& s = entry.first.front();
     notes.back().replay = replay_command(command, s.x, s.y, s.sample);
   }
   return notes;
@@ -45,7 +45,7 @@ std::string health_json(const Health& totals, std::span<const HealthNote> notes)
   json causes = json::array();
   for (const HealthNote& n : notes) {
     json first = json::array();
-    for (const HealthSpot& s : n.first) first.push_back({{"pixel", {s.x, s.y}}, {"sample", s.sample}});
+    for (const HealthLocation& s : n.first) first.push_back({{"pixel", {s.x, s.y}}, {"sample", s.sample}});
     causes.push_back({{"cause", to_string(n.cause)},
                       {"effect", word(effect_of(n.cause))},
                       {"count", n.count},

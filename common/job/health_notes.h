@@ -1,5 +1,5 @@
-// The health of a job as people and programs are told of it: a sentence for each cause, where it was first,
-// and the command that shows it again.
+// The health of a job for people and programs: for each cause a sentence, its first location, and the command
+// that reproduces it.
 #pragma once
 
 #include <optional>
@@ -7,23 +7,23 @@
 #include <string>
 #include <vector>
 
-#include "common/image/health.h"
+#include "common/image/film/health.h"
 
 namespace ls {
 
 struct HealthNote {
   HealthCause cause{};
   std::uint64_t count = 0;
-  std::vector<HealthSpot> first;
+  std::vector<HealthLocation> first;
   std::optional<std::uint32_t>
-      frame;           // of a sequence: the first that has it, which `first` and `replay` are of
-  std::string replay;  // of the first place; empty: there is none
+      frame;           // for sequences: the first frame with this cause, to which `first` and `replay` refer
+  std::string replay;  // command for the first location; empty: none
   bool operator==(const HealthNote&) const = default;
 };
 
 // `command`: replay_command() of the job.
 std::vector<HealthNote> health_notes(const Health& health, const std::string& command);
-// Those of another frame to those of the frames before it.
+// Merges the notes of another frame into those of earlier frames.
 void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more, std::uint32_t frame);
 
 // {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected" |

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/suggest.h"
 #include "common/job/limits.h"
-#include "common/scene/suggest.h"
 
 namespace ls::job {
 namespace {
 
-// Letters, digits and "_-.:": fit for file names, labels and layers.
+// Letters, digits and "_-.:": safe for file names, labels and layers.
 bool is_name(const std::string& s) {
   if (s.empty() || s.size() > kMaxNameBytes) return false;
   for (const char c : s) {
@@ -58,7 +58,7 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    if (too_deep) return false;  // not kept: deep values would be destroyed and printed by recursion
+    if (too_deep) return false;  // do not keep it: deep values are destroyed and printed recursively
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.emplace(depth, key).second && !twice) twice = key;
@@ -89,7 +89,7 @@ Fields::Fields(const Json& object, std::string_view what, std::vector<std::strin
     bool found = false;
     for (const auto& k : known) found |= k == item.key();
     const std::string name = printable(item.key(), kMaxNameBytes);
-    if (!found) wrong(name, "is not known" + scene::suggestion(name, known));
+    if (!found) wrong(name, "is not known" + suggestion(name, known));
   }
 }
 
@@ -119,7 +119,7 @@ std::optional<std::uint64_t> Fields::whole(const char* key, std::uint64_t least,
 std::optional<std::int64_t> Fields::integer(const char* key, std::int64_t least, std::int64_t most) {
   const Json* v = find(key);
   if (!v) return std::nullopt;
-  // An unsigned value above the signed range would turn negative.
+  // An unsigned value above the signed range would become negative.
   const bool fits =
       v->is_number_integer() && !(v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX);
   if (fits && v->get<std::int64_t>() >= least && v->get<std::int64_t>() <= most)

@@ -1,5 +1,5 @@
-// Taking fields out of a JSON object strictly: every key must be known, every value of its type and range,
-// and the first thing wrong is told with the key's name. For the .cpp files of this folder.
+// Strict extraction of fields from a JSON object: every key must be known, every value of its type and range;
+// the first error is recorded with the key's name. For the .cpp files of this folder.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +10,27 @@
 #include <vector>
 
 #include "common/base/error.h"
-#include "common/image/frame.h"
+#include "common/image/frame/frame.h"
 
 namespace ls::job {
 
 using Json = nlohmann::json;
 
-// For messages: cut to `most` bytes, and ASCII, so that it can stand in a log line or a JSON string whatever
-// was sent.
+// Makes text fit for messages: cut to `most` bytes and ASCII only, so that any input can go into a log line
+// or a JSON string.
 std::string printable(std::string_view text, std::size_t most);
 
-// Refuses what is no object, keys given twice, over-long and deeply nested texts. `what`: "spec", for the
-// messages.
+// Rejects anything but an object, duplicate keys, and texts that are too long or too deeply nested. `what`:
+// the name for messages, such as "spec".
 Result<Json> parse_object(std::string_view text, std::string_view what);
 
 class Fields {
  public:
   Fields(const Json& object, std::string_view what, std::vector<std::string> known);
 
-  const std::optional<Error>& error() const { return error_; }  // the first one
+  const std::optional<Error>& error() const { return error_; }  // the first error
 
-  // Nothing if the key is absent or wrong.
+  // nullopt if the key is absent or its value is wrong.
   std::optional<std::uint64_t> whole(const char* key, std::uint64_t least, std::uint64_t most);
   std::optional<std::int64_t> integer(const char* key, std::int64_t least, std::int64_t most);
   std::optional<double> positive(const char* key, double most);
@@ -38,7 +38,7 @@ class Fields {
   std::optional<std::string> name(const char* key);
   std::optional<std::vector<std::string>> names(const char* key);
   std::optional<FrameSize> size(const char* key);  // [w, h] or "WxH"
-  const Json* find(const char* key) const;         // null: absent
+  const Json* find(const char* key) const;         // null if absent
   void wrong(std::string_view key, std::string_view problem);
   void require(const char* key);
 

@@ -1,26 +1,26 @@
-// What a job may ask for at most. Beyond it the answer is an error that names the limit.
+// Limits of a job. Exceeding one is an error that names the limit.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-#include "common/image/render_limits.h"
+#include "common/image/frame/render_limits.h"
 
 namespace ls {
 
-inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels a side
-inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
-// Tiles x rounds. 2^24 samples are fine for one small tile (262 thousand rounds), not for a whole frame.
+inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels per side
+// Tiles x rounds. 2^24 samples are possible for one small tile (262 thousand rounds), not for a whole frame.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
-// Of a film's sums: all AOVs of a UHD frame take about 5 GB, colour alone of the largest frame 3.2.
+// Size of a film's sums: all AOVs of a UHD frame take about 5 GB, colour alone of the largest frame 3.2 GB.
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
-inline constexpr double kMaxSeconds = 1e9;  // of a time budget
+inline constexpr double kMaxSeconds = 1e9;  // limit of a time budget
 inline constexpr double kMaxTargetError = 1e6;
-inline constexpr int kMaxPriority = 1'000'000;                       // either sign
-inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;   // of a spec or settings text
-inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;               // workers or units that a job may hold
-inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 50;  // bytes asked of a worker
-inline constexpr std::size_t kMaxNames = 64;                         // aov, tags
+inline constexpr int kMaxPriority = 1'000'000;                      // absolute value
+inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;  // size of a spec or settings text
+inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;  // limit of workers or units that a job may occupy
+// bytes that a job may require of a worker
+inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 50;
+inline constexpr std::size_t kMaxNames = 64;  // number of names in `aov` and `tags`
 inline constexpr std::size_t kMaxNameBytes = 64;
 inline constexpr std::size_t kMaxDefines = 1024, kMaxDefineBytes = 65536;
 

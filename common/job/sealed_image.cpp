@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "common/base/overloaded.h"
-#include "common/image/exr_file.h"
-#include "common/image/render_limits.h"
+#include "common/image/exr/exr_file.h"
+#include "common/image/frame/render_limits.h"
 
 namespace ls {
 namespace {
@@ -69,7 +69,7 @@ std::size_t index_of(FrameSize size, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) + static_cast<std::size_t>(x);
 }
 
-// The bits of a value as the file has it.
+// The bits of a value as stored in the file.
 std::uint32_t stored(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel, std::size_t at) {
   return std::visit(
       overloaded{[&](const ExrHalf& c) { return std::bit_cast<std::uint32_t>(as_half(c.values[at])); },

@@ -1,5 +1,5 @@
-// A final EXR of ours, read back: its pixels and what it says of itself, so that it can be rendered again and
-// compared. The file is somebody's: sizes are bounded, headers and layers must be what final_exr() writes.
+// A final EXR of ours, read back with its provenance, so that it can be rendered again and compared. The file
+// is untrusted: sizes are bounded, headers and layers must be as final_exr() writes them.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +11,9 @@
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
-#include "common/image/film.h"
-#include "common/image/final_image.h"
-#include "common/image/frame.h"
+#include "common/image/exr/final_image.h"
+#include "common/image/film/film.h"
+#include "common/image/frame/frame.h"
 #include "common/job/settings.h"
 
 namespace ls {
@@ -28,14 +28,14 @@ struct SealedImage {
   TileGrid grid() const { return {picture.size, settings.tile}; }
 };
 
-// invalid_argument: what is missing or wrong, by the name of the header or layer.
+// invalid_argument: names the header or layer that is missing or wrong.
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
-// How many samples the tile's pixels say they have. invalid_argument: they do not agree.
+// The tile's number of samples according to its pixels. invalid_argument: they disagree.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The first value of the tile that is not the film's, as final_exr() would store it; in the order of layers.
-// Where the image lacks the whole layer, that of the tile's first pixel.
+// The tile's first value that differs from what final_exr() would store for the film, in the order of layers.
+// If the image lacks a whole layer, its first pixel in the tile.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string layer;

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "common/image/rounds.h"
+#include "common/image/frame/rounds.h"
 #include "common/job/json_fields.h"
 #include "common/job/limits.h"
 
@@ -41,7 +41,7 @@ void read_defines(Fields& fields, JobSpec& spec) {
   }
 }
 
-// "1-10", or 7: one frame alone.
+// "1-10", or 7: a single frame.
 void read_frames(Fields& fields, JobSpec& spec) {
   const Json* v = fields.find("frames");
   if (!v) return;
@@ -153,10 +153,16 @@ std::string canonical_json(const JobSpec& spec) {
   return dump(json);
 }
 
+Result<nlohmann::json> parse_spec_object(std::string_view text) { return job::parse_object(text, "spec"); }
+
 Result<JobSpec> parse_job_spec(std::string_view text) {
-  const auto json = job::parse_object(text, "spec");
-  if (!json) return tl::unexpected(json.error());
-  Fields fields(*json, "spec",
+  const auto json = parse_spec_object(text);
+  return json ? job_spec_of(*json) : tl::unexpected(json.error());
+}
+
+Result<JobSpec> job_spec_of(const nlohmann::json& object) {
+  if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
+  Fields fields(object, "spec",
                 {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
                  "float", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
   JobSpec spec;

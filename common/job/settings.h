@@ -1,10 +1,11 @@
-// What a job asks for, in two parts: what a unit's pixels depend on (RenderSettings), and what only the job
-// as a whole depends on (JobSpec). Raising a job's samples must not rename its units, so spp stands in the
+// A job's request in two parts: what determines a unit's pixels (RenderSettings), and what concerns only the
+// job as a whole (JobSpec). Raising a job's samples must not change its units' identity, so spp is in the
 // second.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,26 +13,26 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/base/frame_range.h"
-#include "common/image/aov.h"
-#include "common/image/frame.h"
+#include "common/image/aov/aov.h"
+#include "common/image/frame/frame.h"
 
 namespace ls {
 
-// Everything but the scene that decides the value of a sample. Its canonical JSON is hashed into every unit.
+// Everything except the scene that determines the value of a sample. Its canonical JSON is hashed into every
+// unit.
 struct RenderSettings {
   FrameSize size;
   int tile = 32;
   std::uint64_t seed = 0;
   std::string integrator;        // as IntegratorSettings::name: resolved, never empty
-  int max_depth = -1;            // -1: unlimited; as in the dialect: number of path segments
+  int max_depth = -1;            // -1: unlimited; counts path segments, as in the dialect
   int rr_depth = 5;              // first depth at which Russian roulette may act
-  std::vector<std::string> aov;  // sorted names, as of names_of(AovSet); empty: colour only
+  std::vector<std::string> aov;  // sorted names, as returned by names_of(AovSet); empty: colour only
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
 
-// The request, as in the HTTP contract's `spec` and the command line's options. Absent means: as the scene
-// says.
+// The request, as in `spec` of the HTTP API and the options of the command line. Absent: as the scene says.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
   std::optional<double> target_error;  // relMSE
@@ -45,10 +46,11 @@ struct JobSpec {
   bool float_output = false;
   std::vector<std::string> tags;
   std::optional<FrameRange> frames;          // a sequence: one film per frame; absent: one image
-  std::optional<std::uint32_t> max_workers;  // that may render it at once
-  std::optional<std::uint32_t> max_units;    // of work lent to workers at once
-  std::optional<std::uint64_t> memory;       // bytes that a worker must have; at least its files' anyway
-  std::optional<Digest> reference;           // blob of the right image, an EXR of the job's size
+  std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
+  std::optional<std::uint32_t> max_units;    // maximum number of leased units at the same time
+  // bytes that a worker must have; in any case at least the size of its files
+  std::optional<std::uint64_t> memory;
+  std::optional<Digest> reference;  // blob of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };
 
@@ -56,11 +58,15 @@ std::string canonical_json(const RenderSettings& settings);
 Result<RenderSettings> parse_render_settings(std::string_view json);
 Digest digest_of(const RenderSettings& settings);
 
-// Is this much work at all possible? Size, tile, samples and the number of units against common/job/limits.h.
+// Checks size, tile, samples and the number of units against common/job/limits.h.
 Result<void> check_job_size(const RenderSettings& settings, std::uint64_t spp);
 
 std::string canonical_json(const JobSpec& spec);
 // Unknown keys, wrong types and values out of range are errors that name the key.
 Result<JobSpec> parse_job_spec(std::string_view json);
+// The two halves of it: the text as an object (keys given twice, over-long or deeply nested texts are
+// errors), and the request from the object.
+Result<nlohmann::json> parse_spec_object(std::string_view text);
+Result<JobSpec> job_spec_of(const nlohmann::json& object);
 
 }  // namespace ls

@@ -1,16 +1,16 @@
-// Every size that the worker protocol bounds, in one place. Both sides check what they receive against these
-// before they allocate or store anything; what they send stays within them.
+// All size limits of the worker protocol. Both sides check received data against them before allocating or
+// storing anything, and stay within them when sending.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-#include "common/image/render_limits.h"
+#include "common/image/frame/render_limits.h"
 
 namespace ls::limits {
 
 inline constexpr std::size_t kMessageBytes = 1 << 20;  // one gRPC message
-// An encoded partial; leaves room for the rest of a UnitResult. 6 floats a pixel: tiles up to about 200 x
+// An encoded partial; leaves room for the rest of a UnitResult. 6 floats per pixel: tiles up to about 200 x
 // 200.
 inline constexpr std::size_t kPartialBytes = kMessageBytes - (32 << 10);
 inline constexpr std::size_t kBlobChunkBytes = 256 << 10;
@@ -28,7 +28,7 @@ inline constexpr std::size_t kAssetsPerJob = 4096;
 inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
-inline constexpr double kSeconds = 1e12;  // that a worker may report of anything; sums of them stay finite
+inline constexpr double kSeconds = 1e12;  // that a worker may report for any duration; sums stay finite
 
 inline constexpr int kFrameSide = kMaxFrameSide;  // pixels
 inline constexpr std::uint64_t kSampleIndex = kMaxSpp;

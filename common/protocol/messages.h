@@ -1,5 +1,5 @@
-// What coordinator and worker say to each other, as plain values. proto/farm.proto is the same on the wire
-// and documents the exchange; `lightshaft render` passes these values inside one process. Conversions:
+// Messages between coordinator and worker, as plain values. proto/farm.proto defines the same on the wire and
+// documents the exchange; `lightshaft render` passes these values inside one process. Conversions:
 // proto/convert.h.
 #pragma once
 
@@ -13,9 +13,9 @@
 
 #include "common/base/digest.h"
 #include "common/base/id.h"
-#include "common/image/frame.h"
-#include "common/image/health.h"
-#include "common/image/rounds.h"
+#include "common/image/film/health.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
 
 namespace ls {
@@ -37,15 +37,15 @@ struct BlobRef {
   bool operator==(const BlobRef&) const = default;
 };
 
-// All a worker needs to know of a job. Sent before the job's first lease on a stream.
+// Everything a worker needs to know about a job. Sent before the job's first lease on a stream.
 struct JobBrief {
   JobId job;
-  Digest scene;  // blob: the canonical scene (common/scene/serialize.h)
+  Digest scene;  // blob: the canonical scene (common/scene/json/serialize.h)
   RenderSettings settings;
   Digest settings_digest;
-  std::vector<BlobRef> assets;  // only those that this scene uses
-  // What the coordinator found the scene to need (common/scene/needs.h), for the worker to compare with what
-  // it finds itself; empty: not said.
+  std::vector<BlobRef> assets;  // only those that the scene uses
+  // The coordinator's analysis of the scene's needs (common/scene/analysis/needs.h), for the worker to
+  // compare with its own; empty: not sent.
   std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
@@ -58,7 +58,7 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units lent to a worker. They are rendered and reported one by one, in order.
+// Units leased to a worker. They are rendered and reported one by one, in order.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -66,14 +66,14 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent for a unit besides rendering it. `load` and `build` come with the first result
-// of a world: getting the files of the job, and reading them and making the world of them (wall time of the
-// thread that does it).
+// Seconds that a worker spent on a unit besides rendering it. `load` and `build` are sent with the first
+// result of a world: fetching the job's files, and reading them and building the world (wall time of the
+// loading thread).
 struct UnitTimes {
   double load = 0, build = 0;
-  double transfer = 0;  // to pack the result: encode and digest
-  double idle = 0;      // that its thread stood still since the last unit of the job
-  double wait = 0;      // that its thread waited for a core while it rendered: wall seconds less cpu_seconds
+  double transfer = 0;  // packing the result: encoding and digest
+  double idle = 0;      // idle time of its thread since the last unit of the job
+  double wait = 0;      // time its thread waited for a core while rendering: wall seconds minus cpu_seconds
   bool operator==(const UnitTimes&) const = default;
 };
 
@@ -88,21 +88,21 @@ struct UnitResult {
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say);
-// trying again elsewhere cannot help and the job fails at once. Otherwise it is the task's fault (crash,
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say), so
+// the job fails at once, as another worker cannot succeed either. Otherwise only this unit failed (crash,
 // hang, memory).
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
   bool scene_at_fault = false;
   std::string reason;                        // for a person
-  std::optional<int> signal;                 // that ended the render child
-  std::optional<std::pair<int, int>> pixel;  // the breadcrumb: where it was
+  std::optional<int> signal;                 // signal that ended the render child
+  std::optional<std::pair<int, int>> pixel;  // the breadcrumb: the pixel being rendered
   std::optional<std::uint64_t> sample;
   bool operator==(const UnitFailure&) const = default;
 };
 
-// ---- worker -> coordinator
+// From worker to coordinator.
 struct WorkerHello {
   int protocol = kProtocolVersion;
   std::string name;
@@ -113,13 +113,13 @@ struct WorkerHello {
   std::vector<std::string> tags;
   std::vector<Digest> blobs_held;
   std::string join_token;
-  // Given by the coordinator at an earlier Welcome; empty for a new worker. The same worker keeps its id over
+  // Assigned by the coordinator in an earlier Welcome; empty for a new worker. A worker keeps its id over
   // reconnects.
   WorkerId previous_id;
-  bool fake = false;  // it renders nothing and makes its pixels up
+  bool fake = false;  // it does not render but generates fake pixels
   bool operator==(const WorkerHello&) const = default;
 };
-// Renews the named leases' deadlines. Sent about once a second while there is work.
+// Renews the deadlines of the named leases. Sent about once a second while there is work.
 struct WorkerProgress {
   struct Entry {
     LeaseId lease;
@@ -133,7 +133,8 @@ struct WorkerProgress {
   double load_seconds = 0;  // last world build
   bool operator==(const WorkerProgress&) const = default;
 };
-// No more leases, please; what is finished is handed in, the rest comes back with LeaseReturned.
+// Requests that no more leases be sent; finished units are still delivered, the others come back as
+// LeaseReturned.
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
@@ -146,7 +147,7 @@ struct LeaseReturned {
 using FromWorker =
     std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
 
-// ---- coordinator -> worker
+// From coordinator to worker.
 struct Welcome {
   WorkerId worker;
   std::uint64_t epoch = 0;  // grows with every registration of this worker; an older stream is closed
@@ -162,12 +163,12 @@ struct AssignLease {
   std::optional<JobBrief> brief;  // with a job's first lease on this stream
   bool operator==(const AssignLease&) const = default;
 };
-struct ResultAck {  // the result is durable (or refused with a reason): drop it from the outbox
+struct ResultAck {  // the result is durable (or rejected, with a reason): remove it from the outbox
   UnitKey unit;
   std::optional<Error> refused;
   bool operator==(const ResultAck&) const = default;
 };
-struct CancelJob {  // stop its units now; results are no longer wanted
+struct CancelJob {  // stop its units immediately; results are discarded
   JobId job;
   bool operator==(const CancelJob&) const = default;
 };

@@ -11,7 +11,7 @@
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // of the table; of more, the last ones
+constexpr std::size_t kMostRows = 256;  // of the table; if there are more, the last ones
 
 struct Clock {
   const char* key;
@@ -26,13 +26,14 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Of the error at a checkpoint. What each was worth is not kept: in doubt about the last there is none at
-// all.
+// Interval of the error at a checkpoint. The reliability of single checkpoints is not stored: if the last is
+// in doubt none is shown.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
 
-// Where the error will be down to the target that was asked for; of wall seconds by the pace there was.
+// The point at which the error will reach the requested target; for wall seconds extrapolated at the previous
+// pace.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
   const double more = number(forecast, "core_seconds"), now = number(last, clock.key);
@@ -55,17 +56,17 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
   plot.y_title = "relMSE";
   const bool doubt = doubtful(report);
   Curve estimate{doubt ? "estimate, not to be trusted yet" : "estimate, with its 95 % interval", {}};
-  Curve truth{"against the reference", {}, true};
+  Curve reference_error{"against the reference", {}, true};
   for (const Json& p : points) {
     const double x = number(p, clock.key);
     const auto ci = shown_interval(p, doubt).value_or(std::pair(0.0, 0.0));
     estimate.points.push_back({x, number(p, "relmse"), ci.first, ci.second});
     const double error = number(p, "true_relmse");
-    if (error > 0 && !flag(p, "true_relmse_below_noise", false)) truth.points.push_back({x, error});
+    if (error > 0 && !flag(p, "true_relmse_below_noise", false)) reference_error.points.push_back({x, error});
   }
-  const bool has_truth = !truth.points.empty();
+  const bool has_reference_error = !reference_error.points.empty();
   plot.curves.push_back(std::move(estimate));
-  if (has_truth) plot.curves.push_back(std::move(truth));
+  if (has_reference_error) plot.curves.push_back(std::move(reference_error));
   const Json& last = points.back();
   if (const double target = number(report, "target_error"); target > 0) plot.target = target;
   plot.ahead = ahead_of(report, last, clock);
@@ -77,7 +78,7 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
 std::string cell(const std::string& words) { return "<td>" + words + "</td>"; }
 
 std::string table(const std::vector<Json>& points, bool doubt) {
-  const bool truth =
+  const bool reference_error =
       std::any_of(points.begin(), points.end(), [](const Json& p) { return number(p, "true_relmse") > 0; });
   const bool flip =
       std::any_of(points.begin(), points.end(), [](const Json& p) { return number(p, "true_flip") >= 0; });
@@ -88,7 +89,8 @@ std::string table(const std::vector<Json>& points, bool doubt) {
             cell(given(number(p, "spp"))) + cell(figure(number(p, "rmse"))) +
             cell(figure(number(p, "relmse")));
     if (!doubt) rows += cell(range(shown_interval(p, doubt), figure));
-    if (truth) rows += cell(true_figure(number(p, "true_relmse"), flag(p, "true_relmse_below_noise", false)));
+    if (reference_error)
+      rows += cell(true_figure(number(p, "true_relmse"), flag(p, "true_relmse_below_noise", false)));
     if (flip) rows += cell(figure(number(p, "true_flip")));
     rows += "</tr>\n";
   }
@@ -96,7 +98,7 @@ std::string table(const std::vector<Json>& points, bool doubt) {
   const auto column = [&](const char* name) { head += fmt::format("<th scope=\"col\">{}</th>", name); };
   for (const char* name : {"Time", "Core time", "Samples", "RMSE", "relMSE"}) column(name);
   if (!doubt) column("95 % interval");
-  if (truth) column("True relMSE");
+  if (reference_error) column("True relMSE");
   if (flip) column("FLIP");
   const std::string title = points.size() > kMostRows
                                 ? fmt::format("The last {} of {} points as a table", kMostRows, points.size())

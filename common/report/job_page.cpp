@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "common/image/maps.h"
+#include "common/image/exr/maps.h"
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"
@@ -61,7 +61,7 @@ std::string picture(const std::vector<std::byte>& png, const std::string& alt) {
   return fmt::format("<img alt=\"{}\" src=\"{}\">", alt, data_url("image/png", png));
 }
 
-// The maps' colours from end to end, in equal factors.
+// The colour scale of the maps, in equal factors.
 std::string legend(const std::string& least, const std::string& most) {
   std::string out = R"(<svg class="ramp" viewBox="0 0 64 4" preserveAspectRatio="none" aria-hidden="true">)";
   for (int i = 0; i < 64; ++i) {

@@ -1,6 +1,5 @@
-// The report of a job as one HTML file that needs nothing but itself: image, curves, maps, where the time
-// went, health, what was left out, provenance. Pure: the farm serves it, `lightshaft render --html` writes
-// it.
+// The report of a job as one self-contained HTML file: image, curves, maps, time split, health, omitted
+// features, provenance. Pure: the farm serves it, `lightshaft render --html` writes it.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +13,12 @@ namespace ls::report {
 
 struct JobPage {
   std::string report;                                    // the JSON of GET /api/v1/jobs/ID/report
-  std::vector<std::byte> image, error_map, samples_map;  // PNG files; empty: there is none
+  std::vector<std::byte> image, error_map, samples_map;  // PNG files; empty: none
 };
-// What the report lacks is left out of the page; what it has of another type than it should counts as
-// lacking. invalid_argument: it is no JSON object.
+// Fields missing from the report are omitted from the page, as are fields of the wrong type.
+// invalid_argument: not a JSON object.
 Result<std::string> job_page(const JobPage& page);
-// Of the response that carries such a page: what its own policy says, and no more.
+// The content security policy for the response that carries such a page: the same as in the page.
 std::string job_page_policy();
 
 }  // namespace ls::report

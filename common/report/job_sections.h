@@ -1,4 +1,5 @@
-// The parts of the page of a job: markup out of its report. Each is empty if the report has nothing of it.
+// The sections of a job's page, as markup generated from its report. Each is empty if the report has no data
+// for it.
 #pragma once
 
 #include <string>
@@ -8,21 +9,21 @@
 
 namespace ls::report {
 
-// ---- what to think of it (job_verdict.cpp) ----
-bool doubtful(const Json& report);              // its error figures are not to be relied on yet
-std::string verdict(const Json& report);        // why they are not, and what else is to be known of them
-std::string verdict_words(const Json& report);  // of one that is not doubtful, a sentence; empty: none
+// Convergence status (job_verdict.cpp).
+bool doubtful(const Json& report);              // true if the error figures are not reliable yet
+std::string verdict(const Json& report);        // why they are not, with further notes
+std::string verdict_words(const Json& report);  // a sentence for a report that is not doubtful; empty: none
 std::string failure(const Json& report);
 
-// ---- error against time (job_curves.cpp) ----
+// Error against time (job_curves.cpp).
 std::string curves(const Json& report);
-std::string outlook(const Json& report);  // what less error would cost, a sentence; empty: not known
+std::string outlook(const Json& report);  // a sentence on the cost of less error; empty: unknown
 
-// ---- figures (job_figures.cpp) ----
+// Figures (job_figures.cpp).
 std::string figures(const Json& report);
 std::string time_split(const Json& report);
 
-// ---- what it is made of (job_facts.cpp) ----
+// Facts about the job (job_facts.cpp).
 std::string health(const Json& report);
 std::string features(const Json& report);
 std::string provenance(const Json& report);

@@ -48,7 +48,7 @@ std::string verdict(const Json& report) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
                        words.empty() ? "This error estimate can&#39;t be trusted yet." : escape_html(words));
-  } else if (objects(report, "convergence").empty()) {  // else it stands under the curves
+  } else if (objects(report, "convergence").empty()) {  // otherwise it is shown below the curves
     out += paragraph("note", verdict_words(report));
   }
   return out + paragraph("note", unreached(report)) + paragraph("note", one_seed(report)) +

@@ -11,12 +11,12 @@
 namespace ls::report {
 namespace {
 
-constexpr double kMargin = 0.06;  // of the range, on either side
-constexpr double kShort = 2.2;    // decades; on a shorter axis 2 and 5 are labelled, too
+constexpr double kMargin = 0.06;  // share of the range added on either side
+constexpr double kShort = 2.2;    // decades; on a shorter axis 2 and 5 are labelled too
 constexpr double kFine = 4.5;     // decades; on a shorter axis 2 to 9 have lines
 constexpr std::size_t kMostLabels = 8;
-constexpr std::size_t kFewTimes = 4;  // labels of time, before those between are added
-constexpr double kFarthest = 300;     // decades from 1: beyond it doubles end
+constexpr std::size_t kFewTimes = 4;  // labels of time below which those in between are added
+constexpr double kFarthest = 300;     // decades from 1: near the range of double
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 
 bool inside(const LogAxis& axis, double value) { return value >= axis.lo && value <= axis.hi; }
@@ -33,7 +33,7 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Times that people count in: `coarse` ones alone, or those between them, too.
+// Round times: only `coarse` ones, or those in between too.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {
@@ -92,7 +92,7 @@ LogAxis log_axis(double lo, double hi, double from, double to) {
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
-  if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};  // none that log_axis() made
+  if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};  // not made by log_axis()
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }
 

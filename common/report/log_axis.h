@@ -1,5 +1,5 @@
-// A logarithmic axis: its range, its ticks and how they are labelled. The dashboard's
-// (web/static/js/plot_scale.js) follows the same rules.
+// A logarithmic axis: range, ticks and labels. The dashboard's (web/static/js/plot_scale.js) follows the same
+// rules.
 #pragma once
 
 #include <string>
@@ -9,23 +9,23 @@ namespace ls::report {
 
 struct LogAxis {
   double lo = 1, hi = 10;         // values at its ends, both above 0
-  double from = 0, to = 1;        // where they are drawn
-  double at(double value) const;  // where a value above 0 is drawn
+  double from = 0, to = 1;        // their positions in the drawing
+  double at(double value) const;  // position of a value above 0
 };
-// Around values from `lo` to `hi` (above 0, lo <= hi), with a margin, at least one decade wide.
+// An axis for values from `lo` to `hi` (above 0, lo <= hi), with a margin, at least one decade wide.
 LogAxis log_axis(double lo, double hi, double from, double to);
 
 struct Tick {
   double value = 0;
-  std::string label;  // empty: a line alone
+  std::string label;  // empty: a line without a label
   bool major = false;
 };
 enum class AxisUnit {
   plain,    // 0.1, 0.01, 10⁻⁴
   seconds,  // 1 s, 10 s, 1 min, 1 h, 1 d
 };
-// Ascending. Decades are labelled (of time its usual steps), what lies between them where there are few; of a
-// long axis only every so many.
+// In ascending order. Decades are labelled (for time its usual steps), values between them if decades are
+// few; on a long axis only every n-th decade.
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit);
 
 }  // namespace ls::report

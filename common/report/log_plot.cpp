@@ -15,9 +15,10 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
-constexpr double kHalfLabel = 25;       // of the widest label of time, which must not leave the drawing
-constexpr double kLetter = 7.4;         // mean width of one, in the legend
-constexpr double kFarthestAhead = 100;  // times the last x: a forecast beyond it is not drawn
+// half the width of the widest time label, which must stay within the drawing
+constexpr double kHalfLabel = 25;
+constexpr double kLetter = 7.4;         // mean width of a letter in the legend
+constexpr double kFarthestAhead = 100;  // multiple of the last x: a forecast beyond it is not drawn
 constexpr std::string_view kNothing =
     "The first point appears when every tile has finished a round of samples.";
 
@@ -26,7 +27,7 @@ using Out = std::back_insert_iterator<std::string>;
 bool drawable(const CurvePoint& p) { return std::isfinite(p.x) && std::isfinite(p.y) && p.x > 0 && p.y > 0; }
 bool has_band(const CurvePoint& p) { return std::isfinite(p.hi) && p.lo > 0 && p.hi >= p.lo; }
 
-// What can be drawn, in order of x.
+// The points that can be drawn, in order of x.
 std::vector<CurvePoint> chosen(const Curve& curve) {
   std::vector<CurvePoint> all;
   std::copy_if(curve.points.begin(), curve.points.end(), std::back_inserter(all), drawable);
@@ -219,7 +220,7 @@ class Drawing {
     text_ += "</g>";
   }
 
-  // Told apart without colours, too.
+  // Marks that can be distinguished without colour.
   static std::string mark(std::size_t index, double x, double y) {
     switch (index % 4) {
       case 1:

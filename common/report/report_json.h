@@ -1,5 +1,5 @@
-// Reading a report that may be of another version, or not ours at all: each call says what is there, or that
-// nothing is.
+// Reads a report that may be of another version, or foreign: each function returns the value or a default if
+// it is missing.
 #pragma once
 
 #include <limits>
@@ -13,12 +13,12 @@ namespace ls::report {
 
 using Json = nlohmann::json;
 
-const Json& member(const Json& j, const char* key);  // null if there is none
-double number(const Json& j, const char* key);       // NaN if there is none
-std::string text(const Json& j, const char* key);    // empty if there is none
+const Json& member(const Json& j, const char* key);  // null if missing
+double number(const Json& j, const char* key);       // NaN if missing
+std::string text(const Json& j, const char* key);    // empty if missing
 bool flag(const Json& j, const char* key, bool otherwise);
 std::optional<std::pair<double, double>> interval(const Json& j, const char* key);  // [lo, hi]
-std::vector<Json> objects(const Json& j, const char* key);       // those of a list that are objects
-std::vector<std::string> texts(const Json& j, const char* key);  // those of a list that are texts
+std::vector<Json> objects(const Json& j, const char* key);       // the elements of a list that are objects
+std::vector<std::string> texts(const Json& j, const char* key);  // the elements of a list that are strings
 
 }  // namespace ls::report

@@ -1,4 +1,4 @@
-// Figures as people read them.
+// Formats figures for people.
 #pragma once
 
 #include <cstdint>
@@ -6,21 +6,21 @@
 
 namespace ls::report {
 
-inline constexpr const char* kAbsent = "–";  // for what is not known: not finite
+inline constexpr const char* kAbsent = "–";  // for unknown (non-finite) values
 
 std::string superscript(int n);  // "⁻⁴"
 // Three significant digits: "0.0213", "3.20 × 10⁻⁵".
 std::string figure(double x);
 std::string true_figure(double x, bool below_noise);  // against a reference
-std::string given(double x);  // a figure that a person chose, with the digits it was given: "0.001"
+std::string given(double x);  // a number chosen by a person, with its original digits: "0.001"
 // "0.4 s", "12 s", "4.2 min", "1 h 12 min", "3 d 4 h".
 std::string duration(double seconds);
 std::string count(double n);           // "39,321,600"
-std::string sample_count(double spp);  // "1,024"; of a mean over few "5.7"
-std::string threads_words(double n);   // "4", of a farm's mean "3.5"
+std::string sample_count(double spp);  // "1,024"; for a mean over few pixels "5.7"
+std::string threads_words(double n);   // "4"; for a farm's mean "3.5"
 std::string byte_size(double n);       // "34.7 MiB"
 std::string percent(
-    double part);  // "12 %", "< 1 %": 0 and 100 are kept for nothing and everything; no markup
+    double part);  // "12 %", "< 1 %": 0 and 100 only for exactly nothing and everything; plain text
 std::string date_time(double unix_seconds);  // "2026-11-21 18:26 UTC"
 
 }  // namespace ls::report

@@ -28,12 +28,12 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
   return begin < end ? text.substr(begin, end - begin) : std::string_view{};
 }
 
-// The line with a caret under the place; of a long line only the part around the place.
+// The line with a caret under the place; of a long line only the part around it.
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > scene::kMaxExcerptBytes / 2 ? column - scene::kMaxExcerptBytes / 2 : 0;
-  const std::string line =
-      plain_text(characters(d.source_line, first, first + scene::kMaxExcerptBytes));  // the caret stays
+  // plain_text() keeps columns, so the caret fits.
+  const std::string line = plain_text(characters(d.source_line, first, first + scene::kMaxExcerptBytes));
   const std::string number = std::to_string(d.place.line);
   const std::size_t room = first + scene::kMaxExcerptBytes - column;
   const std::size_t length = std::min<std::size_t>(static_cast<std::size_t>(std::max(1, d.length)), room);

@@ -1,4 +1,4 @@
-// What is wrong with a scene, and where.
+// Errors and warnings about a scene, with their place.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ struct Diagnostic {
   Severity severity = Severity::error;
   SourcePlace place;
   std::string text;
-  std::string source_line;  // the line itself, for the caret; empty if there is none
+  std::string source_line;  // the line, for showing the caret; empty if there is none
   int length = 1;           // of the underlined part
   bool operator==(const Diagnostic&) const = default;
 };

@@ -6,17 +6,17 @@
 #include <system_error>
 #include <vector>
 
+#include "common/base/suggest.h"
 #include "common/scene/limits.h"
-#include "common/scene/suggest.h"
 
 namespace ls {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxNamesLookedAt = 4096;  // of a folder, for a suggestion
+constexpr std::size_t kMaxNamesLookedAt = 4096;  // limit of files in a folder examined for a suggestion
 
-// "; did you mean 'cloud.vol'?" from the files beside the one that is missing.
+// "; did you mean 'cloud.vol'?" from the files beside the missing one.
 std::string names_like(const fs::path& missing) {
   std::vector<std::string> names;
   std::error_code error;
@@ -26,7 +26,7 @@ std::string names_like(const fs::path& missing) {
     names.push_back(it->path().filename().string());
   if (names.empty())
     return fs::is_directory(folder, error) ? "; its folder is empty" : "; its folder does not exist";
-  const auto near = scene::nearest_name(missing.filename().string(), names);
+  const auto near = nearest_name(missing.filename().string(), names);
   return near ? fmt::format("; did you mean '{}'?", *near) : "";
 }
 
@@ -35,7 +35,7 @@ std::string names_like(const fs::path& missing) {
 Result<fs::path> FolderAssets::locate(std::string_view name) const {
   if (name.empty() || name.find('\0') != std::string_view::npos)
     return fail(Errc::invalid_argument, "this is not the name of a file");
-  const fs::path path = folder_ / fs::path(name);  // an absolute name stays itself
+  const fs::path path = folder_ / fs::path(name);  // an absolute name is used as it is
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found)

@@ -1,4 +1,4 @@
-// The files of a scene on disk, for the command line: names are relative to the folder of the main scene
+// The files of a scene on disk, for the command line. Names are relative to the folder of the main scene
 // file.
 #pragma once
 
@@ -14,15 +14,15 @@ namespace ls {
 
 class FolderAssets final : public AssetSource {
  public:
-  // `folder`: of the main scene file; empty: the working directory.
+  // `folder`: that of the main scene file; empty: the working directory.
   explicit FolderAssets(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  // Digests are computed once a file and kept; a file that is missing is told with names like it.
-  // invalid_argument: it is there but no regular file, or can't be read.
+  // Computes each file's digest once. If a file is missing, the error suggests similar names.
+  // invalid_argument: it exists but is not a regular file, or cannot be read.
   Result<Asset> find(std::string_view name) override;
   Result<std::string> text(std::string_view name) override;
 
-  // Where the bytes are of what find() has found.
+  // Path of a file that find() has found.
   std::optional<std::filesystem::path> path_of(std::string_view name) const;
   std::optional<std::filesystem::path> path_of(const Digest& digest) const;
 

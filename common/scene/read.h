@@ -1,4 +1,4 @@
-// Scene text -> Scene, or up to kMaxDiagnostics diagnostics, each with a place.
+// Reads scene text: returns a Scene, or up to kMaxDiagnostics diagnostics, each with a place.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,21 @@
 
 namespace ls {
 
-// How the reader reaches the files a scene names. Two real ones: a folder on disk (the command line), and the
-// assets of an upload (the coordinator, which never opens a path that a scene wrote).
+// Gives the reader access to the files that a scene names. Two implementations: a folder on disk (the command
+// line), and the assets of an upload (the coordinator, which never opens a path written in a scene).
 class AssetSource {
  public:
   virtual ~AssetSource() = default;
   // Digest and size of the file that the scene calls `name`.
   virtual Result<Asset> find(std::string_view name) = 0;
-  // Text of an included scene file; bounded in size.
+  // Text of an included scene file, of limited size.
   virtual Result<std::string> text(std::string_view name) = 0;
 };
 
 struct ReadOptions {
-  std::map<std::string, std::string> defines;  // $name -> value; one that nothing asks for is warned about
+  std::map<std::string, std::string> defines;  // $name -> value; unused ones cause a warning
   bool strict = false;                         // warnings become errors
-  // Of a sequence: a run of # in the name of a file stands for this number, and $frame is defined to be it.
+  // For sequences: a run of # in a file name is replaced by this number, and $frame is defined as it.
   std::optional<std::uint32_t> frame = std::nullopt;
   bool labels = false;  // fill Scene::shape_labels and instance_labels
 };

@@ -1,7 +1,7 @@
-// The scene as plain data: what a scene file becomes, whatever its dialect. No pointers, no library types;
-// cross references are typed indices; every file is named by digest. Semantics are Mitsuba 3's. Lengths are
-// scene units, angles degrees (as in the files), colours linear RGB. Two equal Scenes have the same canonical
-// serialisation and so the same digest.
+// The scene as plain data, the result of reading a scene file of any dialect. No pointers, no library types;
+// cross references are typed indices; every file is identified by digest. Semantics are Mitsuba 3's. Lengths
+// are in scene units, angles in degrees (as in the files), colours linear RGB. Equal Scenes have the same
+// canonical serialisation and so the same digest.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace ls {
 
-// ---- textures
+// Textures.
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
 
@@ -25,34 +25,34 @@ struct ConstantTexture {
   Rgb value{.5, .5, .5};
   bool operator==(const ConstantTexture&) const = default;
 };
-// v = 0 is the top row (Mitsuba 3): nothing flips in the lookup; OBJ meshes flip v at load, see MeshShape.
+// v = 0 is the top row (Mitsuba 3): lookups do not flip; OBJ meshes flip v at load, see MeshShape.
 struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
   UvTransform to_uv;
-  // For an opacity: the image's alpha channel, if that falls below 1/2 somewhere, and else its colour.
+  // For an opacity: use the image's alpha channel if it falls below 1/2 somewhere, otherwise its colour.
   bool alpha = false;
   bool operator==(const BitmapTexture&) const = default;
 };
 // color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's
-// `checkerboard`). Where one number is wanted (roughness, opacity, weight of a blend, all of `principled` but
-// its colour) it is color1 that stands there: so has it Mitsuba 3.9.
+// `checkerboard`). Read as a scalar (roughness, opacity, weight of a blend, all of `principled` but its
+// colour) the two are swapped, as in Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
   bool operator==(const CheckerboardTexture&) const = default;
 };
 // The largest channel of another texture, or with `hue` its colour divided by that (white where it is black):
-// their product is the texture. Our own; what Nori's `microfacet` is made of.
+// their product is the texture. An extension, used to express Nori's `microfacet`.
 struct PeakTexture {
   TextureIndex texture;
   bool hue = false;
   bool operator==(const PeakTexture&) const = default;
 };
-// What a mesh carries of this name, "vertex_..." (interpolated) or "face_...": one number, or three. Of a PLY
-// file; on other shapes it means nothing and is refused (mesh_attributes.h).
+// A mesh attribute of this name, "vertex_..." (interpolated) or "face_...": one number, or three. For PLY
+// files; rejected on other shapes (mesh_attributes.h).
 struct MeshAttributeTexture {
   std::string name;
   double scale = 1;
@@ -61,10 +61,10 @@ struct MeshAttributeTexture {
 using Texture =
     std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture, MeshAttributeTexture>;
 
-// ---- surfaces
+// Surfaces.
 enum class Microfacet { beckmann, ggx };
-// Rough surfaces with multiple_scattering also send on the light that microfacets throw onto each other,
-// which the model leaves out (docs/design/multiple-scattering.md). Their roughness is one constant.
+// Rough surfaces with multiple_scattering include light scattered several times between microfacets, which
+// the plain model omits (docs/design/multiple-scattering.md). Their roughness must be one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -96,7 +96,7 @@ struct RoughDielectricBsdf {
   bool multiple_scattering = false;
   bool operator==(const RoughDielectricBsdf&) const = default;
 };
-struct ThinDielectricBsdf {  // both sides of a sheet in one surface: light passes without being bent
+struct ThinDielectricBsdf {  // both sides of a sheet in one surface: light passes without refraction
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const ThinDielectricBsdf&) const = default;
@@ -123,8 +123,8 @@ struct TwoSidedBsdf {
   BsdfIndex front, back;
   bool operator==(const TwoSidedBsdf&) const = default;
 };
-// Bsdfs that hold others do so at most scene::kMaxBsdfNesting deep.
-struct MaskBsdf {  // the share 1 - opacity of the light passes straight on
+// Bsdfs that contain others nest at most scene::kMaxBsdfNesting deep.
+struct MaskBsdf {  // a share 1 - opacity of the light passes straight through
   TextureIndex opacity;
   BsdfIndex bsdf;
   bool operator==(const MaskBsdf&) const = default;
@@ -134,18 +134,17 @@ struct BlendBsdf {  // (1 - weight) first + weight second
   BsdfIndex first, second;
   bool operator==(const BlendBsdf&) const = default;
 };
-// Both kinds of map: flip_invalid_normals turns a normal by half a circle about the surface's where it would
-// face away from the viewer (Schuessler et al. 2017); use_shadowing_function darkens by the shadow that
-// facets of the map's slope would cast (Estevez, Lecocq, Stein 2019). With either, light does not go both
-// ways alike.
+// Options of both kinds of map: flip_invalid_normals rotates a normal that faces away from the viewer by half
+// a turn about the surface's (Schuessler et al. 2017); use_shadowing_function darkens by the shadowing of
+// facets with the map's slope (Estevez, Lecocq, Stein 2019). With either, the BSDF is not reciprocal.
 struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
   TextureIndex normalmap;
   BsdfIndex bsdf;
   bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const NormalMapBsdf&) const = default;
 };
-// The surface is lifted along its normal by scale * luminance, in scene units, as far as the normal shows it.
-// A bitmap.
+// Displaces the surface along its normal by scale * luminance, in scene units, but in the shading normal
+// only. The texture is a bitmap.
 struct BumpMapBsdf {
   TextureIndex texture;
   double scale = 1;
@@ -153,10 +152,10 @@ struct BumpMapBsdf {
   bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const BumpMapBsdf&) const = default;
 };
-// Burley's model, 2012 and 2015, as Mitsuba 3 has it.
+// Burley's model, 2012 and 2015, as in Mitsuba 3.
 struct PrincipledBsdf {
   TextureIndex base_color, roughness, anisotropic, metallic;
-  std::optional<TextureIndex> spec_trans;  // nothing: no light crosses the surface
+  std::optional<TextureIndex> spec_trans;  // nullopt: no light crosses the surface
   double eta = 1.5;
   TextureIndex spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss;
   bool operator==(const PrincipledBsdf&) const = default;
@@ -165,9 +164,10 @@ using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, Dielec
                           ThinDielectricBsdf, PlasticBsdf, RoughPlasticBsdf, NullBsdf, TwoSidedBsdf, MaskBsdf,
                           BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf>;
 
-// ---- volumes and media
-// As a density it fills the unit cube [0,1]^3 of its local space, moved by to_world; as anything else it is
-// everywhere.
+// Volumes and media.
+//
+// As a density it fills the unit cube [0,1]^3 of its local space, transformed by to_world; otherwise it
+// extends everywhere.
 struct ConstVolume {
   Rgb value{1, 1, 1};
   Transform to_world;
@@ -175,17 +175,17 @@ struct ConstVolume {
 };
 enum class VolumeFilter { nearest, trilinear };
 enum class GridOrder { x_fastest, z_fastest };
-// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, moved by to_world. With
-// use_grid_bbox the file's own bounding box is placed first. VDB and NanoVDB grids are placed by their own
-// transform, raw `.bin` grids by their box with the outermost values on its faces (see
+// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, transformed by to_world. With
+// use_grid_bbox the cube is first mapped to the file's own bounding box. VDB and NanoVDB grids are placed by
+// their own transform, raw `.bin` grids by their box with the outermost values on its faces (see
 // docs/reference/scene-format.md).
 struct GridVolume {
   AssetIndex file;
-  std::string grid_name;  // for files with named grids; empty: the only one, or "density"
+  std::string grid_name;  // for files with named grids; empty: the only grid, or "density"
   VolumeFilter filter = VolumeFilter::trilinear;
   Wrap wrap = Wrap::clamp;
   bool use_grid_bbox = false;
-  bool node_centred = false;  // the outermost values on the faces of the box (Mitsuba 0.x); not of VDB
+  bool node_centred = false;  // the outermost values are on the faces of the box (Mitsuba 0.x); not for VDB
   bool raw = true;
   Transform to_world;
   GridOrder order = GridOrder::x_fastest;  // of the values in a `.bin`
@@ -202,46 +202,46 @@ struct HgPhase {
 };
 using Phase = std::variant<IsotropicPhase, HgPhase>;
 
-// sigma_t (per scene unit) and albedo, both multiplied out at load: sigma_s = albedo * sigma_t * scale. What
-// it emits per length is emission + sigma_a * source_radiance.
+// sigma_t (per scene unit) and albedo, multiplied out at load: sigma_s = albedo * sigma_t * scale. Emission
+// per length is emission + sigma_a * source_radiance.
 struct HomogeneousMedium {
   Rgb sigma_t{1, 1, 1};
   Rgb albedo{.75, .75, .75};
   double scale = 1;
   PhaseIndex phase;
-  Rgb emission{0, 0, 0};         // radiance per scene unit, whatever the extinction
-  Rgb source_radiance{0, 0, 0};  // what an infinite depth of it, not scattering, shows
-  int priority = 0;              // where media overlap those of the highest count, together
+  Rgb emission{0, 0, 0};         // radiance per scene unit, independent of extinction
+  Rgb source_radiance{0, 0, 0};  // radiance of an infinite depth of the medium without scattering
+  int priority = 0;              // of overlapping media, all those of the highest priority are in effect
   bool operator==(const HomogeneousMedium&) const = default;
 };
-// At most one of the three sources of light.
+// At most one of emission, source_radiance and temperature is set.
 struct HeterogeneousMedium {
   VolumeIndex sigma_t;
   VolumeIndex albedo;
   double scale = 1;
   PhaseIndex phase;
-  std::optional<VolumeIndex> emission;         // radiance per scene unit, whatever the extinction
-  std::optional<VolumeIndex> source_radiance;  // emits sigma_a times it
-  // Emits sigma_a times the radiance of a black body of temperature_offset + temperature_scale * value
-  // kelvin.
+  std::optional<VolumeIndex> emission;         // radiance per scene unit, independent of extinction
+  std::optional<VolumeIndex> source_radiance;  // emission per length is sigma_a times this
+  // Emission per length is sigma_a times the radiance of a black body at temperature_offset +
+  // temperature_scale * value kelvin.
   std::optional<VolumeIndex> temperature;
-  double emission_scale = 1;  // factor on what is emitted
+  double emission_scale = 1;  // factor on the emission
   double temperature_scale = 1, temperature_offset = 0;
-  int priority = 0;  // as of a homogeneous one
+  int priority = 0;  // as for a homogeneous medium
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
-// ---- emitters without a shape
-struct ConstantEmitter {  // radiance from everywhere
+// Emitters without a shape.
+struct ConstantEmitter {  // radiance from all directions
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
 };
-struct DirectionalEmitter {  // `direction`: the way light travels, in the world; irradiance on a plane facing
-                             // it
+// `direction`: the light's direction of travel, in the world; irradiance on a plane facing it
+struct DirectionalEmitter {
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
-  // Degrees: the light is a disk of this radius in the sky, of one radiance, with the same irradiance.
+  // Degrees: the light is a disk of this radius in the sky, of uniform radiance, with the same irradiance.
   double angular_radius = 0;
   bool operator==(const DirectionalEmitter&) const = default;
 };
@@ -250,17 +250,17 @@ struct PointEmitter {
   Rgb intensity{1, 1, 1};  // W/sr
   bool operator==(const PointEmitter&) const = default;
 };
-struct SpotEmitter {  // at the origin of to_world, shining along its +z
+struct SpotEmitter {  // at the origin of to_world, emitting along its +z
   Transform to_world;
   Rgb intensity{1, 1, 1};
-  double cutoff_angle = 20;             // degrees from the axis: dark beyond
-  double beam_width = 15;               // full intensity within; in between linear in the angle
-  std::optional<TextureIndex> texture;  // projected, as Mitsuba's
+  double cutoff_angle = 20;             // degrees from the axis; dark beyond
+  double beam_width = 15;               // full intensity within; linear in the angle between the two
+  std::optional<TextureIndex> texture;  // projected, as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
-// Radiance from everywhere around, by direction: an image in latitude-longitude form. In its own space the
-// top row is +y; of the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). Rows
-// lie from pole to pole, the first and the last on them; columns repeat. to_world turns and mirrors only.
+// Radiance from all directions: an image in latitude-longitude form. In its own space the top row is +y; on
+// the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). The first and last rows
+// are the poles; columns wrap around. to_world rotates and mirrors only.
 struct EnvmapEmitter {
   AssetIndex file;
   double scale = 1;
@@ -268,9 +268,9 @@ struct EnvmapEmitter {
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
-// A camera turned round: at the origin of to_world, along its +z, +y up, it throws an image as the camera of
-// that field of view and the image's shape would see it. On the plane one scene unit ahead irradiance is
-// pi scale times the image's value.
+// An inverse camera: at the origin of to_world, along its +z, +y up, it projects an image as a camera with
+// that field of view and the image's aspect would see it. On the plane one scene unit ahead the irradiance is
+// pi * scale times the image's value.
 struct ProjectorEmitter {
   TextureIndex irradiance;
   double scale = 1;
@@ -282,18 +282,18 @@ struct ProjectorEmitter {
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
                              ProjectorEmitter>;
 
-// ---- integrator
+// Integrator.
 struct IntegratorSettings {
-  std::string name = "volpath";  // ours: "volpath", "volpath_distant_mis" or "path"
+  std::string name = "volpath";  // our name: "volpath", "volpath_distant_mis" or "path"
   int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light
   int rr_depth = 5;
   bool hide_emitters = false;
-  DistanceSampling distance = DistanceSampling::mis;  // these two of "volpath_distant_mis" alone
+  DistanceSampling distance = DistanceSampling::mis;  // these two for "volpath_distant_mis" only
   MisHeuristic heuristic = MisHeuristic::power;
   bool operator==(const IntegratorSettings&) const = default;
 };
 
-// What people call a shape or an instance, and its material; for the names of mattes only.
+// Names of a shape or an instance, and of its material; for Cryptomatte names only.
 struct Label {
   std::string name, material;  // material: empty for instances
   bool operator==(const Label&) const = default;
@@ -314,8 +314,8 @@ struct Scene {
   std::uint64_t sample_count = 4;
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
-  std::string aovs;  // further outputs that the scene asks for: names of common/image/aov.h, comma between
-  // Of each shape and instance; empty unless they were asked for (ReadOptions::labels).
+  std::string aovs;  // AOVs that the scene requests: names of common/image/aov/aov.h, separated by commas
+  // For each shape and instance; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;
   bool operator==(const Scene&) const = default;
 };

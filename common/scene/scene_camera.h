@@ -5,7 +5,7 @@
 #include <optional>
 #include <variant>
 
-#include "common/image/frame.h"
+#include "common/image/frame/frame.h"
 #include "common/scene/scene_values.h"
 
 namespace ls {
@@ -24,9 +24,9 @@ struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   std::array<double, 2> principal_point_offset{0, 0};
   double aperture_radius = 0;  // 0: pinhole
   double focus_distance = 1;
-  std::optional<MediumIndex> medium;  // that the camera sits in
+  std::optional<MediumIndex> medium;  // the medium around the camera
   Projection projection = Projection::perspective;
-  std::optional<TextureIndex> aperture_scale;  // over the frame: multiplies the aperture's radius at a pixel
+  std::optional<TextureIndex> aperture_scale;  // over the frame: factor on the aperture's radius at a pixel
   bool operator==(const Sensor&) const = default;
 };
 
@@ -47,16 +47,16 @@ using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>
 struct FilmSettings {
   FrameSize size{768, 576};
   ReconstructionFilter filter = GaussianFilter{};
-  // The part of the frame that is rendered; a width of 0: all of it.
+  // The rendered part of the frame; a width of 0: the whole frame.
   std::array<int, 2> crop_offset{0, 0};
   FrameSize crop_size{0, 0};
   bool has_crop() const { return crop_size.width > 0; }
-  FrameSize image_size() const { return has_crop() ? crop_size : size; }  // of what is written
+  FrameSize image_size() const { return has_crop() ? crop_size : size; }  // size of the output
   bool operator==(const FilmSettings&) const = default;
 };
 
-// How `volpath_distant_mis` chooses the point of a ray's way through a medium that it connects with a light,
-// and how the two choices of `mis` are weighed against each other.
+// How `volpath_distant_mis` samples the point on a ray through a medium that it connects with a light, and
+// how it weights the two samples of `mis` against each other.
 enum class DistanceSampling { exponential, equiangular, mis };
 enum class MisHeuristic { power, balance };
 

@@ -14,7 +14,7 @@ struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
 struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
   bool operator==(const CubeShape&) const = default;
 };
-struct SphereShape {  // center and radius before to_world
+struct SphereShape {  // center and radius apply before to_world
   Vec3 center{0, 0, 0};
   double radius = 1;
   bool operator==(const SphereShape&) const = default;
@@ -38,9 +38,9 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// Radiance leaves on the side of the normal only. At an angle a from it, in degrees: all of it within
-// beam_width, none beyond cutoff_angle, and in between times s^falloff with
-// s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
+// Emits on the side of the normal only. At an angle a from it, in degrees: the full radiance within
+// beam_width, none beyond cutoff_angle, and in between radiance times s^falloff with s = (cos a - cos
+// cutoff_angle) / (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
@@ -55,15 +55,15 @@ struct Shape {
   std::optional<AreaEmitter> emitter;
   std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
   bool is_medium_transition = false;              // interior or exterior was given
-  // Seen only where instances of this group stand; to_world places it within the group. The shapes of a group
-  // stand together in the scene's list, groups in the order of their numbers; none of them emits light.
+  // Visible only through instances of this group; to_world places it within the group. The shapes of a group
+  // are contiguous in the scene's list, groups in the order of their indices; none of them emits light.
   std::optional<GroupIndex> group;
   bool operator==(const Shape&) const = default;
 };
-struct ShapeGroup {  // its shapes name it
+struct ShapeGroup {  // its shapes refer to it
   bool operator==(const ShapeGroup&) const = default;
 };
-struct Instance {  // the shapes of a group, once more
+struct Instance {  // another copy of a group's shapes
   GroupIndex group;
   Transform to_world;
   bool operator==(const Instance&) const = default;

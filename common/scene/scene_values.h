@@ -1,4 +1,4 @@
-// The values that a scene is made of; see scene.h.
+// The basic value types of a scene; see scene.h.
 #pragma once
 
 #include <array>
@@ -10,7 +10,8 @@
 namespace ls {
 
 using Rgb = std::array<double, 3>;
-// A place or direction. Not the type of a colour: files write the two differently.
+inline bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
+// A point or direction. A separate type from colours, as files write the two differently.
 struct Vec3 : std::array<double, 3> {};
 
 // Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
@@ -37,7 +38,7 @@ using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 using GroupIndex = Index<struct GroupTag>;
 
-// A file that the scene names. `name` is as written in the scene (for messages); the bytes are found by
+// A file that the scene names. `name` is as written in the scene (for messages); the bytes are identified by
 // digest.
 struct Asset {
   std::string name;

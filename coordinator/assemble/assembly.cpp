@@ -1,6 +1,6 @@
 #include "coordinator/assemble/assembly.h"
 
-#include "coordinator/limits.h"
+#include "coordinator/base/limits.h"
 
 namespace ls::coordinator {
 namespace {

@@ -39,7 +39,7 @@ void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
     auto& kept = tiles_[i].rounds;
     const auto later =
         std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
-    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);  // the last one that counts stays
+    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);  // keeps the last one that counts
   }
 }
 
@@ -62,7 +62,7 @@ void put(std::vector<std::byte>& out, const T& value) {
   std::memcpy(&out[at], &value, sizeof value);
 }
 
-// Whatever the bytes say, no more is allocated than they hold.
+// Never allocates more than the bytes hold, whatever they say.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -81,8 +81,8 @@ class Reader {
 };
 }  // namespace
 
-// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Written and read by the same build
-// only: the snapshot names its build and is left aside by another one.
+// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Read only by builds with the same
+// layout: the snapshot names its format, and other builds ignore it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;
@@ -106,7 +106,7 @@ std::vector<std::byte> RoundErrors::save() const {
 }
 
 namespace {
-// One tile's; what follows it is left in `in`.
+// Reads one tile; what follows it is left in `in`.
 template <class Rounds>
 bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
   std::uint32_t count = 0;

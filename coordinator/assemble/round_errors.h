@@ -1,6 +1,6 @@
-// The error sums of every tile after every fold, as far as they are still needed: a checkpoint says how many
-// rounds of each tile count, and sums what each said after those, though some are ahead already. So the
-// figures of a checkpoint do not depend on the order of arrival.
+// The error sums of every tile after every fold, as long as they are needed. A checkpoint gives the number of
+// rounds of each tile that count and sums the errors after these, even if some tiles are ahead already. So
+// the errors of a checkpoint do not depend on the order of arrival.
 #pragma once
 
 #include <cstddef>
@@ -10,27 +10,30 @@
 #include <vector>
 
 #include "common/base/error.h"
-#include "common/image/error_estimate.h"
+#include "common/image/error/error_estimate.h"
 
 namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // `keep_relative`: also keep each fold's relative error sum for good, which the farm's stopping needs after
+  // `keep_relative`: also keep each fold's relative error sum for good; the farm's stop rule needs them after
   // a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
-  // Rounds of a tile in order; a round given again (a cut one, now in full) replaces what was said of it.
+  // Rounds of a tile come in order; a round given again (a truncated one, now in full) replaces the earlier
+  // error.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  // Summed in tile order, `rounds` of each tile. One that has less counts with what it has; one of which only
-  // later rounds are kept, since it was ahead at a checkpoint that has been taken, with the first of those.
+  // The sum after `rounds` of each tile, in tile order. A tile with fewer rounds counts with what it has; a
+  // tile of which only later rounds are kept, because it was ahead at an earlier checkpoint, with the first
+  // of those.
   TileError at(std::span<const RoundIndex> rounds) const;
-  // Whether at() is what it was when these rounds were the last: nothing that it needs has been forgotten.
+  // True if at(rounds) is exact: nothing that it needs has been dropped.
   bool knows(std::span<const RoundIndex> rounds) const;
-  void discard(TileIndex tile) { tiles_[tile] = {}; }         // it is folded again from round 0
-  void checkpoint_taken(std::span<const RoundIndex> rounds);  // at() will not be asked for fewer again
+  void discard(TileIndex tile) { tiles_[tile] = {}; }  // the tile is folded again from round 0
+  // at() will not be called with fewer rounds again
+  void checkpoint_taken(std::span<const RoundIndex> rounds);
 
-  // [round][tile]; empty unless kept. Tiles that have not reached a round stand with 0.
+  // [round][tile]; empty unless kept. 0 for tiles that have not reached a round.
   std::vector<std::vector<double>> relative() const;
 
   std::vector<std::byte> save() const;

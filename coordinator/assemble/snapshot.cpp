@@ -37,13 +37,13 @@ std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_vi
   return out;
 }
 
-// Reads on, and knows the digest of all that was read.
+// Reads a file from the front and hashes all that it reads.
 class Source {
  public:
   explicit Source(std::filesystem::path path) : path_(std::move(path)) {
     if (auto file = File::open(path_, O_RDONLY)) file_ = std::move(*file);
   }
-  // Nothing: there are not so many.
+  // nullopt: fewer bytes are left.
   std::optional<std::vector<std::byte>> take(std::uint64_t bytes) {
     if (!file_ || bytes > kMostPart) return std::nullopt;
     auto read = read_at(file_, at_, static_cast<std::size_t>(bytes), path_);
@@ -60,7 +60,7 @@ class Source {
     std::memcpy(&v, raw->data(), sizeof v);
     return v;
   }
-  // All that is left must be the seal.
+  // True if the rest of the file is the right seal.
   bool sealed() {
     const Digest read = hash_.finish();
     const auto seal = take(sizeof read.bytes);
@@ -74,7 +74,7 @@ class Source {
   Sha256 hash_;
 };
 
-// False: damaged. `health` collects what load() of all of it takes.
+// False: damaged. Appends to `health` the text that HealthTable::load() reads at the end.
 bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
   TileHead head{.tile = tile};
   for (std::uint64_t* length : {&head.film, &head.errors, &head.health}) {
@@ -90,7 +90,7 @@ bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std:
 
 }  // namespace
 
-TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const HealthBook& health,
+TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const HealthTable& health,
                          TileIndex tile) {
   return {tile, film.saver(tile), errors.save_tile(tile), health.save_tile(tile)};
 }
@@ -147,9 +147,9 @@ std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const T
   std::string health;
   while (const auto tile = in.value<std::uint32_t>()) {
     if (*tile == kEnd) {
-      auto book = HealthBook::load(health);
-      if (!in.sealed() || !book) return std::nullopt;
-      return Assembly(std::move(film), std::move(errors), std::move(*book));
+      auto health_table = HealthTable::load(health);
+      if (!in.sealed() || !health_table) return std::nullopt;
+      return Assembly(std::move(film), std::move(errors), std::move(*health_table));
     }
     if (*tile >= grid.count() || !read_tile(in, *tile, film, errors, health)) return std::nullopt;
   }

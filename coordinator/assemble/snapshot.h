@@ -1,9 +1,10 @@
-// What is folded of a job, as a file, tile by tile: neither writing nor reading one takes more memory than a
-// tile besides the film. Each tile stands as it was when it was added, so a film may go on being folded
-// meanwhile; what it has more by then is folded again from the partials after a restart.
-//   "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile, u64
-//   lengths of its three parts, and these: film (film_bytes.cpp), error figures, health; u32 2^32 - 1;
-//   SHA-256 of all before it
+// A snapshot file of a job's folded image, tile by tile: writing or reading it needs memory for one tile
+// besides the film. Each tile is saved as it was when added, so folding may continue meanwhile; after a
+// restart, later folds are repeated from the partials.
+// Format:
+//    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
+//    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
+//    SHA-256 of all before it
 #pragma once
 
 #include <filesystem>
@@ -25,17 +26,17 @@ struct TileSnapshot {
   std::vector<std::byte> errors;
   std::string health;
 };
-TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const HealthBook& health,
+TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const HealthTable& health,
                          TileIndex tile);
 
 class SnapshotFile {
  public:
-  // `suffix`: of the name that it has until commit().
+  // `suffix`: added to the file name until commit().
   static Result<SnapshotFile> create(const std::filesystem::path& path, std::string_view suffix,
                                      const TileGrid& grid, AovSet aovs, std::string_view format);
-  Result<void> add(const TileSnapshot& tile);  // each once; one that has nothing folded is left out
-  Result<void> finish();                       // sealed and durable, but not at its place
-  Result<void> commit();                       // after finish()
+  Result<void> add(const TileSnapshot& tile);  // each tile once; tiles without folds are skipped
+  Result<void> finish();  // seals the file and makes it durable, still under the temporary name
+  Result<void> commit();  // moves the file into place, after finish()
 
  private:
   explicit SnapshotFile(AtomicFile file) : file_(std::move(file)) {}
@@ -44,8 +45,8 @@ class SnapshotFile {
   Sha256 hash_;
 };
 
-// Nothing if it is missing, damaged, of another grid, other AOVs or another format: then everything is folded
-// again from the partials. Files of earlier programs ("LSSNAP1\n", all in one piece) are read, too.
+// nullopt if the file is missing, damaged or of another grid, AOV set or format: then everything is folded
+// again from the partials. Also reads the format of earlier versions ("LSSNAP1\n", all in one piece).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
 

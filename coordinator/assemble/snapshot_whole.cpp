@@ -37,7 +37,7 @@ std::optional<Assembly> load_whole_snapshot(const std::filesystem::path& path, c
   const auto by = take_part(rest);
   const auto film_bytes = take_part(rest);
   const auto error_bytes = take_part(rest);
-  // The first of them had none.
+  // The first snapshots had no health.
   const std::optional<std::span<const std::byte>> health_bytes =
       rest.empty() ? std::as_bytes(std::span(kNoHealth)) : take_part(rest);
   if (!by || !film_bytes || !error_bytes || !health_bytes || !rest.empty()) return std::nullopt;
@@ -46,7 +46,8 @@ std::optional<Assembly> load_whole_snapshot(const std::filesystem::path& path, c
   if (!film || film->grid() != grid || film->aovs() != aovs) return std::nullopt;
   auto errors = RoundErrors::load(*error_bytes, grid.count(), keep_relative);
   if (!errors) return std::nullopt;
-  auto health = HealthBook::load({reinterpret_cast<const char*>(health_bytes->data()), health_bytes->size()});
+  auto health =
+      HealthTable::load({reinterpret_cast<const char*>(health_bytes->data()), health_bytes->size()});
   if (!health) return std::nullopt;
   return Assembly(std::move(*film), std::move(*errors), std::move(*health));
 }

@@ -1,5 +1,5 @@
-// Snapshots of earlier programs, all in one piece: {"LSSNAP1\n", format, film, error figures, health}, closed
-// by a SHA-256. Read, no longer written.
+// Snapshots of earlier versions, all in one piece: {"LSSNAP1\n", format, film, error sums, health}, closed by
+// a SHA-256. Read, but no longer written.
 #pragma once
 
 #include <filesystem>

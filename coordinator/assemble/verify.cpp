@@ -14,7 +14,7 @@ BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
                              result.unit.round, why)}};
 }
 
-// The other ways a round of this tile is cut: same header, same start, an end within the round.
+// True if `got` differs only in how the round is cut: same header, same start, and an end within the round.
 bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex round) {
   UnitHeader other = got;
   other.samples = expected.samples;

@@ -1,19 +1,19 @@
-// Is a worker's result what it claims to be? No state, no lock: runs on any thread.
+// Verification of a worker's result. No state, no lock: runs on any thread.
 #pragma once
 
 #include <variant>
 
-#include "common/image/partial.h"
+#include "common/image/film/partial.h"
 #include "common/protocol/messages.h"
 
 namespace ls::coordinator {
 
-// An honest partial of the same round, but of another sample range than is wanted now: the job was extended
+// An honest partial of the right round, but of another sample range than needed now: the job was extended
 // meanwhile.
 struct OtherRange {
   SampleRange samples;
 };
-// Not what it claims: wrong size, windows, scene, settings, class, tile, digest, or not finite. Says what.
+// Wrong size, windows, scene, settings, class, tile or digest, or not finite; the error says which.
 struct BadResult {
   Error error;
 };

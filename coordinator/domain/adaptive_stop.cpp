@@ -10,7 +10,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Before it no round is the last one.
+// The first round that may be a tile's last.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
 constexpr RoundIndex kFirstForecast = 3;  // rounds: 8 samples
 
@@ -47,7 +47,7 @@ AdaptiveStop::AdaptiveStop(const TileGrid& grid, std::uint64_t spp)
       g.pixels += pixels_of(grid, t);
     }
     g.tiles = std::move(tiles);
-    g.stop = g.foreseen = std::min(kFirstStop, last_);
+    g.stop = g.predicted_last = std::min(kFirstStop, last_);
     groups_.push_back(std::move(g));
     advance(groups_.back());
   }
@@ -88,7 +88,7 @@ void AdaptiveStop::advance(Group& g) {
       ++g.stop;
     }
   }
-  g.foreseen = std::max(g.foreseen, g.stop);
+  g.predicted_last = std::max(g.predicted_last, g.stop);
 }
 
 double AdaptiveStop::predicted() const {
@@ -176,8 +176,8 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error grows with the level: halve the interval of its exponent, by roots, which are the same on every
-  // machine.
+  // The error grows with the level: bisect on the level's exponent. The midpoint is a square root, which has
+  // the same bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);
@@ -187,14 +187,14 @@ void AdaptiveStop::foresee(double target) {
   }
   for (std::size_t i = 0; i < groups_.size(); ++i) {
     const double n = samples(a[i], low);
-    groups_[i].foreseen =
+    groups_[i].predicted_last =
         std::max(groups_[i].stop, round_count(static_cast<std::uint64_t>(std::ceil(n))) - 1);
   }
-  foreseen_ = true;
+  speculative_ = true;
 }
 
-RoundIndex AdaptiveStop::foreseen(TileIndex tile) const {
-  return std::min(groups_[group_of_[tile]].foreseen, last_) + 1;
+RoundIndex AdaptiveStop::predicted_last(TileIndex tile) const {
+  return std::min(groups_[group_of_[tile]].predicted_last, last_) + 1;
 }
 
 double AdaptiveStop::variance(TileIndex tile) const {
@@ -203,7 +203,7 @@ double AdaptiveStop::variance(TileIndex tile) const {
                         : variance(g, static_cast<RoundIndex>(g.sums.size() - 1));
 }
 
-double AdaptiveStop::samples_lacking(const Group& g, RoundIndex last) const {
+double AdaptiveStop::samples_missing(const Group& g, RoundIndex last) const {
   const auto samples_to = [this](std::size_t round) {
     return static_cast<double>(cut_range(static_cast<RoundIndex>(round), spp_).s1);
   };
@@ -212,15 +212,15 @@ double AdaptiveStop::samples_lacking(const Group& g, RoundIndex last) const {
 }
 
 std::optional<double> AdaptiveStop::samples_left() const {
-  if (!foreseen_) return std::nullopt;
+  if (!speculative_) return std::nullopt;
   double samples = 0;
-  for (const Group& g : groups_) samples += samples_lacking(g, std::min(g.foreseen, last_));
+  for (const Group& g : groups_) samples += samples_missing(g, std::min(g.predicted_last, last_));
   return samples;
 }
 
 double AdaptiveStop::samples_to_limit() const {
   double samples = 0;
-  for (const Group& g : groups_) samples += samples_lacking(g, last_);
+  for (const Group& g : groups_) samples += samples_missing(g, last_);
   return samples;
 }
 

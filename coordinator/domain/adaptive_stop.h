@@ -1,29 +1,29 @@
-// When the tiles of a job with a target error stop: adaptive sampling, as a function of the tiles' own
-// errors.
+// Adaptive sampling: decides when the tiles of a job with a target error stop, from the tiles' own errors
+// alone.
 //
-// The image's relMSE is the mean over its pixels. A group of p pixels whose variance per sample is a (mean
-// over pixels and channels, relative) adds p a / n to it after n samples and costs p n. The sum is least for
-// its cost where one more sample lowers it equally everywhere, so where a / n^2 is equal: n ~ sqrt(a). (Equal
-// errors everywhere, n ~ a, would cost as much as uniform sampling.) In rounds: group g goes on after round k
-// as long as its gain a / (n_k n_k+1), what the next round takes off per sample, exceeds a level common to
-// all (marginal allocation, Fox 1966).
+// The image's relMSE is the mean over its pixels. A group of p pixels whose (relative) variance per sample,
+// averaged over pixels and channels, is a, contributes p a / n to it after n samples and costs p n. For a
+// given cost the sum is least where one more sample lowers it equally everywhere: where a / n^2 is equal, so
+// n ~ sqrt(a). (Equal errors everywhere, n ~ a, would cost as much as uniform sampling.) In rounds: group g
+// continues after round k as long as its gain a / (n_k n_k+1), the error that the next round removes per
+// sample, exceeds a level common to all groups (marginal allocation, Fox 1966).
 //
-// The right level for a target is not known in advance, and must not depend on who rendered what first. So
-// levels fall step by step on a fixed grid, 2^(-j/4). At each level every group comes to a stop by itself;
-// when all have, the error of the image is predicted, and either it is down to the target or the level falls.
-// Each state depends on the groups' errors alone, and the sequence of states not even on the target: a
-// smaller target goes on where a larger one ended, so that an extended job has the bits of one that had the
-// smaller target from the first.
+// The right level for a target is not known in advance, and must not depend on which results arrive first. So
+// levels fall step by step on a fixed grid, 2^(-j/4). At each level every group stops independently; when all
+// have stopped, the error of the image is predicted: either it meets the target, or the level falls. Each
+// state depends on the groups' errors alone, and the sequence of states does not even depend on the target: a
+// smaller target continues where a larger one ended, so an extended job has the same bits as one that had the
+// smaller target from the start.
 //
-// The decision to stop after round k uses the errors after the rounds before k and predicts that at k (the
-// variance falls as 1/n; samplers that do better make the image better than asked): a group's own last round
-// would bias it low. So does the judgement of the image; only when it says that the target is met are the
-// last rounds asked, too, and may make the image go on. Nothing stops before kMinSppBeforeStop. Cost per
-// sample counts as equal everywhere: measured times would make pixels depend on the machine. An error that is
-// not known (NaN) stops nothing.
+// The decision to stop after round k uses the errors of the rounds before k and predicts the error at k (the
+// variance falls as 1/n; samplers that converge faster make the image better than requested): the error of a
+// group's own last round would bias the decision towards stopping. The image's error is predicted in the same
+// way. Only when it meets the target are the errors of the last rounds checked, too, and they may make the
+// image continue. Nothing stops before kMinSppBeforeStop. The cost per sample is taken to be equal
+// everywhere: measured times would make pixels depend on the machine. An unknown error (NaN) stops nothing.
 //
-// All of it, and the error estimates that it is fed, is made of +, -, *, / and square roots, which are the
-// same bits on every machine: another coordinator that takes the job over decides alike.
+// Both this rule and the error estimates that it reads use only +, -, *, / and square roots, which give the
+// same bits on every machine: another coordinator that takes over the job makes the same decisions.
 #pragma once
 
 #include <cstdint>
@@ -32,96 +32,98 @@
 #include <span>
 #include <vector>
 
-#include "common/image/frame.h"
-#include "common/image/rounds.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 
 namespace ls::coordinator {
 
-// The largest number of the grid {2^(-j/4)} below `gain`, and never above it; 0 for 0.
+// Returns the largest number of the grid {2^(-j/4)} that is less than `gain`; 0 for 0.
 double level_below(double gain);
 
 class AdaptiveStop {
  public:
-  // `spp`: the most samples that any tile gets.
+  // `spp`: the most samples per pixel that any tile gets.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
-  // A tile's sum over pixels and channels of the relative squared error with rounds 0..round
-  // (TileError::relative.squares). Rounds of a tile in order; tiles in any.
+  // Adds the sum over the tile's pixels and channels of the relative squared error after rounds 0..round
+  // (TileError::relative.squares). The rounds of one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
-  // The last round of the tile that is wanted whatever comes: it may be folded. At a decision the tile's
-  // last.
+  // The tile's last round that is certain to be needed, so that it may be folded. Once the image is accepted,
+  // the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
-  // The tiles that stop with this one, itself among them.
+  // The tiles of this tile's group, which all stop together; includes the tile itself.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
-  // All groups have come to a stop at this level.
+  // True if all groups have stopped at this level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Whether the image is good enough at this level.
+  // Whether the image meets the target at this level.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
-  // relMSE of the image at this level, predicted from the rounds before the last of each tile; only when
-  // settled.
+  // relMSE of the image at this level, predicted from the rounds before each tile's last. Requires settled().
   double predicted() const;
-  // Every group has all the samples there are: nothing can go on.
+  // True if every group has reached the sample limit: nothing can continue.
   bool exhausted() const;
-  // Goes to the next level; only when settled and not exhausted. Where nothing is known to gain by it, all
-  // groups get all the samples there are.
+  // Goes to the next level. Requires settled() and not exhausted(). If no group's gain is known to be
+  // positive, all groups continue to the sample limit.
   void lower();
   double level() const { return level_; }
 
-  // How many rounds each tile has at this level; only when settled.
+  // Number of rounds of each tile at this level. Requires settled().
   std::vector<RoundIndex> ends() const;
   double mean_spp() const;  // over pixels
 
-  // Some group has all the samples there are.
+  // True if some group has reached the sample limit.
   bool bound() const;
-  // More samples for each tile than before; only while !bound(): with more a group would have decided
-  // otherwise.
+  // Raises the sample limit. Requires !bound(): a group that reached the limit might have continued with a
+  // higher one.
   void extend(std::uint64_t spp);
 
-  // ---- what will probably be wanted, to have it rendered in time; decides no pixel ----
-  // Looks ahead to the level at which the image will be down to `target`. Nothing is foreseen before every
-  // group has kFirstForecast rounds.
+  // Speculation: predicts the rounds that will probably be needed, so that they are rendered in time. Affects
+  // no pixel.
+  //
+  // foresee() predicts the level at which the image will meet `target`. It does nothing until every group has
+  // kFirstForecast rounds.
   void foresee(double target);
-  // Rounds of the tile that will probably be wanted; never fewer than those that surely are.
-  RoundIndex foreseen(TileIndex tile) const;
-  // Of the tile's group, per sample, as told by its last round: with it, in whole rounds, the rule's order of
-  // gains can be foretold. NaN: not known.
+  // Number of the tile's rounds that will probably be needed; never fewer than are certain to be.
+  RoundIndex predicted_last(TileIndex tile) const;
+  // Variance per sample of the tile's group, from its last round; with it the queue predicts the order of
+  // gains, in whole rounds. NaN if unknown.
   double variance(TileIndex tile) const;
-  // Samples of all pixels that these still lack; nothing: not foreseen yet.
+  // Pixel samples still to be taken up to the predicted ends; nullopt before foresee() has predicted them.
   std::optional<double> samples_left() const;
-  double samples_to_limit() const;                            // that all pixels lack to the most there are
-  std::uint64_t rounds_seen() const { return rounds_seen_; }  // of all groups
+  double samples_to_limit() const;  // pixel samples still to be taken up to the sample limit
+  std::uint64_t rounds_seen() const { return rounds_seen_; }  // summed over groups
   std::size_t groups() const { return groups_.size(); }
 
  private:
   struct Group {
     std::vector<TileIndex> tiles;
     double pixels = 0;
-    std::vector<double> sums;  // of the group's tiles, by round, in tile order
-    RoundIndex stop = 0;       // no earlier round was the last one
-    RoundIndex foreseen = 0;   // probably the last one
-    bool settled = false;      // and it is this one, at this level
+    std::vector<double> sums;       // error sums of the group's tiles, by round, added in tile order
+    RoundIndex stop = 0;            // the earliest round that may be the group's last
+    RoundIndex predicted_last = 0;  // the round that will probably be its last
+    bool settled = false;           // `stop` is its last round at this level
   };
-  double variance(const Group& g, RoundIndex round) const;        // per sample, as told by rounds 0..round
-  double samples_lacking(const Group& g, RoundIndex last) const;  // of its pixels, with rounds up to this one
+  double variance(const Group& g, RoundIndex round) const;        // per sample, from rounds 0..round
+  double samples_missing(const Group& g, RoundIndex last) const;  // pixel samples, up to round `last`
   double gain(const Group& g) const;                              // of one more round after `stop`
-  double measured() const;  // relMSE with the last rounds, which must be known
+  double measured() const;  // relMSE from the errors of the last rounds, which must be known
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }
   void advance(Group& g);
 
   TileGrid grid_;
   std::uint64_t spp_;
-  RoundIndex last_;  // of all rounds there are
+  RoundIndex last_;  // the last round within the sample limit
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;
-  std::vector<std::vector<double>> waiting_;  // of each tile: errors of rounds that its group has not got yet
+  // Errors by tile, of rounds that other tiles of its group do not have yet
+  std::vector<std::vector<double>> waiting_;
   std::size_t settled_ = 0;
   double level_ = std::numeric_limits<double>::infinity();
   std::uint64_t rounds_seen_ = 0;
-  bool foreseen_ = false;
+  bool speculative_ = false;
 };
 
 }  // namespace ls::coordinator

@@ -1,12 +1,12 @@
-// What a sample costs, measured from the CPU seconds that results report: per tile, and the job's running
-// mean for tiles not measured yet. Decides the size of leases and their deadlines, never a pixel.
+// Cost of a sample, measured from the CPU seconds that results report: per tile, with the job's running mean
+// for tiles not measured yet. Affects the size of leases and their deadlines, never a pixel.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
-#include "common/image/frame.h"
+#include "common/image/frame/frame.h"
 #include "coordinator/domain/limits.h"
 
 namespace ls::coordinator {
@@ -15,7 +15,7 @@ class CostModel {
  public:
   explicit CostModel(TileIndex tiles) : tile_cost_(tiles, 0.0f) {}
 
-  // Absurd figures (negative, not finite, more than a day) are passed over.
+  // Ignores implausible values (negative, not finite, more than a day).
   void measured(TileIndex tile, std::uint64_t pixel_samples, double cpu_seconds) {
     if (!(cpu_seconds >= 0 && cpu_seconds <= kMostUnitSeconds) || pixel_samples == 0) return;
     const double n = static_cast<double>(pixel_samples);
@@ -25,7 +25,7 @@ class CostModel {
   }
   bool known() const { return samples_ > 0; }
   double per_sample() const { return known() ? seconds_ / samples_ : 0; }
-  // Predicted CPU seconds; 0 when nothing has been measured.
+  // Predicted CPU seconds; 0 if nothing has been measured.
   double predict(TileIndex tile, std::uint64_t pixel_samples) const {
     if (!known()) return 0;
     const double cost = tile_cost_[tile] > 0 ? tile_cost_[tile] : per_sample();
@@ -33,8 +33,8 @@ class CostModel {
   }
 
  private:
-  static constexpr double kLeastSeconds = 1e-4;     // the turn-around of any unit
-  static constexpr double kMemory = 1 - 1.0 / 256;  // the mean follows the last few hundred results
+  static constexpr double kLeastSeconds = 1e-4;     // the overhead of any unit
+  static constexpr double kMemory = 1 - 1.0 / 256;  // exponential mean over the last few hundred results
   double seconds_ = 0, samples_ = 0;
   std::vector<float> tile_cost_;
 };

@@ -1,4 +1,4 @@
-// What the farm wants done. Effects are carried out in the order given.
+// Actions that the farm requests. The service carries them out in the order given.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@
 
 namespace ls::coordinator {
 
-// AssignLease (its tiles are now leased to this worker), CancelLease or CancelJob.
+// Send the worker an AssignLease (its units are now leased to it), CancelLease or CancelJob.
 struct Send {
   WorkerId worker;
   ToWorker message;
 };
 
-// These units are no longer lent under this lease. Those that are still wanted wait for another worker
-// (unless another lease holds them too).
+// These units have left this lease. Those that are still needed wait for another worker, unless another lease
+// holds them too.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -31,7 +31,7 @@ struct UnitsFreed {
   FreedCause cause = FreedCause::worker_lost;
 };
 
-// This result is the unit's accepted one: record it (unit, worker, digest).
+// This result is the unit's accepted one: store it (unit, worker, digest).
 struct RecordUnit {
   UnitKey unit;
   SampleRange samples;
@@ -39,26 +39,27 @@ struct RecordUnit {
   WorkerId worker;
 };
 
-// Fold this unit's accepted partial into the film, then raise UnitFolded. Rounds of a tile come in order,
-// each once; no round beyond the tile's stop is ever asked for.
+// Fold this unit's accepted partial into the film, then raise UnitFolded. The rounds of a tile come in order,
+// each once, and never beyond the tile's stop.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
 };
 
-// A second result of a unit, equal to the first: nothing to do but to let the worker drop it.
+// A second result of a unit, equal to the first: let the worker drop it.
 struct DropDuplicate {
   UnitKey unit;
   WorkerId worker;
 };
-// A result nobody wants: of a job that has ended, a round past its stop, another range or numeric class.
+// A result that is not needed: its job has ended, its round is past the tile's stop, or its range or numeric
+// class is another.
 struct DropUnwanted {
   UnitKey unit;
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A third one is
-// asked to render the unit; where there is none, a running job fails.
+// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A third worker
+// is asked to render the unit; if there is none, a running job fails.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -74,34 +75,33 @@ struct JobStateChanged {
   JobState from = JobState::queued;
   JobState to = JobState::queued;
 };
-// Every tile is folded as far as this says: time for a point of the convergence curve and a snapshot. With a
-// target error tiles have different numbers of rounds: those of one level of the stop rule
-// (coordinator/domain/adaptive_stop.h). Which checkpoints there are, and in what order, does not depend on
-// the order of arrival.
+// Every tile is folded up to the given round: time for a point of the convergence curve and a snapshot. With
+// a target error the tiles have different numbers of rounds: those of one level of the stop rule
+// (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend on the order of
+// arrival.
 struct Checkpoint {
   JobId job;
-  std::vector<RoundIndex> rounds;  // of each tile that count
+  std::vector<RoundIndex> rounds;  // rounds that count, by tile
   double spp = 0;                  // mean over pixels
 };
-// With an extension the cut round `round` is rendered again: its folded tail is to be replaced, its partials
-// are void.
+// An extension renders the truncated round `round` again in full: its folded tail is to be replaced, and its
+// partials are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
 };
-// All that is wanted is folded. Follows the JobStateChanged to `done`.
+// All units needed are folded. Follows the JobStateChanged to `done`.
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
-  std::uint64_t unaudited =
-      0;  // results that were to be rendered again, and no other worker of the class was there
+  std::uint64_t unaudited = 0;  // results chosen for an audit when no other worker of the class was connected
 };
-// For a person: what failed, where, what the workers said and how to replay it. Follows JobStateChanged to
-// `failed`.
+// The failure for a person to read: what failed, where, what the workers reported and how to replay it.
+// Follows the JobStateChanged to `failed`.
 struct JobFailed {
   JobId job;
   std::string error;
-  std::optional<UnitFailure> failure;  // the one that decided
+  std::optional<UnitFailure> failure;  // the failure that ended the job
 };
 
 struct WorkerStateChanged {
@@ -109,27 +109,27 @@ struct WorkerStateChanged {
   WorkerState to = WorkerState::connected;
   std::string why;
 };
-// A worker gets no more of this job for a while.
+// The worker gets no more units of this job for a while.
 struct WorkerBlocked {
   WorkerId worker;
   JobId job;
   std::string why;
 };
-// This worker rendered wrong pixels, as two others say: it gets no more work of any job, and nothing it sends
-// is taken. To be stored before what follows is carried out; none of its results may be taken up after a
-// restart.
-struct WorkerDistrusted {
+// This worker rendered wrong pixels, according to two others. It gets no more work of any job, and its
+// messages are ignored. Store this before carrying out the effects that follow; after a restart none of its
+// results may be accepted.
+struct WorkerFoundFaulty {
   WorkerId worker;
-  UnitKey unit;  // that it was found by
+  UnitKey unit;  // whose results revealed it
   std::string evidence;
 };
-// The film of this tile is void, since a worker that is not trusted has rendered some of it: it is folded
-// again from round 0. No result of it that was accepted so far counts.
+// The film of this tile is void, since a quarantined worker rendered part of it: the tile is folded again
+// from round 0. None of its results accepted so far count.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;
 };
-// A worker that was lost long ago is no longer known.
+// The farm has forgotten a worker that was lost long ago.
 struct WorkerForgotten {
   WorkerId worker;
 };
@@ -137,6 +137,6 @@ struct WorkerForgotten {
 using Effect =
     std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
                  JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed, WorkerStateChanged,
-                 WorkerBlocked, WorkerDistrusted, TileDiscarded, WorkerForgotten>;
+                 WorkerBlocked, WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

@@ -1,4 +1,5 @@
-// What the farm is told. Every fact that decides anything arrives here; the farm reads no clock and no file.
+// The farm's inputs. Every fact that decides anything arrives as an event; the farm reads no clock and no
+// file.
 #pragma once
 
 #include <cstdint>
@@ -11,61 +12,62 @@
 #include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/id.h"
-#include "common/image/frame.h"
-#include "common/image/rounds.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "common/protocol/messages.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
 
-// What a job asks for, resolved: the scene's own defaults are already in it.
+// A job's request, resolved: the scene's defaults are already filled in.
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
-  std::optional<std::uint64_t> spp;                // nothing: limits.h kMaxSppWithoutLimit
+  std::optional<std::uint64_t> spp;                // nullopt: limits.h kMaxSppWithoutLimit
   std::optional<double> target_error;              // relMSE of the image
   std::optional<double> time;                      // seconds from the first ray
   int priority = 0;                                // higher first
-  std::vector<std::string> tags;                   // a worker must carry all of them
+  std::vector<std::string> tags;                   // a worker must have all of them
   std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
-  // ---- whose turn it is, and how much at once (share_book.h, docs/design/scheduling.md) ----
-  std::string owner;  // the user (JobView::owner); empty: the administrator, whom no limit of users holds
-  std::string group;  // jobs of one owner that share their turns and go in order: a sequence; empty: itself
-  // Limits of the job, or of all jobs of its group together.
-  std::uint32_t max_workers = 0;   // that may hold units of it at once; 0: any number
-  std::uint32_t max_units = 0;     // lent at once; 0: any number
-  std::uint64_t memory_bytes = 0;  // that a worker must have for it, at least; 0: not known
+  // Fair shares and limits (fair_share.h, docs/design/scheduling.md)
+  std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
+  // The sequence: jobs of one owner and group share their turns and run in order; empty: the job alone
+  std::string group;
+  // Limits of the job, or of all jobs of its group together
+  std::uint32_t max_workers = 0;   // that hold units at the same time; 0: no limit
+  std::uint32_t max_units = 0;     // leased at the same time; 0: no limit
+  std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
 };
 
-// ---- jobs
+// Jobs
 struct JobSubmitted {
   JobPlan plan;
 };
 
-// After a restart, before any other event of the job.
+// Sent after a restart, before any other event of the job.
 struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    SampleRange samples;  // one that is no longer wanted (a cut round, extended since) is passed over
+    SampleRange samples;  // ignored if no longer needed (a truncated round that was extended since)
     Digest digest;
     WorkerId worker;
   };
   JobPlan plan;
   JobState state = JobState::queued;
-  std::optional<StopReason> stopped;    // of a job that is done
-  std::optional<Digest> numeric_class;  // it was pinned to
+  std::optional<StopReason> stopped;    // set for a job that is done
+  std::optional<Digest> numeric_class;  // the class that the job is pinned to
   std::vector<Unit> accepted;           // durable results, in any order
-  std::vector<RoundIndex> folded;       // rounds in the restored film (with tails), by tile; empty: none.
-                                        // A job that is done must have them
-  std::vector<std::vector<double>>
-      rel_error;               // [round][tile] of what is folded, as UnitFolded said; only with a target
-  double elapsed_seconds = 0;  // since its first ray, before the restart
-  // Results that were being rendered again (Farm::open_audits).
+  // Rounds in the restored film (with tails), by tile; empty: none. Required for a job that is done.
+  std::vector<RoundIndex> folded;
+  // [round][tile] of the folded rounds, from UnitFolded; only with a target error
+  std::vector<std::vector<double>> rel_error;
+  double elapsed_seconds = 0;  // from the first ray until the restart
+  // An audit that was open at the restart (Farm::open_audits)
   struct Audit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    std::optional<std::pair<WorkerId, Digest>> second;  // what another worker said, if it was not the same
+    std::optional<std::pair<WorkerId, Digest>> second;  // a differing result of another worker
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
@@ -80,7 +82,7 @@ struct JobPaused {
 struct JobResumed {
   JobId job;
 };
-// Finish with what is leased: the job ends as `done`, stopped by the user.
+// Finish the leased units only: the job ends as `done`, stopped by the user.
 struct JobStopped {
   JobId job;
 };
@@ -88,27 +90,28 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
-// Another target error for a job that has one and was not stopped otherwise (Farm::may_retarget). A smaller
-// one also takes up again what a larger one ended, and gives the bits of a job that had it from the first,
-// since what was not good enough for the larger one was not for it. A larger one counts from where the job
-// is.
+// Changes the target error of a job that has one and was not stopped for another reason (Farm::may_retarget).
+// A smaller target also resumes a job that reached the larger one, and gives the bits of a job that had it
+// from the start: an image that missed the larger target misses the smaller one, too. A larger target applies
+// from the job's current state on.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// To this new total, of a running, paused or done job. Of one whose end is decided a target error or time no
-// longer applies: all its tiles get the samples asked for.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. If its end is already
+// decided, a target error or time limit no longer applies: all its tiles get the new total.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
 };
-// Forget a job that has ended; its id may come again with JobRestored only.
+// Forget a job that has ended; its id may come again only with JobRestored.
 struct JobForgotten {
   JobId job;
 };
 
-// ---- workers
-// A stream has been registered. An older stream of the same worker counts as lost.
+// Workers
+
+// A worker has opened a stream. An older stream of the same worker counts as lost.
 struct WorkerJoined {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -116,16 +119,16 @@ struct WorkerJoined {
   Digest numeric_class;
   int threads = 1;
   std::vector<std::string> tags;
-  std::uint64_t memory_bytes = 0;  // that its renderer may use; 0: not told, then it is given anything
-  std::vector<Digest> blobs_held;  // in its cache, the most recently used first
+  std::uint64_t memory_bytes = 0;  // that its renderer may use; 0: unknown, so no job is kept from it
+  std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
 };
-// Known to have rendered wrong pixels, from before a restart or by another coordinator: it gets no work, and
-// what it has rendered of jobs that are here is void.
-struct WorkerBarred {
+// The worker rendered wrong pixels, found before a restart or by another coordinator: it gets no work, and
+// its results for jobs of this farm are void.
+struct WorkerQuarantined {
   WorkerId worker;
   std::string why;
 };
-// The stream has closed. With an epoch that is not the worker's last it means nothing.
+// The stream has closed. Ignored unless the epoch is the worker's latest.
 struct WorkerLost {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -137,8 +140,8 @@ struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;
 };
-// A result of this worker's has come and waits until the coordinator has room for it; behind it all else that
-// the worker says waits, too. That is no fault of the worker's: its leases go on.
+// A result of this worker has arrived and waits until the coordinator has room for it; later messages of the
+// worker wait behind it. This is not the worker's fault, so its leases are renewed.
 struct ResultsWait {
   WorkerId worker;
 };
@@ -147,8 +150,9 @@ struct LeaseCameBack {
   LeaseReturned returned;
 };
 
-// ---- units
-// A verified and durable result. Raised once per arrival; the farm sorts out duplicates.
+// Units
+
+// A verified and durable result. Raised once per arrival; the farm detects duplicates.
 struct UnitAccepted {
   UnitKey unit;
   SampleRange samples;
@@ -157,26 +161,26 @@ struct UnitAccepted {
   double cpu_seconds = 0;
   double wait_seconds = 0;  // that its thread waited meanwhile: core_share.h
 };
-// The assembler did what Fold asked for.
+// The assembler has carried out a Fold.
 struct UnitFolded {
   UnitKey unit;
-  SampleRange samples;  // as Fold named them
-  // Sum over pixels and channels of the tile's relative squared error, with all rounds up to this one:
-  // TileError::relative.squares of common/image/error_estimate.h.
+  SampleRange samples;  // as in the Fold
+  // Sum over pixels and channels of the tile's relative squared error after all rounds up to this one:
+  // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
 };
-// What the worker said, or the service itself of a result that is not what it claims to be.
+// Reported by the worker, or by the service for a result that fails verification.
 struct UnitFailed {
   WorkerId worker;
   UnitFailure failure;
 };
 
-// Raised regularly (about once a second): deadlines, speculation, forgiveness, time budgets.
+// Raised about once a second, for deadlines, speculation, forgiveness and time limits.
 struct Tick {};
 
 using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped,
-                           JobPriority, JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerBarred,
-                           WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, UnitAccepted,
-                           UnitFolded, UnitFailed, Tick>;
+                           JobPriority, JobRetargeted, JobExtended, JobForgotten, WorkerJoined,
+                           WorkerQuarantined, WorkerLost, WorkerDrains, LeaseProgress, ResultsWait,
+                           LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -1,5 +1,6 @@
-// Failures of units at workers (DESIGN 8): when a unit has failed often enough that the job must, and when a
-// worker has. Lost workers, expired deadlines and returned leases are infrastructure and never come here.
+// Failures of units at workers: decides when a unit has failed often enough for its job to fail, and when a
+// worker is blocked. Lost workers, expired deadlines and returned leases are infrastructure failures and are
+// not counted.
 #pragma once
 
 #include <algorithm>
@@ -20,14 +21,14 @@ struct FailedAttempt {
   UnitFailure failure;
 };
 
-// Units of one job that have failed and are not accepted yet.
+// Units of one job that have failed and are not accepted yet
 class UnitFailures {
  public:
   void add(UnitCode code, FailedAttempt attempt);
   void accepted(UnitCode code) { units_.erase(code); }
   bool failed_on(UnitCode code, WorkerIndex worker) const;
-  // On min(kUnitFailureWorkers, workers_known) distinct workers and in at least kUnitFailureAttempts
-  // attempts.
+  // True after failures on min(kUnitFailureWorkers, workers_known) distinct workers and at least
+  // kUnitFailureAttempts attempts.
   bool exhausted(UnitCode code, std::size_t workers_known) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
   bool any() const { return !units_.empty(); }
@@ -40,7 +41,7 @@ class UnitFailures {
   std::map<UnitCode, std::vector<FailedAttempt>> units_;  // attempts per unit are bounded by exhausted()
 };
 
-// One worker's failures in one job.
+// Failures of one worker in one job
 struct WorkerFailures {
   std::uint32_t count = 0;
   TimePoint last{};
@@ -56,7 +57,7 @@ struct WorkerFailures {
   bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
-// The sentence for the job's owner: unit, pixel, signal, what each worker said, how to replay it.
+// The message for the job's owner: unit, pixel, signal, what each worker reported, how to replay it.
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
                              const std::vector<FailedAttempt>& attempts, const std::string& replay);
 

@@ -1,4 +1,4 @@
-// Why a worker no longer has a unit that was lent to it, though it has not handed in its result.
+// Why a unit left a worker's lease without a result.
 #pragma once
 
 #include <string_view>
@@ -8,16 +8,16 @@ namespace ls::coordinator {
 
 enum class FreedCause {
   worker_lost,
-  newer_stream,  // its worker has connected again
+  newer_stream,  // the worker has connected again
   deadline_passed,
-  returned,        // by a worker that drains, or that could not load the job
+  returned,        // by a worker that is draining or could not load the job
   failed,          // on this worker
-  moved,           // from behind other work of its worker to one that had none
-  paused,          // the job
+  moved,           // from behind other work of its worker to an idle worker
+  paused,          // the job was paused
   round_reopened,  // an extension renders it again with more samples
-  worker_barred,
-  not_wanted,  // beyond the round in which its tile has ended: nobody renders it again
-  job_ended    // it failed or was cancelled: nobody renders it again
+  worker_quarantined,
+  not_wanted,  // beyond the round in which its tile ended: not rendered again
+  job_ended    // the job failed or was cancelled: not rendered again
 };
 inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::worker_lost, "worker lost"},
@@ -28,7 +28,7 @@ inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::moved, "moved to an idle worker"},
     {FreedCause::paused, "job paused"},
     {FreedCause::round_reopened, "round reopened"},
-    {FreedCause::worker_barred, "worker barred"},
+    {FreedCause::worker_quarantined, "worker barred"},
     {FreedCause::not_wanted, "not wanted"},
     {FreedCause::job_ended, "job ended"}};
 

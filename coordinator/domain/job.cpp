@@ -26,19 +26,19 @@ void Job::steer() {
 }
 
 void Job::move_windows(int farm_threads) {
-  if (steered() &&
-      adaptive->rounds_seen() >= foreseen_at + std::max<std::uint64_t>(1, adaptive->groups() / 2)) {
+  if (adaptive_running() &&
+      adaptive->rounds_seen() >= predicted_at + std::max<std::uint64_t>(1, adaptive->groups() / 2)) {
     adaptive->foresee(*plan.target_error);
-    foreseen_at = adaptive->rounds_seen();
+    predicted_at = adaptive->rounds_seen();
   }
   for (TileIndex t = 0; t < units.tiles(); ++t) move_window(t, farm_threads);
 }
 
 void Job::move_window(TileIndex tile, int farm_threads) {
-  if (!steered()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
+  if (!adaptive_running()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
   // Small images need more rounds in flight to keep a large farm busy.
   const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
-  queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->foreseen(tile) + busy));
+  queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->predicted_last(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));
 }
 

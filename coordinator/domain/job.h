@@ -1,4 +1,4 @@
-// A job as the farm keeps it. Its planned units are at every moment done (accepted), leased or queued.
+// A job in the farm. At every moment each of its planned units is done (accepted), leased or queued.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@
 #include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
-#include "coordinator/domain/witness_book.h"
+#include "coordinator/domain/voter_table.h"
 
 namespace ls::coordinator {
 
 using JobSeq = std::uint64_t;    // order of submission
-using LeaseSeq = std::uint64_t;  // order of leasing; 0: none
+using LeaseSeq = std::uint64_t;  // order of leasing; 0: no lease
 
-// The leases that hold a unit: one, or two when an idle worker renders a copy.
+// The leases that hold a unit: one, or two when an idle worker renders a copy
 struct Holders {
   std::array<LeaseSeq, 2> lease{};
   bool full() const { return lease[0] != 0 && lease[1] != 0; }
@@ -33,33 +33,33 @@ struct Holders {
   }
 };
 
-// What is lent at once: of a job, or of all jobs of a user.
+// Units leased at the moment, of a job or of all jobs of a user or group
 struct Load {
-  std::uint32_t units = 0;                                   // copies included, audits not
-  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // by worker, never 0
+  std::uint32_t units = 0;                                   // including copies, without audits
+  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // by worker; never 0
 };
 
-// An accepted result that is rendered again elsewhere. With a second result that differs, a third decides.
+// An accepted result that another worker renders again. If the second result differs, a third one decides.
 struct Audit {
   WorkerIndex first = kNoWorker;
   std::optional<std::pair<WorkerIndex, Digest>> second;
-  // What one said that nobody had asked: no vote, but the reason to ask.
+  // A differing result that was not requested: no vote, but the reason for the audit
   std::optional<std::pair<WorkerIndex, Digest>> claim;
-  std::vector<WorkerIndex> tried;  // and failed
-  TimePoint since{};               // of the second result, or of the restart
+  std::vector<WorkerIndex> tried;  // workers that tried and failed
+  TimePoint since{};               // time of the second result, or of the restart
   bool restored = false;           // begun before a restart
-  LeaseSeq lease = 0;              // that it is out under; 0: it waits
+  LeaseSeq lease = 0;              // under which it is rendered; 0: waiting
   bool asks(WorkerIndex worker) const {
     return worker != first && (!second || worker != second->first) && (!claim || worker != claim->first) &&
            std::find(tried.begin(), tried.end(), worker) == tried.end();
   }
 };
 
-// A level of the adaptive stop rule whose image makes a checkpoint, until all of it is folded.
+// A level of the adaptive stop rule whose image makes a checkpoint as soon as all of it is folded
 struct LevelMark {
-  std::vector<RoundIndex> rounds;  // of each tile
+  std::vector<RoundIndex> rounds;  // by tile
   double spp = 0;                  // mean over pixels
-  TileIndex missing = 0;           // tiles that are not folded so far
+  TileIndex missing = 0;           // tiles not folded up to their round yet
 };
 
 struct Job {
@@ -67,14 +67,14 @@ struct Job {
 
   JobSeq seq;
   JobPlan plan;
-  std::uint64_t spp;  // the plan's, or the limit; even
+  std::uint64_t spp;  // the plan's, or kMaxSppWithoutLimit; even
   JobState state = JobState::queued;
-  std::optional<StopReason>
-      stopping;         // decided, while what is leased or unfolded is awaited; final once done
-  bool frozen = false;  // by time or user: what has been leased once is still wanted, nothing else
+  // The end is decided, but leased or unfolded units are still pending; final once done
+  std::optional<StopReason> stopping;
+  bool frozen = false;  // stopped by time or user: units leased before are still accepted, no others are
   std::optional<Digest> numeric_class;
-  std::optional<TimePoint> first_ray;    // moved on by the time that the job stood still since
-  std::optional<TimePoint> still_since;  // paused or done: its time budget does not run
+  std::optional<TimePoint> first_ray;    // shifted by the time that the job has stood still since
+  std::optional<TimePoint> still_since;  // while paused or done its time budget does not run
 
   UnitTable units;
   UnitQueue queue;
@@ -82,20 +82,20 @@ struct Job {
   CostModel cost;
   UnitFailures failures;
   std::map<UnitCode, Audit> audits;
-  std::uint64_t audits_missed = 0;  // chosen, but nobody else of the class was there
-  WitnessBook witnesses;
+  std::uint64_t audits_missed = 0;  // chosen, but no other worker of the class was connected
+  VoterTable voters;
   Load load;
-  std::uint32_t lent = 0;     // units out under all leases, of audits too
-  bool has_units = false;     // to lend, as last looked at
-  bool offered = false;       // stands among those whose turn may come
-  double charge_out = 0;      // core seconds that its leases are charged with (share_book.h)
-  double checkpoint_spp = 0;  // of the last checkpoint by rounds
+  std::uint32_t lent = 0;     // units under all leases, including audits
+  bool has_units = false;     // units to lease, when last checked
+  bool offered = false;       // is in FairShare
+  double charge_out = 0;      // core seconds charged for its leases (fair_share.h)
+  double checkpoint_spp = 0;  // of the last checkpoint of whole rounds
 
-  std::optional<AdaptiveStop> adaptive;  // with a target
+  std::optional<AdaptiveStop> adaptive;  // with a target error
   double level_seen = 0;                 // the last level at which the image was judged; 0: none
   std::deque<LevelMark> marks;           // ascending
-  double marked_spp = 0;                 // of the last mark made
-  std::uint64_t foreseen_at = 0;         // rounds seen when the end was last foreseen
+  double marked_spp = 0;                 // of the last mark
+  std::uint64_t predicted_at = 0;        // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
   bool leasable() const { return state == JobState::queued || state == JobState::running; }
@@ -112,22 +112,22 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // The errors of the tiles decide where they end, and have not yet.
-  bool steered() const { return adaptive && !stopping; }
-  // A target begins, is given up or judged anew.
+  // The tiles' errors decide where the tiles end, and have not decided yet.
+  bool adaptive_running() const { return adaptive && !stopping; }
+  // Starts, drops or re-evaluates the target.
   void steer();
   RoundIndex last_foldable(TileIndex tile) const {
-    return steered() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
+    return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // How far ahead of what is folded rounds may be leased, for a farm of so many threads.
+  // Sets how far rounds may be leased ahead of the folded ones, for a farm of this many threads.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
-  // Ends each tile after so many rounds, or earlier if it ends earlier already. Acceptances beyond are
-  // forgotten. Nothing happens if no tile ends earlier than before.
+  // Ends each tile after ends[tile] rounds, or earlier if it ends earlier already, and forgets results
+  // accepted beyond. Does nothing if no tile ends earlier than before.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
-  void plan_all();  // every tile ends with the samples asked for
+  void plan_all();  // every tile ends with the requested samples
   std::optional<TimePoint> time_limit(TimePoint now) const;
-  // Before and after which the state is one in which the job stands still.
+  // Call both around a change of state that may stop or start the job's clock.
   void stand_still(TimePoint now);
   void go_on(TimePoint now);
 };

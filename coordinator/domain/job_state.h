@@ -1,4 +1,4 @@
-// The states of a job, as the farm decides them and as users see them; each enumerator with its word.
+// The states of a job, as the farm decides them and users see them, with their names.
 #pragma once
 
 #include <cstddef>
@@ -6,18 +6,18 @@
 
 namespace ls::coordinator {
 
-// queued: nothing of it has been leased yet. The last three are ends; only `done` can be extended.
+// `queued`: nothing has been leased yet. The last three are final; only `done` can be extended.
 enum class JobState { queued, running, paused, done, failed, cancelled };
 constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
   return kWords[static_cast<std::size_t>(state)];
 }
-// Nothing follows; only `extend` leads out of it.
+// True for final states; only an extension of a done job leaves them.
 constexpr bool is_terminal(JobState state) {
   return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
 }
 
-// Why a job that is done went no further. The words of the report: "spp", "error", "time", "user".
+// Why a done job went no further. Names in the report: "spp", "error", "time", "user".
 enum class StopReason { spp, error, time, user };
 constexpr std::string_view to_string(StopReason reason) {
   constexpr std::string_view kWords[] = {"spp", "error", "time", "user"};

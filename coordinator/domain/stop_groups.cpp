@@ -10,15 +10,16 @@ namespace {
 
 std::int64_t divided_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
 
-// Tiles along one side in blocks of `block`; what is left over joins the last one. Only whole tiles make
-// blocks: `whole` of them fit, at least one is taken to.
+// Tiles along one side of the frame, in blocks of `block` tiles; the remainder joins the last block. Only
+// whole tiles form blocks: `whole` is their number, at least 1.
 struct Side {
   int tiles, whole, block;
   int blocks() const { return std::max(1, whole / block); }
   int block_of(int tile) const { return std::min(tile / block, blocks() - 1); }
 };
 
-// As many tiles as it takes, `across` being how many pixels a block has in the other direction.
+// Blocks of as many tiles as kMinStopPixels need; `across` is a block's extent in the other direction, in
+// pixels.
 Side side_of(int frame, int tile, int across) {
   const int whole = std::max(1, frame / tile);
   const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));
@@ -31,7 +32,7 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
   const int width = grid.frame.width, height = grid.frame.height;
   int square = grid.tile;
   while (std::int64_t{square} * square < kMinStopPixels) square += grid.tile;
-  // Of a frame that is not as high as a square block the blocks are wider, and the other way round.
+  // If the frame is lower than a square block, blocks are wider, and the other way round.
   const Side x = side_of(width, grid.tile, std::min(square, height));
   const Side y = side_of(height, grid.tile, std::min(width, x.block * grid.tile));
   std::vector<std::vector<TileIndex>> groups(static_cast<std::size_t>(x.blocks()) *

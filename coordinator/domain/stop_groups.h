@@ -1,16 +1,17 @@
-// Which tiles stop together. A decision to stop that rests on few pixels biases the image, so at least
-// kMinStopPixels of them decide: small tiles are taken together in blocks, and what is left over at the right
-// and bottom edge joins its neighbour. Only an image that has fewer pixels itself is one smaller group. A
-// function of the tiling alone.
+// Groups of tiles that stop together. A decision to stop that rests on few pixels biases the image, so at
+// least kMinStopPixels decide together: small tiles form blocks, and the remainder at the right and bottom
+// edges joins the neighbouring block. Only an image with fewer pixels than that forms one smaller group.
+// Depends on the tiling alone.
 #pragma once
 
 #include <vector>
 
-#include "common/image/frame.h"
+#include "common/image/frame/frame.h"
 
 namespace ls::coordinator {
 
-// The tiles of each group, ascending; groups in the order of their first tiles. Every tile is in exactly one.
+// Returns the tiles of each group, ascending; groups in the order of their first tiles. Every tile is in
+// exactly one group.
 std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
 
 }  // namespace ls::coordinator

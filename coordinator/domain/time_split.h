@@ -1,21 +1,22 @@
-// Where the time of a job went, in core seconds: of the workers, but for `merge`. What was counted since the
-// job was last stored is lost when the coordinator is killed; `render` never is.
+// Where the time of a job went, in core seconds of the workers (`merge`: of the coordinator). If the
+// coordinator is killed, amounts counted since the job was last stored are lost, except `render`, which never
+// is.
 #pragma once
 
 namespace ls::coordinator {
 
 struct TimeSplit {
-  double load = 0;      // getting files
-  double build = 0;     // reading them, making worlds
+  double load = 0;      // fetching files
+  double build = 0;     // parsing files, building worlds
   double render = 0;    // CPU time of units: JobView::core_seconds
   double transfer = 0;  // packing results
-  double merge = 0;     // of the coordinator: checking and folding results
-  double idle = 0;      // threads between two units of the job
+  double merge = 0;     // coordinator: verifying and folding results
+  double idle = 0;      // worker threads between two units of the job
   void add(const TimeSplit& o);
   bool operator==(const TimeSplit&) const = default;
 };
 
-// By their names in JSON, wherever a split is written or read.
+// The names in JSON, wherever a split is written or read
 struct TimePart {
   const char* name;
   double TimeSplit::*seconds;

@@ -1,11 +1,11 @@
-// The units of a job that wait for a worker. Each tile has its own end, since tiles of an adaptive job stop
-// after different numbers of rounds. Of a tile wait all rounds from `next` to its end, and those before it
-// that came back. Lower rounds go first, so that a whole picture is there early. Of a job whose tiles stop by
-// their errors some rounds are only probably wanted: they go behind all that surely are, in the order in
-// which the stop rule would come to want them (adaptive_stop.h).
+// The units of a job that wait for a worker. Each tile has its own end, since the tiles of an adaptive job
+// stop after different numbers of rounds. A tile's waiting units are all rounds from `next` to its end and
+// the earlier ones that came back. Lower rounds go first, so that a complete picture is available early. In
+// an adaptive job some rounds are speculative: they go behind all that are certain, in the order in which the
+// stop rule would come to need them (adaptive_stop.h).
 //
-// Every operation costs O(log tiles) at most, amortised; 20 bytes a tile, 60 where something is only probably
-// wanted.
+// Every operation costs O(log tiles) at most, amortised; memory is 20 bytes per tile, 60 if there are
+// speculative units.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class UnitQueue {
   }
 
   TileIndex tiles() const { return static_cast<TileIndex>(next_.size()); }
-  // Rounds of the tile that belong to the job.
+  // Number of rounds of the tile that belong to the job
   RoundIndex end(TileIndex tile) const { return end_[tile]; }
   RoundIndex longest() const { return *std::max_element(end_.begin(), end_.end()); }
   bool plans(UnitCode code) const { return round_of(code) < end_[tile_of(code)]; }
@@ -46,15 +46,15 @@ class UnitQueue {
     forget_from(tile, rounds);
     if (!was_open) offer(tile);
   }
-  // Rounds of the tile from `window` on wait until it is moved.
+  // Holds back the tile's rounds from `window` on until the window moves.
   void set_window(TileIndex tile, RoundIndex window) {
     const bool was_open = open(tile);
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // Rounds of the tile before `before` are surely wanted, later ones the sooner the more each takes off the
-  // error per sample: `variance` (of the tile's pixels, per sample; NaN: unknown) over the samples before it
-  // and with it.
+  // The tile's rounds before `before` are certain to be needed. Later ones are speculative, ordered by the
+  // error that each removes per sample: `variance` (per sample, of the tile's group; NaN: unknown) divided by
+  // the product of the sample counts without and with that round.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
     const float weight =
@@ -77,12 +77,12 @@ class UnitQueue {
     }
   }
   bool wanted(UnitCode code) const { return round_of(code) < wanted_before(tile_of(code)); }
-  // That wait and are surely wanted; one that was accepted out of turn may be counted.
+  // Number of waiting units that are certain to be needed; may include some that were accepted out of turn.
   std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
 
-  // Before it every round of the tile has been handed out at least once, or accepted.
+  // Every round of the tile before this one has been leased at least once, or accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
-  // The tile's rounds from `round` on wait again.
+  // Makes the tile's rounds from `round` on wait again.
   void rewind(TileIndex tile, RoundIndex round) {
     forget_from(tile, round);
     if (round >= next_[tile]) return;
@@ -90,8 +90,8 @@ class UnitQueue {
     offer(tile);
   }
 
-  // The first waiting unit for which `excluded` is false; exclusion applies to units that came back only.
-  // Those go first among the surely wanted, and among the others.
+  // Returns the first waiting unit for which `excluded` is false; exclusion applies only to units that came
+  // back. Those go first among the certain units, and first among the speculative ones.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -100,7 +100,7 @@ class UnitQueue {
     };
     if (const auto code = first_of(returned_)) return code;
     std::optional<UnitCode> next = head();
-    for (; next && units.accepted(*next); next = head()) step(tile_of(*next));
+    for (; next && units.accepted(*next); next = head()) advance(tile_of(*next));
     if (next && wanted(*next)) return next;
     const auto perhaps = first_of(returned_perhaps_);
     return perhaps ? perhaps : next;
@@ -108,31 +108,31 @@ class UnitQueue {
   bool empty(const UnitTable& units) {
     return !front(units, [](UnitCode) { return false; });
   }
-  // Takes out what front() gave.
+  // Removes the unit that front() returned.
   void pop(UnitCode code) {
     if (head() == code)
-      step(tile_of(code));
+      advance(tile_of(code));
     else
       forget(code);
   }
-  // A lent unit waits again.
+  // A leased unit waits again.
   void put_back(UnitCode code) {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
       (wanted(code) ? returned_ : returned_perhaps_).insert(code);
   }
-  // A late result came for a unit that may be waiting.
+  // A late result arrived for a unit that may be waiting.
   void forget(UnitCode code) {
     returned_.erase(code);
     returned_perhaps_.erase(code);
   }
   bool returned(UnitCode code) const { return returned_.contains(code) || returned_perhaps_.contains(code); }
   std::size_t returned_count() const { return returned_.size() + returned_perhaps_.size(); }
-  std::size_t entries() const { return heads_.size() + perhaps_.size(); }  // memory, in its unit
+  std::size_t entries() const { return heads_.size() + perhaps_.size(); }  // a measure of memory use
 
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // Of one tile. Of a job by samples there is none: all is wanted.
+  // Per tile; unused if no tile is adaptive, where all units are certain.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
@@ -163,8 +163,8 @@ class UnitQueue {
     change();
     surely_ += surely(t);
   }
-  // heads_ and perhaps_ together hold the next unit of every open tile, and dead ones among them, which
-  // head() drops.
+  // heads_ and perhaps_ together hold the next unit of every open tile, and outdated entries, which head()
+  // drops.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);
@@ -172,7 +172,7 @@ class UnitQueue {
     if (perhaps_.size() > 2 * next_.size()) return offer_all_perhaps();
     perhaps_.push({gain(code), code});
   }
-  // Drops the dead ones, so that they are never more than the others.
+  // Rebuilds perhaps_ without outdated entries, so that these never outnumber the others by much.
   void offer_all_perhaps() {
     std::vector<Perhaps> all;
     for (TileIndex t = 0; t < tiles(); ++t) {
@@ -190,7 +190,7 @@ class UnitQueue {
     while (!perhaps_.empty() && !alive(perhaps_.top())) perhaps_.pop();
     return perhaps_.empty() ? std::nullopt : std::optional(perhaps_.top().code);
   }
-  void step(TileIndex tile) {
+  void advance(TileIndex tile) {
     counting(tile, [&] { ++next_[tile]; });
     offer(tile);
   }
@@ -198,7 +198,8 @@ class UnitQueue {
     if (returned_count() == 0) return;
     for (RoundIndex k = round; k < next_[tile]; ++k) forget(unit_code(k, tile));
   }
-  // The tile's rounds before `to` are wanted, no longer those before `from`.
+  // Moves the tile's returned units between the two sets when the end of its certain rounds changes from
+  // `from` to `to`.
   void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
     if (returned_count() == 0) return;
     auto& there = from < to ? returned_perhaps_ : returned_;
@@ -211,7 +212,7 @@ class UnitQueue {
   std::uint64_t planned_, surely_;
   std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads_;
   std::priority_queue<Perhaps> perhaps_;
-  std::vector<Wanted> wanted_;  // empty: all is
+  std::vector<Wanted> wanted_;  // empty: all units are certain
   std::set<UnitCode> returned_, returned_perhaps_;
 };
 

@@ -46,8 +46,9 @@ void UnitTable::truncate(TileIndex tile, RoundIndex end) {
 }
 
 void UnitTable::reopen(RoundIndex index) {
+  // Rounds that were cut off
   while (rounds_.size() > index + 1 && rounds_.back().accepted == 0 && rounds_.back().folded == 0)
-    rounds_.pop_back();  // what was cut off
+    rounds_.pop_back();
   if (index >= rounds_.size()) return;
   CHECK(index + 1 == rounds_.size(), "round {} is reopened though {} rounds are known", index,
         rounds_.size());

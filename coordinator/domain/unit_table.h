@@ -1,5 +1,5 @@
-// What is known of the units of one job: accepted results (digest and worker, 36 bytes a unit, stored round
-// by round as rounds begin) and how far each tile is folded.
+// The state of one job's units: accepted results (digest and worker, 36 bytes per unit, allocated round by
+// round as rounds begin) and how far each tile is folded.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "common/base/digest.h"
-#include "common/image/frame.h"
-#include "common/image/rounds.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 
 namespace ls::coordinator {
 
-// (round, tile) in one number; its order is the order of rendering: every tile's round 0, then every tile's
-// round 1...
+// (round, tile) in one number, ordered as units are rendered: every tile's round 0, then every tile's round
+// 1...
 using UnitCode = std::uint64_t;
 constexpr UnitCode unit_code(RoundIndex round, TileIndex tile) { return UnitCode{round} << 32 | tile; }
 constexpr RoundIndex round_of(UnitCode code) { return static_cast<RoundIndex>(code >> 32); }
@@ -33,32 +33,35 @@ class UnitTable {
 
   TileIndex tiles() const { return tiles_; }
 
-  // ---- accepted results ----
+  // Accepted results
   const Result* find(UnitCode code) const;  // null: not accepted
   bool accepted(UnitCode code) const { return find(code) != nullptr; }
-  void accept(UnitCode code, const Result& result);  // not accepted before
+  void accept(UnitCode code, const Result& result);  // the unit must not be accepted yet
   std::uint64_t accepted_count() const { return accepted_count_; }
   RoundIndex end_of_accepted(TileIndex tile) const;  // one past its last accepted round
-  void truncate(TileIndex tile, RoundIndex end);     // forgets its acceptances from `end` on, none folded
-  void reopen(RoundIndex round);  // forgets round `round`, accepted or folded; no later one may be known
-  // Forgets all of the tile, accepted and folded. Returns the units that were accepted, ascending.
+  // Forgets results accepted from `end` on; none of them may be folded
+  void truncate(TileIndex tile, RoundIndex end);
+  void reopen(RoundIndex round);  // forgets round `round`, accepted or folded; no later round may be known
+  // Forgets all results and folds of the tile. Returns the units that were accepted, ascending.
   std::vector<UnitCode> void_tile(TileIndex tile);
-  std::vector<TileIndex> tiles_of(WorkerIndex worker) const;  // of which it has an accepted result; ascending
-  void mark_workers(std::vector<bool>& used) const;           // those that accepted results name
-  void forget_results();  // of a job that failed: frees the memory, keeps the fold counts
+  // Tiles with an accepted result of this worker, ascending
+  std::vector<TileIndex> tiles_of(WorkerIndex worker) const;
+  void mark_workers(std::vector<bool>& used) const;  // sets used[worker] for the workers of accepted results
+  void forget_results();  // for a failed job: frees the memory, keeps the fold counts
 
-  // ---- folding ----
-  // The tile's next round if it is accepted, below `end` and at most `limit`; it counts as issued from now
-  // on.
+  // Folding
+
+  // Returns the tile's next round if it is accepted, below `end` and at most `limit`, and counts it as issued
+  // from now on.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
-  RoundIndex issued(TileIndex tile) const { return issued_[tile]; }  // folds asked for
-  // False if this is not the issued round that is next to be folded.
+  RoundIndex issued(TileIndex tile) const { return issued_[tile]; }  // number of folds requested
+  // False if `round` is not the next issued round to be folded.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);
   RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
   std::uint64_t folded_count() const { return folded_count_; }
-  RoundIndex rounds_complete() const { return rounds_complete_; }  // folded over all tiles
+  RoundIndex rounds_complete() const { return rounds_complete_; }  // rounds folded in all tiles
   double error(RoundIndex round, TileIndex tile) const;            // NaN: unknown
 
  private:

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/protocol/limits.h"
-#include "coordinator/rpc/convert.h"
+#include "coordinator/rpc/grpc_status.h"
 #include "proto/convert.h"
 
 namespace ls::coordinator::rpc {
@@ -19,7 +19,7 @@ BlobStream::BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::Fet
       run_(std::move(run)),
       on_gone_(std::move(on_gone)) {}
 
-// Nothing of this is touched after a write or the end has begun: OnDone may come at once.
+// After a write or Finish has been started, no member is used: OnDone may run at once.
 void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
   if (const int wait = guard.wait(address, request_.join_token()); wait > 0)
     return Finish({grpc::StatusCode::RESOURCE_EXHAUSTED, too_many_wrong_tokens(wait)});
@@ -59,10 +59,10 @@ void BlobStream::next() {
   StartWrite(&chunk_);
 }
 
-// Told first, so that the jobs that need it wait before the worker gives its units back.
+// Reported before Finish, so that the jobs that need the blob are paused before the worker returns its units.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
-    coordinator_.blob_lacking(digest_, why);
+    coordinator_.blob_missing(digest_, why);
   Finish(to_status(why));
 }
 

@@ -1,24 +1,24 @@
-// One FetchBlob: chunks of a blob, read as the worker takes them, on threads of its own: a blob that must be
-// fetched first may take minutes, and gRPC's few threads are those that listen to workers.
+// One FetchBlob call: sends a blob in chunks, as fast as the worker takes them. Blobs are read on separate
+// threads: fetching one first may take minutes, and gRPC's few threads must listen to workers.
 #pragma once
 
 #include <functional>
 
 #include "coordinator/rpc/join_guard.h"
-#include "coordinator/service.h"
+#include "coordinator/service/coordinator.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
 
 namespace ls::coordinator::rpc {
 
-using RunOn = std::function<void(std::function<void()>)>;  // runs it soon, on another thread
+using RunOn = std::function<void(std::function<void()>)>;  // runs the function soon, on another thread
 
 class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::BlobChunk> {
  public:
   BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::FetchBlobRequest& request,
              const JoinCheck& may_join, RunOn run, std::function<void()> on_gone);
-  void begin(const JoinGuard& guard,
-             const std::string& address);  // starts the first write, or ends with what is wrong
+  // Starts the first write, or ends the call with an error.
+  void begin(const JoinGuard& guard, const std::string& address);
 
   void OnWriteDone(bool ok) override;
   void OnDone() override;

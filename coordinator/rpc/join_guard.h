@@ -1,4 +1,4 @@
-// Against guessing join tokens: who was wrong too often has to wait, by address.
+// Protects join tokens against guessing: after too many wrong tokens an address has to wait.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 namespace ls::coordinator {
 
 struct JoinGuard {
-  // Seconds that a token from this address has to wait before it is looked at; 0: go on.
+  // Seconds that this address has to wait before its token is checked; 0: allowed.
   std::function<int(const std::string& address, std::string_view token)> wait = [](const auto&, auto) {
     return 0;
   };
@@ -16,10 +16,10 @@ struct JoinGuard {
       [](const auto&, auto, bool) {};
 };
 
-// The address in what gRPC calls a peer: "ipv4:10.0.0.7:4711", "ipv6:%5Bfd00::7%5D:4711", "unix:..."; of
-// anything else all of it.
+// The address in a gRPC peer name: "ipv4:10.0.0.7:4711", "ipv6:%5Bfd00::7%5D:4711", "unix:..."; for any other
+// form the whole name.
 std::string address_of_peer(std::string_view peer);
 
-std::string too_many_wrong_tokens(int seconds);  // for whoever has to wait
+std::string too_many_wrong_tokens(int seconds);  // message for the worker that has to wait
 
 }  // namespace ls::coordinator

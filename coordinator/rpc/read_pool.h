@@ -1,5 +1,5 @@
-// Threads that read blobs for FetchBlob streams: such a read may wait for another machine, and gRPC's own few
-// threads are those that listen to workers.
+// Threads that read blobs for FetchBlob streams: a read may wait for another machine, and gRPC's few threads
+// must listen to workers.
 #pragma once
 
 #include <condition_variable>
@@ -22,7 +22,7 @@ class ReadPool {
     waiting_.push_back(std::move(read));
     changed_.notify_one();
   }
-  // When nothing comes any more: ends after what is under way.
+  // Call when no more reads arrive; returns after those in progress.
   void stop() {
     for (auto& thread : threads_) thread.request_stop();
     threads_.clear();
@@ -43,7 +43,7 @@ class ReadPool {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> waiting_;
-  std::vector<std::jthread> threads_;  // last
+  std::vector<std::jthread> threads_;  // last member: its threads use the others
 };
 
 }  // namespace ls::coordinator::rpc

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/base/log.h"
-#include "coordinator/rpc/convert.h"
+#include "coordinator/rpc/grpc_status.h"
 #include "coordinator/rpc/limits.h"
 #include "proto/convert.h"
 
@@ -70,11 +70,11 @@ void WorkStream::pump_locked() {
 }
 
 void WorkStream::OnReadDone(bool ok) {
-  if (!ok) {  // the worker has closed its side, or is gone
+  if (!ok) {  // the worker has closed its side, or has vanished
     end(grpc::Status::OK);
     return;
   }
-  if (greeted_ && !wire::known(incoming_)) {  // of a newer worker; it must be able to do without
+  if (greeted_ && !wire::known(incoming_)) {  // from a newer worker; it must be able to do without
     StartRead(&incoming_);
     return;
   }
@@ -93,7 +93,7 @@ void WorkStream::OnReadDone(bool ok) {
   session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
 }
 
-// No thread waits meanwhile. Until Finish is called the stream lives.
+// No thread blocks meanwhile. Until Finish is called the stream lives.
 void Outlet::read_on() {
   const std::lock_guard lock(mutex_);
   if (stream_ && !finished_) stream_->StartRead(&stream_->incoming_);

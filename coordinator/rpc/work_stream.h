@@ -1,8 +1,9 @@
-// One worker's stream: messages in to its WorkerSession, messages out from a bounded queue.
+// One worker's stream: passes incoming messages to its WorkerSession and outgoing ones through a bounded
+// queue.
 //
-// Two objects: the Outlet is the WorkerSink that the coordinator holds, for as long as it likes; the
-// WorkStream is gRPC's reactor and deletes itself at OnDone. The outlet's mutex guards both and is never held
-// while the coordinator is called, so the coordinator may call the sink with its own locks held.
+// Two objects: the coordinator holds the Outlet, a WorkerSink, for as long as it likes; the WorkStream is
+// gRPC's reactor and deletes itself in OnDone. The outlet's mutex guards both and is never held while the
+// coordinator is called, so the coordinator may call the sink with its own locks held.
 #pragma once
 
 #include <atomic>
@@ -12,7 +13,7 @@
 
 #include "common/base/clock.h"
 #include "coordinator/rpc/join_guard.h"
-#include "coordinator/service.h"
+#include "coordinator/service/coordinator.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
 
@@ -27,14 +28,14 @@ class Outlet final : public WorkerSink {
   explicit Outlet(WorkStream* stream) : stream_(stream) {}
   void send(ToWorker message) override;
   void close() override;
-  void read_on();  // from any thread: the next message may come
+  void read_on();  // from any thread: reads the next message
 
  private:
   friend class WorkStream;
   std::mutex mutex_;
   WorkStream* stream_;  // null after OnDone
   std::deque<pb::ToWorker> queue_;
-  bool writing_ = false;   // a write is under way; queue_.front() is it
+  bool writing_ = false;   // a write of queue_.front() is in progress
   bool closing_ = false;   // finish with status_ once the queue is empty
   bool finished_ = false;  // Finish was called
   grpc::Status status_;
@@ -42,16 +43,15 @@ class Outlet final : public WorkerSink {
 
 class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
  public:
-  // `open_streams` is decremented at the end. `on_gone` tells the server, last thing before the stream is
-  // deleted.
-  // `guard` outlives this.
+  // `on_gone` notifies the server; it is the last call before the stream is deleted. `guard` must outlive
+  // this.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
              TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
-  void refuse(const Error& error, bool retry);  // tells the worker, then ends the stream
-  void end(const grpc::Status& status);         // after what is queued
-  void cut();                                   // at once
+  void refuse(const Error& error, bool retry);  // sends the error to the worker, then ends the stream
+  void end(const grpc::Status& status);         // ends the stream after the queued messages
+  void cut();                                   // ends the stream at once
   bool hello_overdue(TimePoint now) const { return !greeted_ && now >= hello_deadline_; }
 
   void OnReadDone(bool ok) override;
@@ -70,7 +70,7 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   const TimePoint hello_deadline_;
   const std::function<void(WorkStream*)> on_gone_;
   std::shared_ptr<Outlet> outlet_;
-  std::unique_ptr<WorkerSession> session_;  // touched by read reactions and OnDone, which never overlap
+  std::unique_ptr<WorkerSession> session_;  // used by read reactions and OnDone, which never overlap
   std::atomic<bool> greeted_{false};
   pb::FromWorker incoming_;
 };

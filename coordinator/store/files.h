@@ -1,4 +1,5 @@
-// Files as the store needs them: whole writes, durable renames, errors that name the path and what to do.
+// File operations of the store: complete writes, durable renames, and errors that name the path and what to
+// do.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@
 
 namespace ls::coordinator {
 
-// An open file descriptor, closed when it goes.
+// An owned file descriptor, closed by the destructor.
 class File {
  public:
   File() = default;
@@ -22,7 +23,7 @@ class File {
   File(File&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   File& operator=(File&& other) noexcept;
 
-  // `flags` as of open(2); O_CLOEXEC is added.
+  // `flags` as in open(2); O_CLOEXEC is added.
   static Result<File> open(const std::filesystem::path& path, int flags, unsigned mode = 0640);
   int fd() const { return fd_; }
   explicit operator bool() const { return fd_ >= 0; }
@@ -31,7 +32,7 @@ class File {
   int fd_ = -1;
 };
 
-// The error of a failed call, from errno: a full disk is resource_exhausted, a missing file not_found.
+// Makes an error from errno: a full disk is resource_exhausted, a missing file not_found.
 Error errno_error(std::string_view what, const std::filesystem::path& path);
 
 Result<void> make_folder(const std::filesystem::path& folder);  // and its parents; mode 0750
@@ -42,24 +43,24 @@ Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, s
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes);
 Result<void> sync_data(const File& file, const std::filesystem::path& path);
 Result<void> sync_folder(const std::filesystem::path& folder);
-// Temporary file, fsync, rename, fsync of the folder: after a crash the old or the new content stands there,
-// whole.
+// Temporary file, fsync, rename, fsync of the folder: after a crash the file has either the old or the new
+// content.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-// The same of what is too large for memory at once: written piece by piece to PATH + `suffix`, and whole at
-// its place only after commit(). One that is not committed leaves nothing.
+// The same for content too large for memory: written piece by piece to PATH + `suffix`, and moved into place
+// by commit(). Without commit() nothing is left.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");
   AtomicFile(AtomicFile&&) noexcept = default;
   ~AtomicFile();
 
-  Result<void> write(std::span<const std::byte> bytes);  // behind what is there
+  Result<void> write(std::span<const std::byte> bytes);  // appends
   Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   Result<void> sync();
-  Result<void> commit();  // with sync()
-  // Without: after a power failure the old or no content may stand there, after a crash of this process the
-  // new one.
+  Result<void> commit();  // including sync()
+  // Without sync: after a power failure the file may have the old content or none, after a crash of this
+  // process the new one.
   Result<void> commit_unsynced();
 
  private:
@@ -67,10 +68,10 @@ class AtomicFile {
       : path_(std::move(path)), temporary_(std::move(temporary)), file_(std::move(file)) {}
 
   std::filesystem::path path_, temporary_;
-  File file_;  // none: moved from, or committed
+  File file_;  // closed: moved from, or committed
 };
 
-// Holds `folder` for this process alone until destroyed. failed_precondition if another one has it.
+// Locks `folder` for this process until destroyed. failed_precondition if another process holds it.
 Result<File> lock_folder(const std::filesystem::path& folder);
 
 }  // namespace ls::coordinator

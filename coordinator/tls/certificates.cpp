@@ -72,7 +72,7 @@ bool add_extension(X509* cert, X509* issuer, int nid, const std::string& value) 
   return extension && X509_add_ext(cert, extension.get(), -1) == 1;
 }
 
-// All but the issuer, the extensions and the signature.
+// Everything except issuer, extensions and signature.
 std::optional<Pair> blank(const std::string& common_name, std::int64_t now, std::int64_t days) {
   Pair pair{Cert(X509_new()), Key(EVP_EC_gen("P-256"))};
   const Number serial(BN_new());

@@ -1,5 +1,5 @@
-// Certificates of a farm: an authority of its own, and what it signs. Keys are on P-256, signatures
-// ECDSA-SHA256. Times are seconds since 1970.
+// Certificates of a farm: its own certificate authority, and the certificates that it signs. Keys are on
+// P-256, signatures ECDSA-SHA256. Times are seconds since 1970.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct Certificate {  // PEM
 
 inline constexpr std::int64_t kDay = 86'400;
 inline constexpr std::int64_t kAuthorityDays = 3650;
-inline constexpr std::int64_t kDays = 397;  // of what it signs
+inline constexpr std::int64_t kDays = 397;  // validity of issued certificates
 
 Result<Certificate> make_authority(const std::string& common_name, std::int64_t now);
 
@@ -24,12 +24,12 @@ enum class Use { server, client };
 struct Wanted {
   std::string common_name;
   Use use = Use::client;
-  std::vector<std::string> names;  // host names and addresses it answers to; of a server
+  std::vector<std::string> names;  // for a server: its host names and addresses
 };
-// invalid_argument: a name is none, or `authority` is no certificate with its key.
+// invalid_argument: a name is invalid, or `authority` is not a certificate with its key.
 Result<Certificate> issue(const Certificate& authority, const Wanted& wanted, std::int64_t now);
 
-// Whether it is signed by the authority and good for so much longer.
+// True if the authority has signed it and it is valid until the time `until`.
 bool is_good(const std::string& cert, const std::string& authority, std::int64_t until);
 
 }  // namespace ls::tls

@@ -1,4 +1,4 @@
-// What a coordinator speaks TLS with: certificates that the operator brings, or those it makes itself.
+// The coordinator's TLS files: provided by the operator, or created by the coordinator.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 namespace ls::tls {
 
 struct Texts {       // PEM
-  std::string ca;    // whose certificates workers must show
-  std::string cert;  // the coordinator's, with its chain
+  std::string ca;    // CA that must have signed the workers' certificates
+  std::string cert;  // of the coordinator, with its chain
   std::string key;
 };
 
@@ -20,13 +20,13 @@ struct Texts {       // PEM
 Result<Texts> read_files(const std::filesystem::path& ca, const std::filesystem::path& cert,
                          const std::filesystem::path& key);
 
-// Whether the mode of a key's file lets nobody read it but `reader`. What root owns it may be shown through
-// its group: so secrets are mounted in a cluster.
+// True if a key file with this mode can be read only by `reader`. A file owned by root may also be
+// group-readable: that is how secrets are mounted in a cluster.
 bool kept_secret(unsigned owner, unsigned mode, unsigned reader);
 
-// Of a farm with an authority of its own, in `folder` (0700): ca.pem and ca.key are made once, server.pem and
-// server.key anew at each start, worker.pem and worker.key when there are none or they end within 30 days.
-// `names`: what clients call this machine, besides localhost and its host name.
+// Files of a farm with its own authority, in `folder` (0700): ca.pem and ca.key are created once, server.pem
+// and server.key at each start, worker.pem and worker.key if they do not exist or expire within 30 days.
+// `names`: names of this machine for clients, besides localhost and its host name.
 Result<Texts> make_files(const std::filesystem::path& folder, std::vector<std::string> names,
                          std::int64_t now);
 

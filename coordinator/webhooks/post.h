@@ -1,5 +1,5 @@
-// One HTTP POST to a receiver. Redirects are not followed, proxies of the environment not used, and only http
-// and https spoken: a receiver cannot send the coordinator anywhere else.
+// One HTTP POST to a receiver. Does not follow redirects, ignores proxies of the environment and uses only
+// http and https: a receiver cannot redirect the coordinator anywhere.
 #pragma once
 
 #include <string>
@@ -16,11 +16,12 @@ struct Post {
   std::string body;
 };
 
-// The status of the answer, whose body is not kept. Errors: no answer within kAnswerSeconds, no connection.
+// Returns the status of the answer; its body is dropped. Errors: no connection, no answer within
+// kAnswerSeconds.
 inline constexpr long kAnswerSeconds = 15;
 Result<int> send(const Post& post);
 
-// invalid_argument if this is no address of a receiver.
+// invalid_argument if this is not a usable receiver URL.
 Result<void> check_url(const std::string& url);
 
 }  // namespace ls::coordinator::webhooks

@@ -11,9 +11,9 @@
 
 #include "common/base/log.h"
 #include "common/base/secret.h"
-#include "coordinator/views.h"
+#include "coordinator/views/views.h"
 #include "coordinator/webhooks/line.h"
-#include "coordinator/webhooks/outbox.h"
+#include "coordinator/webhooks/webhook_outbox.h"
 
 namespace ls::coordinator {
 namespace {
@@ -44,15 +44,15 @@ class Teller final : public Webhooks {
   }
 
   ~Teller() override {
-    subscription_.reset();  // no call is under way any more
+    subscription_.reset();  // no callback is in progress after this
     for (auto& thread : threads_) thread.request_stop();
   }
 
   void start(Coordinator& coordinator) {
-    // First the stream, then the state: nothing falls between.
+    // First the stream, then the state, so that no change is missed.
     std::uint64_t last = coordinator.last_event_id();
     subscription_ = coordinator.subscribe(last, [this, &coordinator, last](const StreamEvent& event) mutable {
-      // Events are kept in a ring: while the disk stood still some may have gone by unseen.
+      // Events are kept in a ring: some may have been dropped while the disk was stuck.
       if (event.id != last + 1) look_again(coordinator, event.id);
       last = event.id;
       if (event.type == "job") changed(event.job, event.data, event.id);
@@ -70,12 +70,12 @@ class Teller final : public Webhooks {
   }
 
  private:
-  // What changed while nobody listened: before a crash was noticed here, or during it.
+  // Reports changes that happened while nobody listened, i.e. before or during a crash.
   void catch_up(Coordinator& coordinator) {
     for (const JobId& job : outbox_.open_jobs()) {
       const auto view = coordinator.job(job);
       const std::string state(view ? to_string(view->state) : "");
-      // Its end may be among what is still to be told: the crash came between both.
+      // Its end may already be among the pending deliveries, if the crash came between the two writes.
       if (!view || kept_.contains(job.value + "/" + state)) {
         const std::lock_guard lock(mutex_);
         mark_ended_locked(job);
@@ -106,7 +106,7 @@ class Teller final : public Webhooks {
   }
 
   void changed(const std::string& job, const std::string& data, std::uint64_t event) {
-    if (frame_of(JobId{job})) return;  // its sequence tells
+    if (frame_of(JobId{job})) return;  // reported by its sequence
     json view = json::parse(data, nullptr, false);
     if (!view.is_object() || !view.contains("state") || !view["state"].is_string()) return;
     const std::string state = view["state"].get<std::string>();
@@ -117,7 +117,7 @@ class Teller final : public Webhooks {
     known = state;
     if (state == "removed" || state == "moved") states_.erase(job);
     if (reopened && !ended(state)) mark_open_locked(JobId{job});
-    tell_locked(job, state, event, std::move(view));
+    send_locked(job, state, event, std::move(view));
     if (ended(state)) mark_ended_locked(JobId{job});
     woken_.notify_all();
   }
@@ -134,7 +134,7 @@ class Teller final : public Webhooks {
     outbox_.job_has_ended(job);
   }
 
-  void tell_locked(const std::string& job, const std::string& state, std::uint64_t event, json view) {
+  void send_locked(const std::string& job, const std::string& state, std::uint64_t event, json view) {
     Delivery delivery;
     delivery.number = ++last_number_;
     delivery.id = fmt::format("{}/{}/{}", job, state, event);
@@ -163,7 +163,7 @@ class Teller final : public Webhooks {
         wait(lock, line.next_due(), token);
         continue;
       }
-      const Delivery sent = *next;  // while it is under way too many others may push it out
+      const Delivery sent = *next;  // a copy: while it is being sent, newer deliveries may push it out
       lock.unlock();
       const auto status = send(receiver, sent);
       lock.lock();
@@ -210,9 +210,9 @@ class Teller final : public Webhooks {
   webhooks::Outbox outbox_;
   mutable std::mutex mutex_;
   std::condition_variable_any woken_;
-  std::map<std::string, std::string> states_;  // by job, as told last
-  std::set<JobId> open_;                       // as the outbox has them
-  std::set<std::string> kept_;                 // JOB/STATE of what waited at the start
+  std::map<std::string, std::string> states_;  // by job, as last reported
+  std::set<JobId> open_;                       // as in the outbox
+  std::set<std::string> kept_;                 // JOB/STATE of the deliveries pending at the start
   std::deque<Line> lines_;                     // by receiver
   std::uint64_t last_number_ = 0;
   Figures figures_;

@@ -1,21 +1,20 @@
-// Tells receivers what becomes of jobs: a POST for every change of a job's state, signed, repeated until it
-// is taken, at least once whatever is killed. Only the operator names receivers (--webhook): no job, scene or
-// user can.
+// Notifies receivers of changes to jobs: a signed POST for every change of a job's state, repeated until it
+// is accepted, and delivered at least once even if processes are killed. Only the operator names receivers
+// (--webhook): no job, scene or user can.
 //
 //   POST URL
 //   Content-Type: application/json
-//   Lightshaft-Event: job.done                         job.STATE, as in GET /api/v1/jobs/ID; job.removed;
-//   job.moved:
-//                                                      another coordinator goes on with it, and tells the
-//                                                      rest
-//   Lightshaft-Delivery: j-1f/done/4711                the same when it is sent again
-//   Lightshaft-Signature: t=UNIX,v1=HEX                HEX = HMAC-SHA-256(secret, "UNIX." + body), UNIX =
-//   time of sending
-//   {"event": "job.done", "id": "j-1f/done/4711", "job": {as the API shows it}}
+//   Lightshaft-Event: job.done               job.STATE, as in GET /api/v1/jobs/ID; or job.removed, or
+//                                            job.moved (another coordinator continues it and sends
+//                                            later events)
+//   Lightshaft-Delivery: j-1f/done/4711      the same when it is sent again
+//   Lightshaft-Signature: t=UNIX,v1=HEX      HEX = HMAC-SHA-256(secret, "UNIX." + body),
+//                                            UNIX = time of sending
+//   {"event": "job.done", "id": "j-1f/done/4711", "job": {as in the API}}
 //
-// An answer of 2xx takes it. Anything else, and no answer within 15 s, is tried again after 1, 2, 4 ... 300
-// s, 20 times; what comes later waits meanwhile. A change that is undone within the same instant may be told
-// by its outcome alone.
+// A 2xx answer accepts it. After any other answer, or none within 15 s, it is sent again after 1, 2, 4 ...
+// 300 s, 20 times; later notifications wait meanwhile. If a change is undone at once, only the outcome may be
+// reported.
 #pragma once
 
 #include <filesystem>
@@ -26,7 +25,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
-#include "coordinator/service.h"
+#include "coordinator/service/coordinator.h"
 #include "coordinator/webhooks/post.h"
 
 namespace ls::coordinator {
@@ -36,21 +35,21 @@ class Webhooks {
   struct Options {
     std::vector<std::string> urls;
     std::string secret;
-    std::filesystem::path folder;  // of what must still be told
+    std::filesystem::path folder;  // of pending notifications
     std::shared_ptr<const Clock> clock;
     std::function<double()> unix_time;                            // wall clock, seconds
-    std::function<Result<int>(const webhooks::Post&)> send = {};  // webhooks::send unless told otherwise
+    std::function<Result<int>(const webhooks::Post&)> send = {};  // webhooks::send by default
   };
   struct Figures {
     std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
   };
-  // Ends, sending nothing more, when it is destroyed; the coordinator must live longer.
+  // Destroying it stops all sending; the coordinator must outlive it.
   static Result<std::unique_ptr<Webhooks>> start(Coordinator& coordinator, Options options);
   virtual ~Webhooks() = default;
   virtual Figures figures() const = 0;
 };
 
-// The value of Lightshaft-Signature.
+// The value of the Lightshaft-Signature header.
 std::string webhook_signature(const std::string& secret, std::int64_t unix_seconds, const std::string& body);
 
 }  // namespace ls::coordinator

@@ -1,6 +1,6 @@
 // What would the forecasts of today have said of races that were run before?
 //   forecast_replay POINTS.CSV     of `lightshaft compare --report DIR`: DIR/points.csv
-// Each scene and seed is followed as cli/compare/forecasts.cpp does it: at every doubling of samples from 8
+// Each scene and seed is followed as compare/forecasts.cpp does it: at every doubling of samples from 8
 // on it is asked for a half, a quarter and an eighth of the error estimated then, and held against the first
 // checkpoint that is there. Predictions whose interval ends after the race are not counted, whatever came of
 // them.
@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/image/convergence.h"
+#include "common/image/error/convergence.h"
 
 namespace ls::test {
 namespace {

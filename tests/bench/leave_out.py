@@ -131,7 +131,7 @@ def instructions(binary, scene, folder):
     return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
 
 
-# By name: the flags of worker/render/features.h, in their order, without those that are not set at the end.
+# By name: the first seven flags of worker/render/base/features.h, in their order, without those that are not set at the end.
 INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
                   "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
                   "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1)}
@@ -160,11 +160,14 @@ def by_instantiation(binary, scene, folder):
     told = json.loads(said.stdout)
     assert told["variants_agree"], told["variant_bits"]
     longer = max(told["size"])
-    paths = 4 * (told["size"][0] * 32 // longer) * (told["size"][1] * 32 // longer)  # as cli/inspect_command.cpp has it
+    paths = 4 * (told["size"][0] * 32 // longer) * (told["size"][1] * 32 // longer)  # as cli/commands/inspect_command.cpp has it
     costs = {}
     for function, cost in inclusive(out).items():
         if (m := re.search(r"sample_with<ls::render::Features\{([^}]*)\}", function)):
-            flags = tuple(int(flag == "true") for flag in m[1].split(", ")) if m[1] else ()
+            flags = [int(flag == "true") for flag in m[1].split(", ")][:7] if m[1] else []
+            while flags and not flags[-1]:
+                flags.pop()
+            flags = tuple(flags)
             costs[flags] = costs.get(flags, 0) + cost / paths
     return [(v["variant"], costs[INSTANTIATIONS[v["variant"]]]) for v in told["variant_bits"]]
 

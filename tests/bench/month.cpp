@@ -32,7 +32,7 @@ void raise(std::map<std::string, std::size_t>& most, const Sizes& sizes) {
 
 void print(int day, const ls::coordinator::Month::Counts& c, const std::map<std::string, std::size_t>& most) {
   fmt::print("| {} | {} | {} | {} | {} | {} | {} + {} | {} | {} |", day, c.events, c.ended, c.units,
-             c.workers, c.failures, c.restarts, c.takeovers, c.audits, c.barred);
+             c.workers, c.failures, c.restarts, c.takeovers, c.audits, c.quarantined);
   for (const char* what :
        {"jobs", "units", "leases", "workers", "of workers", "names", "shares", "allocated KiB"})
     fmt::print(" {} |", most.at(what));

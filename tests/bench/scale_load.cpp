@@ -20,7 +20,7 @@
 #include <thread>
 
 #include "common/base/overloaded.h"
-#include "common/image/partial.h"
+#include "common/image/film/partial.h"
 #include "worker/client/client.h"
 #include "worker/fake/fake.h"
 

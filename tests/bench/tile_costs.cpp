@@ -21,10 +21,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/local_scene.h"
-#include "cli/local_world.h"
+#include "cli/local/local_scene.h"
+#include "cli/local/local_world.h"
 #include "common/base/log.h"
-#include "common/image/film.h"
+#include "common/image/film/film.h"
 #include "worker/render/render.h"
 
 namespace ls::test {

@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "cli/local_farm.h"
-#include "common/image/exr_file.h"
+#include "cli/local/local_farm.h"
+#include "common/image/exr/exr_file.h"
 #include "tests/coverage/job.h"
 
 namespace ls::test {

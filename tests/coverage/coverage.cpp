@@ -11,11 +11,11 @@
 #include <thread>
 #include <vector>
 
-#include "cli/validate_stats.h"
-#include "common/image/convergence.h"
-#include "common/image/film.h"
+#include "common/image/error/convergence.h"
+#include "common/image/film/film.h"
 #include "common/scene/read.h"
 #include "tests/coverage/job.h"
+#include "validation/measure/hypothesis_tests.h"
 #include "worker/render/render.h"
 
 namespace ls::test {
@@ -172,7 +172,8 @@ CoverageJob run_plain_job(const Scene& scene, std::uint64_t spp, std::uint64_t s
   job.image = film.pixels(0).mean;
   job.halves = film.half_means(0);
   job.spp = film.spp(0);
-  job.heavy_tail = !job.error.trusted || judge(points, job.error.verdict).kind == Judgement::Kind::heavy_tail;
+  job.heavy_tail =
+      !job.error.trusted || judge(points, job.error.verdict).kind == ConvergenceStatus::Kind::heavy_tail;
   return job;
 }
 

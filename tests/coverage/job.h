@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/error_estimate.h"
+#include "common/image/error/error_estimate.h"
 #include "common/scene/scene.h"
 #include "tests/coverage/scenes.h"
 

@@ -9,10 +9,10 @@
 #include <exception>
 #include <string>
 
-#include "cli/validate_stats.h"
 #include "common/base/log.h"
 #include "tests/coverage/coverage.h"
 #include "tests/coverage/denominators.h"
+#include "validation/measure/hypothesis_tests.h"
 
 namespace {
 

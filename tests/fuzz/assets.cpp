@@ -13,15 +13,15 @@
 #include "common/assets/mesh.h"
 #include "common/assets/raw_grid.h"
 #include "common/assets/vol.h"
-#include "common/image/exr_file.h"
-#include "common/image/fake_pixels.h"
-#include "common/image/final_image.h"
+#include "common/image/exr/exr_file.h"
+#include "common/image/exr/final_image.h"
+#include "common/image/film/fake_pixels.h"
 #include "tests/fuzz/all_targets.h"
-#include "tests/unit/nvdb/nvdb_kit.h"
+#include "tests/unit/nvdb/nvdb_builder.h"
+#include "worker/render/media/vdb_reply.h"
+#include "worker/render/media/vdb_validate.h"
 #include "worker/render/vdb/nvdb.h"
 #include "worker/render/vdb/refused.h"
-#include "worker/render/vdb_belief.h"
-#include "worker/render/vdb_reply.h"
 
 namespace ls::fuzz {
 namespace {
@@ -154,7 +154,7 @@ void vdb_reply(Bytes input) {
   std::copy_n(bytes_of(input).begin(), head, reply.begin());
   if (reply.size() >= render::kVdbValuesAt)
     std::copy(bytes_of(input).begin() + head, bytes_of(input).end(), reply.begin() + render::kVdbValuesAt);
-  const auto grid = render::believed_grid(reply, kMostValues);
+  const auto grid = render::validated_grid(reply, kMostValues);
   grid ? check(*grid) : must(!grid.error().message.empty(), "what is refused is told why");
 }
 
@@ -175,10 +175,10 @@ const std::string& grid_of(std::uint8_t choice, bool whole_file) {
   static const auto made = [] {
     std::vector<std::string> all;
     for (const std::uint32_t type : {1, 2, 9, 13, 15, 16}) {
-      test::NvdbKit kit;
-      kit.type = type;
-      all.push_back(kit.buffer());
-      all.push_back(kit.file());
+      test::NvdbBuilder builder;
+      builder.type = type;
+      all.push_back(builder.buffer());
+      all.push_back(builder.file());
     }
     return all;
   }();
@@ -275,7 +275,7 @@ void volume(Bytes input) {
 }
 
 Seeds volume_seeds() {
-  test::NvdbKit packed;
+  test::NvdbBuilder packed;
   packed.codec = 1;
   Seeds seeds{"v" + vol(1, 1, 4), "v" + vol(1, 3, 4), "v" + vol(2, 1, 2),  "v" + vol(3, 3, 1),
               "x" + raw_grid(),   "z" + raw_grid(),   "n" + packed.file(), "r" + vdb_reply_seed()};

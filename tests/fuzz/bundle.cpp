@@ -4,8 +4,8 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "coordinator/http/bundle.h"
-#include "coordinator/store/memory_blobs.h"
+#include "coordinator/http/bundle/bundle.h"
+#include "coordinator/store/blobs/memory_blobs.h"
 #include "tests/fuzz/all_targets.h"
 
 namespace ls::fuzz {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "coordinator/http/api.h"
+#include "coordinator/http/api/api.h"
 
 namespace ls::fuzz {
 
@@ -30,7 +30,7 @@ class HttpDoor {
   http::Response answer(http::Request request);
 
   std::unique_ptr<coordinator::Coordinator> coordinator_;
-  http::TokenBook tokens_{kToken};
+  http::TokenRegistry tokens_{kToken};
   std::unique_ptr<http::Api> api_;
   std::string job_;
 };

@@ -1,9 +1,9 @@
 // Partial EXRs, as workers and `lightshaft merge` hand them in: each alone, and all merged into a final EXR.
-#include "common/image/partial.h"
-#include "common/image/exr_file.h"
-#include "common/image/fake_pixels.h"
-#include "common/image/final_image.h"
-#include "common/image/merge.h"
+#include "common/image/film/partial.h"
+#include "common/image/exr/exr_file.h"
+#include "common/image/exr/final_image.h"
+#include "common/image/film/fake_pixels.h"
+#include "common/image/film/merge.h"
 #include "tests/fuzz/all_targets.h"
 
 namespace ls::fuzz {

@@ -6,8 +6,8 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "common/image/fake_pixels.h"
-#include "coordinator/service.h"
+#include "common/image/film/fake_pixels.h"
+#include "coordinator/service/coordinator.h"
 #include "proto/convert.h"
 #include "tests/fuzz/all_targets.h"
 

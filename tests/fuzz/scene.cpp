@@ -1,11 +1,11 @@
 // Scene texts of strangers: read, described, written in both forms and read back to the same scene.
+#include "common/scene/analysis/needs.h"
+#include "common/scene/analysis/prune.h"
 #include "common/scene/diagnostic.h"
-#include "common/scene/needs.h"
-#include "common/scene/nori_test.h"
-#include "common/scene/prune.h"
+#include "common/scene/json/serialize.h"
 #include "common/scene/read.h"
-#include "common/scene/serialize.h"
-#include "common/scene/xml_write.h"
+#include "common/scene/reader/nori_test.h"
+#include "common/scene/reader/xml_write.h"
 #include "tests/fuzz/all_targets.h"
 
 namespace ls::fuzz {

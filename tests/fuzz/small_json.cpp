@@ -1,9 +1,9 @@
 // The small texts that travel between processes and lie in stores. The first byte says which.
-#include "common/image/health.h"
-#include "common/image/partial.h"
+#include "common/image/film/health.h"
+#include "common/image/film/partial.h"
 #include "common/job/settings.h"
-#include "coordinator/assemble/health_book.h"
-#include "coordinator/store/job_store.h"
+#include "coordinator/assemble/health_table.h"
+#include "coordinator/store/jobs/job_store.h"
 #include "tests/fuzz/all_targets.h"
 #include "worker/child/job_text.h"
 
@@ -40,8 +40,8 @@ void small_json(Bytes input) {
       return there_and_back(text, coordinator::parse_stored_job,
                             [](const coordinator::StoredJob& job) { return to_json(job); });
     case 'b':
-      return there_and_back(text, coordinator::HealthBook::load,
-                            [](const coordinator::HealthBook& book) { return book.save(); });
+      return there_and_back(text, coordinator::HealthTable::load,
+                            [](const coordinator::HealthTable& book) { return book.save(); });
     case 'c':
       return there_and_back(text, worker::child::from_text,
                             [](const worker::LocalJob& job) { return worker::child::to_text(job); });
@@ -63,7 +63,7 @@ Seeds small_json_seeds() {
   spec.frames = FrameRange{1, 9, 2};
   Health health;
   health.add(HealthCause::infinite, 3, {4, 5, 6});
-  coordinator::HealthBook book;
+  coordinator::HealthTable book;
   book.folded(0, 0, {0, 2}, health);
   book.folded(3, 2, {4, 6}, health);
   coordinator::StoredJob job;

@@ -1,7 +1,7 @@
 // Bytes of a client's connection to the coordinator: what Beast makes of them, what we make of that, and
 // bodies of a length and in chunks, until the connection would be closed. The first byte of each part of the
 // input says how many bytes arrive at once.
-#include "coordinator/http/request_head.h"
+#include "coordinator/http/net/request_head.h"
 #include "tests/fuzz/all_targets.h"
 #include "tests/fuzz/http_door.h"
 

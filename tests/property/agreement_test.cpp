@@ -39,15 +39,15 @@ std::vector<Rival> rivals(const IntegratorSettings& base) {
   return all;
 }
 
-SceneKit quarter(const RandomScene& s, const IntegratorSettings& integrator, int which) {
-  SceneKit kit;
-  kit.scene = s.scene;
-  kit.files = s.assets.files();
-  kit.scene.integrator = integrator;
-  kit.scene.film.size = {16, 16};
-  kit.scene.film.crop_offset = {8 * (which & 1), 8 * (which >> 1)};
-  kit.scene.film.crop_size = {8, 8};
-  return kit;
+SceneBuilder quarter(const RandomScene& s, const IntegratorSettings& integrator, int which) {
+  SceneBuilder builder;
+  builder.scene = s.scene;
+  builder.files = s.assets.files();
+  builder.scene.integrator = integrator;
+  builder.scene.film.size = {16, 16};
+  builder.scene.film.crop_offset = {8 * (which & 1), 8 * (which >> 1)};
+  builder.scene.film.crop_size = {8, 8};
+  return builder;
 }
 
 TEST(RandomScenes, GiveTheSameImageByEveryIntegrator) {

@@ -34,7 +34,7 @@ Comparison compare(const Estimate& a, const Estimate& b, double level) {
   return all;
 }
 
-Comparison look(const SceneKit& a, const SceneKit& b, std::uint64_t seed, double level, Looks looks) {
+Comparison look(const SceneBuilder& a, const SceneBuilder& b, std::uint64_t seed, double level, Looks looks) {
   const auto at = [&](std::uint64_t spp, std::uint64_t s, double alpha) {
     return compare(estimate(a, spp, s), estimate(b, spp, s + 1), alpha);
   };

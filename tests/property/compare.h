@@ -22,6 +22,7 @@ Comparison compare(const Estimate& a, const Estimate& b, double level);
 struct Looks {
   std::uint64_t first = 64, second = 1024;  // samples per pixel
 };
-Comparison look(const SceneKit& a, const SceneKit& b, std::uint64_t seed, double level, Looks looks = {});
+Comparison look(const SceneBuilder& a, const SceneBuilder& b, std::uint64_t seed, double level,
+                Looks looks = {});
 
 }  // namespace ls::test

@@ -37,7 +37,7 @@ TextureIndex Draw::texture(const scene::Range& range, int depth) {
   if (kind < .15) {
     BitmapTexture b;
     fill(b);
-    b.file = SceneKit::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
+    b.file = SceneBuilder::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
     t = b;
   } else if (kind < .3 && depth < 3) {
     CheckerboardTexture c;
@@ -52,7 +52,7 @@ TextureIndex Draw::texture(const scene::Range& range, int depth) {
     p.texture = texture(range, depth + 1);
     t = p;
   }
-  return SceneKit::push<TextureTag>(scene_.textures, t);
+  return SceneBuilder::push<TextureTag>(scene_.textures, t);
 }
 
 BsdfIndex Draw::bsdf(int depth) {
@@ -62,7 +62,7 @@ BsdfIndex Draw::bsdf(int depth) {
     any(b);
   } while (depth > 2 && scene::nested_bsdfs(b)[0]);
   const auto diffuse = [&] {
-    return SceneKit::push<BsdfTag>(scene_.bsdfs, DiffuseBsdf{texture(scene::kUnit)});
+    return SceneBuilder::push<BsdfTag>(scene_.bsdfs, DiffuseBsdf{texture(scene::kUnit)});
   };
   if (auto* two = std::get_if<TwoSidedBsdf>(&b)) {
     const auto traits = *scene::bsdf_traits(scene_);
@@ -87,18 +87,18 @@ BsdfIndex Draw::bsdf(int depth) {
           if constexpr (requires { rough.alpha_u; })
             if (rough.multiple_scattering)
               rough.alpha_u = rough.alpha_v =
-                  SceneKit::push<TextureTag>(scene_.textures, ConstantTexture{kGreys[dice_.below(3)]});
+                  SceneBuilder::push<TextureTag>(scene_.textures, ConstantTexture{kGreys[dice_.below(3)]});
         }
       },
       b);
   if (auto* bump = std::get_if<BumpMapBsdf>(&b)) {
     BitmapTexture heights;
-    heights.file = SceneKit::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
+    heights.file = SceneBuilder::push<AssetTag>(scene_.assets, random_image(dice_, assets_, choice_.wild));
     heights.raw = true;
-    bump->texture = SceneKit::push<TextureTag>(scene_.textures, heights);
+    bump->texture = SceneBuilder::push<TextureTag>(scene_.textures, heights);
   }
   depth_ = outer;
-  return SceneKit::push<BsdfTag>(scene_.bsdfs, b);
+  return SceneBuilder::push<BsdfTag>(scene_.bsdfs, b);
 }
 
 VolumeIndex Draw::volume(GridKind kind) {
@@ -108,18 +108,18 @@ VolumeIndex Draw::volume(GridKind kind) {
     v.value = colour(kind == GridKind::share ? scene::kUnit : scene::kNonNegative);
     if (kind == GridKind::temperature) v.value = Rgb{v.value[0] * 800, v.value[0] * 800, v.value[0] * 800};
     if (kind == GridKind::density) v.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
-    return SceneKit::push<VolumeTag>(scene_.volumes, v);
+    return SceneBuilder::push<VolumeTag>(scene_.volumes, v);
   }
   GridVolume g;
   fill(g);
   const bool bin = c > .85;
-  g.file = SceneKit::push<AssetTag>(scene_.assets, bin ? random_bin(dice_, assets_, choice_.wild, kind)
-                                                       : random_vol(dice_, assets_, choice_.wild, kind));
+  g.file = SceneBuilder::push<AssetTag>(scene_.assets, bin ? random_bin(dice_, assets_, choice_.wild, kind)
+                                                           : random_vol(dice_, assets_, choice_.wild, kind));
   if (!bin) g.order = GridOrder::x_fastest;
   if (bin) g.raw = true;
   if (bin || g.node_centred) g.wrap = Wrap::clamp;
   if (dice_.chance(.7)) g.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
-  return SceneKit::push<VolumeTag>(scene_.volumes, g);
+  return SceneBuilder::push<VolumeTag>(scene_.volumes, g);
 }
 
 MediumIndex Draw::medium() {
@@ -137,7 +137,7 @@ MediumIndex Draw::medium() {
       h->temperature_offset = 0;
     }
   }
-  return SceneKit::push<MediumTag>(scene_.media, m);
+  return SceneBuilder::push<MediumTag>(scene_.media, m);
 }
 
 }  // namespace ls::test

@@ -6,10 +6,10 @@
 #include <utility>
 #include <variant>
 
-#include "common/scene/bsdf_traits.h"
-#include "common/scene/describe_fields.h"
+#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/describe_fields.h"
 #include "tests/property/random_scene.h"
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
 
 namespace ls::test {
 
@@ -84,7 +84,7 @@ class Draw {
   void draw(const scene::Field&, PhaseIndex& x) {
     Phase p;
     any(p);
-    x = SceneKit::push<PhaseTag>(scene_.phases, p);
+    x = SceneBuilder::push<PhaseTag>(scene_.phases, p);
   }
   void draw(const scene::Field&, MediumIndex& x) { x = medium(); }
   void draw(const scene::Field&, AssetIndex&) {}  // by whoever knows what the file is for

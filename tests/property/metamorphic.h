@@ -19,14 +19,14 @@ inline std::vector<NamedScene> scenes() {
   const auto [first, count] = scenes_to_try(kRandom);
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
-    SceneKit kit;
-    kit.scene = s.scene;
-    kit.files = s.assets.files();
-    kit.scene.film.size = {12, 12};
-    kit.scene.film.crop_offset = {0, 0};
-    kit.scene.film.crop_size = {0, 0};
-    if (!render::build_world(kit.scene, settings_of(kit.scene), kit.files, 1)) continue;
-    all.push_back({fmt::format("random scene {}", seed), kit});
+    SceneBuilder builder;
+    builder.scene = s.scene;
+    builder.files = s.assets.files();
+    builder.scene.film.size = {12, 12};
+    builder.scene.film.crop_offset = {0, 0};
+    builder.scene.film.crop_size = {0, 0};
+    if (!render::build_world(builder.scene, settings_of(builder.scene), builder.files, 1)) continue;
+    all.push_back({fmt::format("random scene {}", seed), builder});
   }
   return all;
 }
@@ -37,10 +37,10 @@ void expect_alike(Tests& tests, const std::vector<NamedScene>& all, Change chang
   std::uint64_t compared = 0, undecided = 0, seed = 1000;
   for (const NamedScene& s : all) {
     seed += 10;
-    const std::optional<SceneKit> other = change(s.kit);
+    const std::optional<SceneBuilder> other = change(s.builder);
     if (!other) continue;
     ++compared;
-    const Comparison c = look(s.kit, *other, seed, tests.level(3), looks);
+    const Comparison c = look(s.builder, *other, seed, tests.level(3), looks);
     undecided += c.verdict == Verdict::undecided;
     EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
   }

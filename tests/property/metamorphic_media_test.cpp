@@ -11,7 +11,7 @@
 namespace ls::test {
 namespace {
 
-void expect_alike(Tests& tests, const SceneKit& a, const SceneKit& b, std::uint64_t seed,
+void expect_alike(Tests& tests, const SceneBuilder& a, const SceneBuilder& b, std::uint64_t seed,
                   Looks looks = {256, 4096}) {
   const Comparison c = look(a, b, seed, tests.level(3), looks);
   EXPECT_EQ(c.verdict, Verdict::alike) << c.told;
@@ -19,21 +19,21 @@ void expect_alike(Tests& tests, const SceneKit& a, const SceneKit& b, std::uint6
 
 // A medium in the cube [-1, 1]^3 under the sun, on a floor.
 template <class Make>
-SceneKit sunlit(Make make) {
-  SceneKit kit({12, 12});
-  kit.shape(RectangleShape{}, translate({0, 0, -1.25}) * scale(4), kit.diffuse(.5));
-  kit.container(CubeShape{}, {}, kit.null(), make(kit));
-  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
-  kit.scene.emitters.push_back(PointEmitter{{0, -2, 2}, {3, 2, 1}});
-  kit.look({0, -5, 2}, {0, 0, 0}, 30);
-  kit.scene.integrator.max_depth = 8;
-  return kit;
+SceneBuilder sunlit(Make make) {
+  SceneBuilder builder({12, 12});
+  builder.shape(RectangleShape{}, translate({0, 0, -1.25}) * scale(4), builder.diffuse(.5));
+  builder.container(CubeShape{}, {}, builder.null(), make(builder));
+  builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
+  builder.scene.emitters.push_back(PointEmitter{{0, -2, 2}, {3, 2, 1}});
+  builder.look({0, -5, 2}, {0, 0, 0}, 30);
+  builder.scene.integrator.max_depth = 8;
+  return builder;
 }
 
 // Values at the nodes from face to face; twice as many nodes between which the field is the same.
-VolumeIndex nodes(SceneKit& kit, int n, const std::vector<float>& values) {
-  const VolumeIndex v = kit.grid({n, n, n}, values, translate({-1, -1, -1}) * scale(2));
-  std::get<GridVolume>(kit.scene.volumes[v.value]).node_centred = true;
+VolumeIndex nodes(SceneBuilder& builder, int n, const std::vector<float>& values) {
+  const VolumeIndex v = builder.grid({n, n, n}, values, translate({-1, -1, -1}) * scale(2));
+  std::get<GridVolume>(builder.scene.volumes[v.value]).node_centred = true;
   return v;
 }
 std::vector<float> refined(int n, const std::vector<float>& v) {
@@ -57,11 +57,11 @@ TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
   for (float& v : values) v = static_cast<float>(random() % 64) / 16;
   for (const char* integrator : {"volpath", "volpath_distant_mis"}) {
     const auto with = [&](int n, const std::vector<float>& v) {
-      SceneKit kit = sunlit([&](SceneKit& k) {
+      SceneBuilder builder = sunlit([&](SceneBuilder& k) {
         return k.heterogeneous(nodes(k, n, v), {.9, .8, .7}, 1, .3);
       });
-      kit.scene.integrator.name = integrator;
-      return kit;
+      builder.scene.integrator.name = integrator;
+      return builder;
     };
     expect_alike(tests, with(5, values), with(9, refined(5, values)), 1);
   }
@@ -71,14 +71,14 @@ TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
 // Half the size and twice the density: the same optical depths. Seen from as near, in the same bits.
 TEST(Metamorphic, HalfTheSizeAtTwiceTheDensityIsTheSame) {
   const auto with = [](double size) {
-    SceneKit kit({12, 12});
-    kit.container(CubeShape{}, scale(size), kit.null(),
-                  kit.homogeneous({.5 / size, 1 / size, 2 / size}, {.9, .8, .7}, .5));
-    kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
-    kit.look({0, -5 * size, 2 * size}, {0, 0, 0}, 30);
-    kit.scene.sensor.near_clip *= size;
-    kit.scene.sensor.far_clip *= size;
-    return kit;
+    SceneBuilder builder({12, 12});
+    builder.container(CubeShape{}, scale(size), builder.null(),
+                      builder.homogeneous({.5 / size, 1 / size, 2 / size}, {.9, .8, .7}, .5));
+    builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, 1, 1}});
+    builder.look({0, -5 * size, 2 * size}, {0, 0, 0}, 30);
+    builder.scene.sensor.near_clip *= size;
+    builder.scene.sensor.far_clip *= size;
+    return builder;
   };
   const PixelRect all{0, 0, 12, 12};
   const auto one = render::render_tile(*world_of(with(1)), all, {0, 4}, nullptr, nullptr);
@@ -94,13 +94,13 @@ TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
       std::vector<float> values(12 * 12 * 12, 1);
       for (int i = 0; i < 12; ++i)
         for (int j = 0; j < 12; ++j) values[static_cast<std::size_t>((i * 12 + j) * 12 + 11)] = outside;
-      SceneKit kit = sunlit([&](SceneKit& k) {
+      SceneBuilder builder = sunlit([&](SceneBuilder& k) {
         // The last layer of voxels, and what is interpolated towards it, lie beyond x = 1.
         return k.heterogeneous(k.grid({12, 12, 12}, values, translate({-1, -1, -1}) * scale(2.5, 2, 2)),
                                {.9, .8, .7});
       });
-      kit.scene.integrator.name = integrator;
-      return kit;
+      builder.scene.integrator.name = integrator;
+      return builder;
     };
     expect_alike(tests, with(1), with(1e4f), 20, {64, 256});
   }
@@ -111,13 +111,13 @@ TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
   Tests tests("property/boundaries");
   std::uint64_t seed = 40;
   for (const NamedScene& s : different_scenes()) {
-    SceneKit more = s.kit;
+    SceneBuilder more = s.builder;
     const BsdfIndex null = more.null();
     // Within the media, across their boundaries, around everything. None of them says what is on its sides.
     for (const double r : {.25, .7, 1.2, 9.})
       more.shape(SphereShape{}, translate({.1, .05, 0}) * scale(r), null);
     more.shape(RectangleShape{}, rotate_x(30) * scale(3), null);
-    expect_alike(tests, s.kit, more, seed += 10, {64, 1024});
+    expect_alike(tests, s.builder, more, seed += 10, {64, 1024});
   }
   tests.close();
 }
@@ -129,17 +129,17 @@ TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
     return Vec3{std::sin(degrees * kPi / 180), 0, std::cos(degrees * kPi / 180)};
   };
   const auto seen = [&](double to, double from, bool beyond, const char* integrator) {
-    SceneKit kit({8, 8});
-    kit.container(CubeShape{}, scale(1e4, 1e4, 1), kit.null(),
-                  kit.homogeneous({.3, .6, 1.2}, {.95, .8, .6}, .6));
+    SceneBuilder builder({8, 8});
+    builder.container(CubeShape{}, scale(1e4, 1e4, 1), builder.null(),
+                      builder.homogeneous({.3, .6, 1.2}, {.95, .8, .6}, .6));
     const Vec3 in = direction(from), out = direction(to);
     // Per irradiance on the slab, which gets the cosine of what faces the light.
     const double e = 1 / in[2];
-    kit.scene.emitters.push_back(DirectionalEmitter{{-in[0], 0, -in[2]}, {e, e, e}});
+    builder.scene.emitters.push_back(DirectionalEmitter{{-in[0], 0, -in[2]}, {e, e, e}});
     const double side = beyond ? -1 : 1;
-    kit.look({5 * side * out[0], 0, 5 * side * out[2]}, {0, 0, 0}, 1e-2, {0, 1, 0});
-    kit.scene.integrator.name = integrator;
-    return kit;
+    builder.look({5 * side * out[0], 0, 5 * side * out[2]}, {0, 0, 0}, 1e-2, {0, 1, 0});
+    builder.scene.integrator.name = integrator;
+    return builder;
   };
   std::uint64_t seed = 200;
   for (const char* integrator : {"volpath", "volpath_distant_mis"})
@@ -151,7 +151,7 @@ TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
 // A sample is its own: alone, in any order and in any company it is the same.
 TEST(Metamorphic, SamplesKnowNoOrder) {
   for (const NamedScene& s : different_scenes()) {
-    const auto world = world_of(s.kit);
+    const auto world = world_of(s.builder);
     const auto tile = render::render_tile(*world, {3, 4, 6, 6}, {0, 8}, nullptr, nullptr);
     for (int y = 5; y >= 4; --y)
       for (int x = 5; x >= 3; --x) {

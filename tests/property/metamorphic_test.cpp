@@ -11,14 +11,14 @@
 namespace ls::test {
 namespace {
 
-std::vector<float> pixels(const SceneKit& kit, std::uint64_t spp) {
-  const FrameSize size = kit.scene.film.image_size();
+std::vector<float> pixels(const SceneBuilder& builder, std::uint64_t spp) {
+  const FrameSize size = builder.scene.film.image_size();
   const PixelRect all{0, 0, size.width, size.height};
-  return render::render_tile(*world_of(kit), all, {0, spp}, nullptr, nullptr).sums;
+  return render::render_tile(*world_of(builder), all, {0, spp}, nullptr, nullptr).sums;
 }
-SceneKit moved(const SceneKit& kit, const Move& m) {
-  SceneKit out = kit;
-  out.scene = moved(kit.scene, m);
+SceneBuilder moved(const SceneBuilder& builder, const Move& m) {
+  SceneBuilder out = builder;
+  out.scene = moved(builder.scene, m);
   return out;
 }
 
@@ -26,17 +26,17 @@ SceneKit moved(const SceneKit& kit, const Move& m) {
 // The world is recentred and scaled to unit size by a power of two before anything is rounded.
 TEST(Metamorphic, ScalingByPowersOfTwoChangesNoBit) {
   for (const NamedScene& s : scenes()) {
-    const auto before = pixels(s.kit, 2);
+    const auto before = pixels(s.builder, 2);
     for (const int k : {-14, -1, 3, 20})
-      EXPECT_EQ(pixels(moved(s.kit, {{}, std::ldexp(1., k)}), 2), before) << s.name << " times 2^" << k;
+      EXPECT_EQ(pixels(moved(s.builder, {{}, std::ldexp(1., k)}), 2), before) << s.name << " times 2^" << k;
   }
 }
 
 TEST(Metamorphic, ScalingChangesNothing) {
   int i = 0;
-  expect_alike("property/scaling", scenes(), [&](const SceneKit& kit) {
+  expect_alike("property/scaling", scenes(), [&](const SceneBuilder& builder) {
     constexpr double kScales[] = {1e-4, 1e-2, 7, 1e3, 1e6};
-    return std::optional(moved(kit, {{}, kScales[i++ % 5]}));
+    return std::optional(moved(builder, {{}, kScales[i++ % 5]}));
   });
 }
 
@@ -44,20 +44,21 @@ TEST(Metamorphic, ScalingChangesNothing) {
 TEST(Metamorphic, ShiftingByAPowerOfTwoChangesNoBitOfExactCoordinates) {
   for (const NamedScene& s : different_scenes()) {
     if (s.name == "coloured fog") continue;  // the directions of its spot light are no short fractions
-    EXPECT_EQ(pixels(moved(s.kit, {{}, 1, {0x1p17, -0x1p16, 0x1p17}}), 2), pixels(s.kit, 2)) << s.name;
+    EXPECT_EQ(pixels(moved(s.builder, {{}, 1, {0x1p17, -0x1p16, 0x1p17}}), 2), pixels(s.builder, 2))
+        << s.name;
   }
 }
 
 TEST(Metamorphic, ShiftingChangesNothing) {
-  expect_alike("property/shifting", scenes(), [](const SceneKit& kit) {
-    return std::optional(moved(kit, {{}, 1, {1e5, -1e5, 1e5}}));
+  expect_alike("property/shifting", scenes(), [](const SceneBuilder& builder) {
+    return std::optional(moved(builder, {{}, 1, {1e5, -1e5, 1e5}}));
   });
 }
 
 TEST(Metamorphic, TurningChangesNothing) {
   const Transform turn = rotate_x(37) * rotate_y(101) * rotate_x(-15);
   expect_alike("property/turning", scenes(),
-               [&](const SceneKit& kit) { return std::optional(moved(kit, {turn})); });
+               [&](const SceneBuilder& builder) { return std::optional(moved(builder, {turn})); });
 }
 
 // The hero channel is chosen by position, so it is exact for no scene.
@@ -66,12 +67,12 @@ TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
   Tests tests("property/channels");
   std::uint64_t seed = 5000, compared = 0;
   for (const NamedScene& s : all) {
-    if (!can_be_permuted(s.kit.scene)) continue;
+    if (!can_be_permuted(s.builder.scene)) continue;
     ++compared;
-    SceneKit other = s.kit;
-    other.scene = permuted(s.kit.scene, {1, 2, 0});
+    SceneBuilder other = s.builder;
+    other.scene = permuted(s.builder.scene, {1, 2, 0});
     const auto at = [&](std::uint64_t spp, double alpha) {
-      Estimate a = estimate(s.kit, spp, ++seed);
+      Estimate a = estimate(s.builder, spp, ++seed);
       const Estimate b = estimate(other, spp, ++seed);
       for (auto* list : {&a.mean, &a.standard_error, &a.freedom})
         *list = {(*list)[1], (*list)[2], (*list)[0]};
@@ -88,16 +89,17 @@ TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
 
 // ---- light
 TEST(Metamorphic, ALightOfTwoHalvesIsTheLight) {
-  expect_alike("property/two_halves", scenes(), [](const SceneKit& kit) -> std::optional<SceneKit> {
-    SceneKit out = kit;
-    const std::size_t n = kit.scene.emitters.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      if (!may_stand_twice(kit.scene.emitters[i])) continue;
-      dim(out.scene.emitters[i], .5);
-      out.scene.emitters.push_back(out.scene.emitters[i]);
-    }
-    return out.scene.emitters.size() > n ? std::optional(out) : std::nullopt;
-  });
+  expect_alike("property/two_halves", scenes(),
+               [](const SceneBuilder& builder) -> std::optional<SceneBuilder> {
+                 SceneBuilder out = builder;
+                 const std::size_t n = builder.scene.emitters.size();
+                 for (std::size_t i = 0; i < n; ++i) {
+                   if (!may_stand_twice(builder.scene.emitters[i])) continue;
+                   dim(out.scene.emitters[i], .5);
+                   out.scene.emitters.push_back(out.scene.emitters[i]);
+                 }
+                 return out.scene.emitters.size() > n ? std::optional(out) : std::nullopt;
+               });
 }
 
 TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
@@ -105,13 +107,13 @@ TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
   const std::vector<NamedScene> all = scenes();
   Tests tests("property/sum_of_lights");
   for (const NamedScene& s : all) {
-    const Scene& scene = s.kit.scene;
+    const Scene& scene = s.builder.scene;
     if (scene.emitters.size() < 2) continue;
     const auto at = [&](std::uint64_t spp, double alpha) {
       Estimate sum;
       sum.freedom = {1e9, 1e9, 1e9};
-      const auto add = [&](const SceneKit& kit) {
-        const Estimate e = estimate(kit, spp, ++seed);
+      const auto add = [&](const SceneBuilder& builder) {
+        const Estimate e = estimate(builder, spp, ++seed);
         for (std::size_t c = 0; c < 3; ++c) {
           sum.mean[c] += e.mean[c];
           sum.standard_error[c] = std::hypot(sum.standard_error[c], e.standard_error[c]);
@@ -120,7 +122,7 @@ TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
       };
       // What shapes and media give off stays with the first.
       for (std::size_t i = 0; i < scene.emitters.size(); ++i) {
-        SceneKit one = s.kit;
+        SceneBuilder one = s.builder;
         one.scene.emitters = {scene.emitters[i]};
         if (i > 0) {
           for (Shape& shape : one.scene.shapes) shape.emitter.reset();
@@ -131,7 +133,7 @@ TEST(Metamorphic, TheImageIsTheSumOverItsLights) {
         }
         add(one);
       }
-      return compare(sum, estimate(s.kit, spp, ++seed), alpha);
+      return compare(sum, estimate(s.builder, spp, ++seed), alpha);
     };
     const double level = tests.level(3);
     Comparison c = at(64, .01);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/base/overloaded.h"
-#include "common/scene/describe_fields.h"
+#include "common/scene/schema/describe_fields.h"
 
 namespace ls::test {
 namespace {

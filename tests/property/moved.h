@@ -1,7 +1,7 @@
 // The same scene elsewhere, in other units or turned: what a metamorphic test compares with.
 #pragma once
 
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
 
 namespace ls::test {
 

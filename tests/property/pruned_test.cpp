@@ -1,13 +1,13 @@
-// What is taken out of a scene before it becomes a job (common/scene/prune.h) changes no image: random scenes
-// beside themselves as they are sent. The same bits, but where decision 0012 names an exception: without a
-// surface that light passes, a medium or a layer of a blend, paths draw other numbers, and means are compared
-// as in agreement_test.cpp.
+// What is taken out of a scene before it becomes a job (common/scene/analysis/prune.h) changes no image:
+// random scenes beside themselves as they are sent. The same bits, but where decision 0012 names an
+// exception: without a surface that light passes, a medium or a layer of a blend, paths draw other numbers,
+// and means are compared as in agreement_test.cpp.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "common/scene/prune.h"
+#include "common/scene/analysis/prune.h"
 #include "tests/property/compare.h"
 #include "tests/property/random_scene.h"
 #include "tests/property/watch.h"
@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::uint64_t kPrunedScenes = 240;  // of a usual run
 
-SceneKit kit_of(const RandomScene& s, const Scene& scene) {
-  SceneKit kit;
-  kit.scene = scene;
-  kit.files = s.assets.files();
-  kit.scene.film.size = {12, 12};
-  return kit;
+SceneBuilder builder_of(const RandomScene& s, const Scene& scene) {
+  SceneBuilder builder;
+  builder.scene = scene;
+  builder.files = s.assets.files();
+  builder.scene.film.size = {12, 12};
+  return builder;
 }
 
 TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
@@ -38,7 +38,7 @@ TEST(RandomScenes, GiveTheSameImageWithoutWhatIsLeftOut) {
     if (sent.left_out.empty()) continue;
     if (!render::build_world(s.scene, settings_of(s.scene), s.assets.files(), 1)) continue;
     ++pruned_ones;
-    const SceneKit whole = kit_of(s, s.scene), part = kit_of(s, sent.scene);
+    const SceneBuilder whole = builder_of(s, s.scene), part = builder_of(s, sent.scene);
     // By bits first: nearly all are, and where they are not, means decide.
     if (estimate(whole, 4).mean == estimate(part, 4).mean) {
       ++by_bits;

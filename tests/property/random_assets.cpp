@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "common/image/exr_file.h"
-#include "tests/support/scene_kit.h"
+#include "common/image/exr/exr_file.h"
+#include "tests/support/scene_builder.h"
 
 namespace ls::test {
 namespace {

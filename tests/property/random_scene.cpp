@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/scene/validate.h"
+#include "common/scene/schema/validate.h"
 #include "tests/property/draw.h"
 
 namespace ls::test {
@@ -47,7 +47,7 @@ class Composer {
     if (dice_.chance(.5)) {
       s.interior = some_medium();
       s.is_medium_transition = true;
-      s.bsdf = dice_.chance(.7) ? SceneKit::push<BsdfTag>(scene_.bsdfs, NullBsdf{}) : draw_.bsdf();
+      s.bsdf = dice_.chance(.7) ? SceneBuilder::push<BsdfTag>(scene_.bsdfs, NullBsdf{}) : draw_.bsdf();
     } else {
       s.bsdf = draw_.bsdf();
     }
@@ -78,10 +78,10 @@ class Composer {
     mesh.shape_index = 0;
     // It is no parameter of `serialized`.
     if (mesh.format == MeshFormat::serialized) mesh.flip_tex_coords = false;
-    mesh.file =
-        SceneKit::push<AssetTag>(scene_.assets, kind == 0   ? random_obj(dice_, out_.assets, wild)
-                                                : kind == 1 ? random_ply(dice_, out_.assets, wild)
-                                                            : random_serialized(dice_, out_.assets, wild));
+    mesh.file = SceneBuilder::push<AssetTag>(scene_.assets,
+                                             kind == 0   ? random_obj(dice_, out_.assets, wild)
+                                             : kind == 1 ? random_ply(dice_, out_.assets, wild)
+                                                         : random_serialized(dice_, out_.assets, wild));
   }
   void floor() {
     Shape s;
@@ -95,7 +95,7 @@ class Composer {
     s.geometry = CubeShape{};
     s.to_world = scale(8);
     s.flip_normals = true;
-    s.bsdf = SceneKit::push<BsdfTag>(scene_.bsdfs, DiffuseBsdf{draw_.texture(scene::kUnit)});
+    s.bsdf = SceneBuilder::push<BsdfTag>(scene_.bsdfs, DiffuseBsdf{draw_.texture(scene::kUnit)});
     if (dice_.chance(.3)) {
       s.exterior = some_medium();
       s.is_medium_transition = true;
@@ -104,7 +104,7 @@ class Composer {
     scene_.shapes.push_back(s);
   }
   void group() {
-    const auto g = SceneKit::push<GroupTag>(scene_.groups, ShapeGroup{});
+    const auto g = SceneBuilder::push<GroupTag>(scene_.groups, ShapeGroup{});
     const std::size_t shapes = 1 + dice_.below(2), instances = 1 + dice_.below(3);
     for (std::size_t i = 0; i < shapes; ++i) {
       Shape s = shape();
@@ -139,8 +139,8 @@ class Composer {
         spot->texture.reset();
       aim(spot->to_world);
     } else if (auto* env = std::get_if<EnvmapEmitter>(&e)) {
-      env->file =
-          SceneKit::push<AssetTag>(scene_.assets, random_environment(dice_, out_.assets, out_.choice.wild));
+      env->file = SceneBuilder::push<AssetTag>(scene_.assets,
+                                               random_environment(dice_, out_.assets, out_.choice.wild));
       env->to_world = dice_.chance(.5) ? Transform{} : rigid();
     } else if (auto* p = std::get_if<ProjectorEmitter>(&e)) {
       aim(p->to_world);

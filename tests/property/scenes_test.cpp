@@ -8,9 +8,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "common/scene/serialize.h"
-#include "common/scene/validate.h"
-#include "common/scene/xml_write.h"
+#include "common/scene/json/serialize.h"
+#include "common/scene/reader/xml_write.h"
+#include "common/scene/schema/validate.h"
 #include "tests/property/random_scene.h"
 #include "tests/property/watch.h"
 #include "tests/support/render_check.h"

@@ -5,80 +5,83 @@
 namespace ls::test {
 namespace {
 
-SceneKit lit_room() {
-  SceneKit kit({12, 12});
-  const BsdfIndex wall = kit.bsdf(DiffuseBsdf{kit.texture({.75, .5, .25})});
+SceneBuilder lit_room() {
+  SceneBuilder builder({12, 12});
+  const BsdfIndex wall = builder.bsdf(DiffuseBsdf{builder.texture({.75, .5, .25})});
   // Clear of the media: which of two surfaces in one place a ray meets first is another question.
-  kit.shape(RectangleShape{}, translate({0, 0, -1.25}) * scale(4), wall);
-  kit.shape(RectangleShape{}, translate({0, 2, 0}) * rotate_x(90) * scale(4), wall);
-  kit.look({0, -5, 1}, {0, 0, 0}, 45);
-  kit.scene.film.filter = TentFilter{};
-  kit.scene.integrator.max_depth = 6;
-  return kit;
+  builder.shape(RectangleShape{}, translate({0, 0, -1.25}) * scale(4), wall);
+  builder.shape(RectangleShape{}, translate({0, 2, 0}) * rotate_x(90) * scale(4), wall);
+  builder.look({0, -5, 1}, {0, 0, 0}, 45);
+  builder.scene.film.filter = TentFilter{};
+  builder.scene.integrator.max_depth = 6;
+  return builder;
 }
 const Transform kBox = translate({-1, -1, -1}) * scale(2);
 
-SceneKit cloud() {
-  SceneKit kit = lit_room();
+SceneBuilder cloud() {
+  SceneBuilder builder = lit_room();
   std::vector<float> values(6 * 5 * 4);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 11) / 4;
-  const MediumIndex m = kit.heterogeneous(kit.grid({6, 5, 4}, values, kBox), {.9, .8, .5}, .75, .5);
-  kit.container(CubeShape{}, {}, kit.null(), m);
-  kit.scene.emitters.push_back(PointEmitter{{1.5, -2, 2}, {8, 6, 4}});
-  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}});
-  return kit;
+  const MediumIndex m = builder.heterogeneous(builder.grid({6, 5, 4}, values, kBox), {.9, .8, .5}, .75, .5);
+  builder.container(CubeShape{}, {}, builder.null(), m);
+  builder.scene.emitters.push_back(PointEmitter{{1.5, -2, 2}, {8, 6, 4}});
+  builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}});
+  return builder;
 }
-SceneKit coloured_cloud() {
-  SceneKit kit = lit_room();
+SceneBuilder coloured_cloud() {
+  SceneBuilder builder = lit_room();
   std::vector<float> values(6 * 5 * 4 * 3);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 11) / 4;
-  const MediumIndex m = kit.heterogeneous(kit.grid({6, 5, 4}, values, kBox, 3), {.9, .8, .5}, .75, .5);
-  kit.container(CubeShape{}, {}, kit.null(), m);
-  kit.scene.emitters.push_back(PointEmitter{{1.5, -2, 2}, {8, 6, 4}});
-  kit.environment(.125);
-  return kit;
+  const MediumIndex m =
+      builder.heterogeneous(builder.grid({6, 5, 4}, values, kBox, 3), {.9, .8, .5}, .75, .5);
+  builder.container(CubeShape{}, {}, builder.null(), m);
+  builder.scene.emitters.push_back(PointEmitter{{1.5, -2, 2}, {8, 6, 4}});
+  builder.environment(.125);
+  return builder;
 }
-SceneKit coloured_fog() {
-  SceneKit kit = lit_room();
-  kit.container(SphereShape{}, {}, kit.null(), kit.homogeneous({.25, 1, 2}, {.9, .7, .5}, -.25));
-  kit.scene.emitters.push_back(
+SceneBuilder coloured_fog() {
+  SceneBuilder builder = lit_room();
+  builder.container(SphereShape{}, {}, builder.null(), builder.homogeneous({.25, 1, 2}, {.9, .7, .5}, -.25));
+  builder.scene.emitters.push_back(
       SpotEmitter{look_at({0, -1.5, 2.5}, {0, 0, 0}, {0, 1, 0}), {20, 20, 30}, 30, 10, {}});
-  kit.environment(.125);
-  return kit;
+  builder.environment(.125);
+  return builder;
 }
-SceneKit milk_in_glass() {
-  SceneKit kit = lit_room();
-  kit.container(SphereShape{}, {}, kit.glass(1.5), kit.homogeneous({2, 3, 4}, {.95, .9, .8}));
-  kit.shape(RectangleShape{}, translate({0, 0, 3}) * rotate_x(180), kit.diffuse(0)).emitter =
-      AreaEmitter{kit.texture({4, 3, 2})};
-  return kit;
+SceneBuilder milk_in_glass() {
+  SceneBuilder builder = lit_room();
+  builder.container(SphereShape{}, {}, builder.glass(1.5), builder.homogeneous({2, 3, 4}, {.95, .9, .8}));
+  builder.shape(RectangleShape{}, translate({0, 0, 3}) * rotate_x(180), builder.diffuse(0)).emitter =
+      AreaEmitter{builder.texture({4, 3, 2})};
+  return builder;
 }
-SceneKit surfaces() {
-  SceneKit kit = lit_room();
-  const TextureIndex rough = kit.texture({.25, .25, .25});
-  kit.shape(SphereShape{}, translate({-1, 0, 0}) * scale(.75),
-            kit.bsdf(RoughConductorBsdf{
-                Microfacet::ggx, rough, rough, {.2, .9, 1.1}, {3.9, 2.4, 2.2}, kit.texture({1, 1, 1})}));
-  kit.shape(CubeShape{}, translate({1.25, 0, -.5}) * scale(.5),
-            kit.bsdf(PlasticBsdf{1.5, 1, false, kit.texture({.5, .25, .125}), kit.texture({1, 1, 1})}));
-  kit.shape(DiskShape{}, translate({0, 0, 3}) * rotate_x(180), kit.diffuse(0)).emitter =
-      AreaEmitter{kit.texture({4, 3, 2})};
-  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}, .5});
-  kit.environment(.125);
-  kit.scene.sensor.aperture_radius = .0625;
-  kit.scene.sensor.focus_distance = 5;
-  return kit;
+SceneBuilder surfaces() {
+  SceneBuilder builder = lit_room();
+  const TextureIndex rough = builder.texture({.25, .25, .25});
+  builder.shape(
+      SphereShape{}, translate({-1, 0, 0}) * scale(.75),
+      builder.bsdf(RoughConductorBsdf{
+          Microfacet::ggx, rough, rough, {.2, .9, 1.1}, {3.9, 2.4, 2.2}, builder.texture({1, 1, 1})}));
+  builder.shape(
+      CubeShape{}, translate({1.25, 0, -.5}) * scale(.5),
+      builder.bsdf(PlasticBsdf{1.5, 1, false, builder.texture({.5, .25, .125}), builder.texture({1, 1, 1})}));
+  builder.shape(DiskShape{}, translate({0, 0, 3}) * rotate_x(180), builder.diffuse(0)).emitter =
+      AreaEmitter{builder.texture({4, 3, 2})};
+  builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}, .5});
+  builder.environment(.125);
+  builder.scene.sensor.aperture_radius = .0625;
+  builder.scene.sensor.focus_distance = 5;
+  return builder;
 }
-SceneKit flame() {
-  SceneKit kit = lit_room();
+SceneBuilder flame() {
+  SceneBuilder builder = lit_room();
   HeterogeneousMedium m;
   std::vector<float> values{0, .5f, 1, .25f, .75f, 0, 1, .5f};
-  m.sigma_t = kit.grid({2, 2, 2}, values, kBox);
-  m.albedo = kit.constant({.5, .5, .5});
-  m.phase = kit.phase(0);
-  m.source_radiance = kit.constant({2, 1, .5});
-  kit.container(CubeShape{}, {}, kit.null(), SceneKit::push<MediumTag>(kit.scene.media, m));
-  return kit;
+  m.sigma_t = builder.grid({2, 2, 2}, values, kBox);
+  m.albedo = builder.constant({.5, .5, .5});
+  m.phase = builder.phase(0);
+  m.source_radiance = builder.constant({2, 1, .5});
+  builder.container(CubeShape{}, {}, builder.null(), SceneBuilder::push<MediumTag>(builder.scene.media, m));
+  return builder;
 }
 
 }  // namespace
@@ -89,7 +92,7 @@ std::vector<NamedScene> different_scenes() {
                               {"milk in glass", milk_in_glass()},
                               {"surfaces", surfaces()},
                               {"a flame", flame()}};
-  SceneKit distant = cloud();
+  SceneBuilder distant = cloud();
   distant.scene.integrator.name = "volpath_distant_mis";
   all.push_back({"a cloud, distances by light", distant});
   all.push_back({"a cloud of three channels", coloured_cloud()});

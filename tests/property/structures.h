@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
 
 namespace ls::test {
 
 struct NamedScene {
   std::string name;
-  SceneKit kit;
+  SceneBuilder builder;
 };
 // Their coordinates are short binary fractions.
 std::vector<NamedScene> different_scenes();

@@ -6,10 +6,10 @@ namespace ls::test {
 namespace {
 
 // Every shape once more in its own place, letting all light pass and saying nothing of media.
-std::optional<SceneKit> with_twins(const SceneKit& kit, bool first) {
-  SceneKit out = kit;
+std::optional<SceneBuilder> with_twins(const SceneBuilder& builder, bool first) {
+  SceneBuilder out = builder;
   const BsdfIndex null = out.null();
-  std::vector<Shape> twins = kit.scene.shapes;
+  std::vector<Shape> twins = builder.scene.shapes;
   for (Shape& twin : twins) {
     twin.bsdf = null;
     twin.interior.reset();
@@ -26,7 +26,7 @@ TEST(Touching, ATwinThatNobodySeesChangesNothing) {
   Tests tests("property/twins");
   for (const bool first : {true, false}) {
     SCOPED_TRACE(first ? "listed before" : "listed after");
-    expect_alike(tests, scenes(), [&](const SceneKit& kit) { return with_twins(kit, first); });
+    expect_alike(tests, scenes(), [&](const SceneBuilder& builder) { return with_twins(builder, first); });
   }
   tests.close();
 }
@@ -35,34 +35,34 @@ TEST(Touching, ATwinThatNobodySeesChangesNothing) {
 struct Cuts {
   std::vector<double> x{-1, 1}, y{-1, 1}, z{-1, 1};
 };
-SceneKit fog_in_a_corner(const Cuts& cuts, bool grid, const std::string& integrator) {
-  SceneKit kit({12, 12});
-  kit.shape(RectangleShape{}, translate({0, 0, -1}) * scale(4), kit.diffuse(.5));
-  kit.shape(RectangleShape{}, translate({0, 1, 0}) * rotate_x(90) * scale(4), kit.diffuse(.75));
-  kit.shape(RectangleShape{}, translate({1, 0, 0}) * rotate_y(-90) * scale(4), kit.diffuse(.25));
+SceneBuilder fog_in_a_corner(const Cuts& cuts, bool grid, const std::string& integrator) {
+  SceneBuilder builder({12, 12});
+  builder.shape(RectangleShape{}, translate({0, 0, -1}) * scale(4), builder.diffuse(.5));
+  builder.shape(RectangleShape{}, translate({0, 1, 0}) * rotate_x(90) * scale(4), builder.diffuse(.75));
+  builder.shape(RectangleShape{}, translate({1, 0, 0}) * rotate_y(-90) * scale(4), builder.diffuse(.25));
   std::vector<float> values(6 * 6 * 6);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 11) / 8;
   const MediumIndex fog =
-      grid ? kit.heterogeneous(kit.grid({6, 6, 6}, values, translate({-1, -1, -1}) * scale(2)), {.9, .8, .5},
-                               .75, .5)
-           : kit.homogeneous({.25, .5, 1}, {.9, .8, .5}, .5);
-  const BsdfIndex null = kit.null();
+      grid ? builder.heterogeneous(builder.grid({6, 6, 6}, values, translate({-1, -1, -1}) * scale(2)),
+                                   {.9, .8, .5}, .75, .5)
+           : builder.homogeneous({.25, .5, 1}, {.9, .8, .5}, .5);
+  const BsdfIndex null = builder.null();
   for (std::size_t i = 1; i < cuts.x.size(); ++i)
     for (std::size_t j = 1; j < cuts.y.size(); ++j)
       for (std::size_t k = 1; k < cuts.z.size(); ++k) {
         const Vec3 a{cuts.x[i - 1], cuts.y[j - 1], cuts.z[k - 1]}, b{cuts.x[i], cuts.y[j], cuts.z[k]};
-        kit.container(CubeShape{},
-                      translate({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2}) *
-                          scale((b[0] - a[0]) / 2, (b[1] - a[1]) / 2, (b[2] - a[2]) / 2),
-                      null, fog);
+        builder.container(CubeShape{},
+                          translate({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2}) *
+                              scale((b[0] - a[0]) / 2, (b[1] - a[1]) / 2, (b[2] - a[2]) / 2),
+                          null, fog);
       }
-  kit.scene.emitters.push_back(PointEmitter{{-2, -3, 2}, {8, 6, 4}});
-  kit.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}});
-  kit.environment(.125);
-  kit.look({-4, -5, 2}, {0, 0, -.25}, 35);
-  kit.scene.integrator.name = integrator;
-  kit.scene.integrator.max_depth = 6;
-  return kit;
+  builder.scene.emitters.push_back(PointEmitter{{-2, -3, 2}, {8, 6, 4}});
+  builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}});
+  builder.environment(.125);
+  builder.look({-4, -5, 2}, {0, 0, -.25}, 35);
+  builder.scene.integrator.name = integrator;
+  builder.scene.integrator.max_depth = 6;
+  return builder;
 }
 
 // One box against others, in both integrators and kinds of media.

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
 
 namespace ls::test {
 
 struct Case {
   std::string name;  // letters, digits and _
-  SceneKit kit;
+  SceneBuilder builder;
   std::array<double, 3> expected{};
   std::uint64_t spp = 256;  // at least, for each of the film's 16 x 16 pixels
   // The confidence interval must lie within this share of the expected value: a test without power fails.

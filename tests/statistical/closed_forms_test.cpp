@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "cli/cases/level.h"
-#include "cli/cases/run.h"
-#include "cli/validate_table.h"
 #include "tests/statistical/case.h"
 #include "tests/support/significance.h"
+#include "validation/result_table.h"
+#include "validation/run.h"
+#include "validation/significance_level.h"
 
 namespace ls::test {
 namespace {
@@ -28,7 +28,7 @@ const cases::Table& table() {
     add_channels(list);
     cases::Table t;
     for (const Case& c : list)
-      t.mean(c.name, "more", "More closed forms.", c.kit, c.expected,
+      t.mean(c.name, "more", "More closed forms.", c.builder, c.expected,
              {.band = c.band,
               .slack = c.slack,
               .complement = c.complement,

@@ -2,9 +2,9 @@
 // everything else here.
 #include <cmath>
 
-#include "cli/cases/stages.h"
 #include "tests/statistical/case.h"
-#include "tests/support/sky_kit.h"
+#include "tests/support/sky_builder.h"
+#include "validation/fixtures/fixtures.h"
 
 namespace ls::test {
 namespace {
@@ -25,11 +25,11 @@ class Adder {
  public:
   explicit Adder(std::vector<Case>& cases) : cases_(cases) {}
   // The exponential alone comes near a light by chance only: its interval is wider, as it should be.
-  void add(const std::string& name, const SceneKit& kit, const std::array<double, 3>& expected,
+  void add(const std::string& name, const SceneBuilder& builder, const std::array<double, 3>& expected,
            std::uint64_t spp, std::initializer_list<Choice> choices, double band = .005) {
     for (const Choice& choice : choices) {
-      Case c{"distant_" + name + "_" + choice.name, kit, expected, spp};
-      IntegratorSettings& i = c.kit.scene.integrator;
+      Case c{"distant_" + name + "_" + choice.name, builder, expected, spp};
+      IntegratorSettings& i = c.builder.scene.integrator;
       i.name = "volpath_distant_mis";
       i.distance = choice.distance;
       i.heuristic = choice.heuristic;
@@ -60,14 +60,14 @@ double point_answer(double h, double sigma, double albedo, double end) {
 void without_end(Adder& a) {
   constexpr double kHeight = .5;
   const Rgb sigma{.5, 1, 2}, albedo{1, .8, .5};
-  SceneKit kit;
-  kit.scene.sensor.medium = kit.homogeneous(sigma, albedo);
-  kit.scene.integrator.max_depth = kOnce;
-  kit.look({0, 0, -3}, {0, 0, 3}, 1e-4, {0, 1, 0});
-  kit.scene.emitters.push_back(PointEmitter{{kHeight, 0, 0}, rgb(1 / (4 * kPi))});
+  SceneBuilder builder;
+  builder.scene.sensor.medium = builder.homogeneous(sigma, albedo);
+  builder.scene.integrator.max_depth = kOnce;
+  builder.look({0, 0, -3}, {0, 0, 3}, 1e-4, {0, 1, 0});
+  builder.scene.emitters.push_back(PointEmitter{{kHeight, 0, 0}, rgb(1 / (4 * kPi))});
   std::array<double, 3> expected;
   for (std::size_t c = 0; c < 3; ++c) expected[c] = point_answer(kHeight, sigma[c], albedo[c], 60);
-  a.add("point_without_end", kit, expected, 4096, {kPower}, .02);
+  a.add("point_without_end", builder, expected, 4096, {kPower}, .02);
 }
 
 std::vector<float> patchy(std::size_t n) {
@@ -79,35 +79,35 @@ std::vector<float> patchy(std::size_t n) {
 // Where light comes from everywhere and nothing absorbs, everything is as bright as the light, however often
 // it is scattered: from surroundings, as a constant and as a map, and from walls that shine.
 void furnaces(Adder& a) {
-  const auto filled = [](SceneKit& kit, bool grid) {
+  const auto filled = [](SceneBuilder& builder, bool grid) {
     if (grid) {
-      const VolumeIndex v = kit.grid({12, 9, 7}, patchy(12 * 9 * 7), translate({-1, -1, -1}) * scale(2));
-      kit.container(CubeShape{}, {}, kit.null(), kit.heterogeneous(v, rgb(1), 2, -.5));
+      const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7), translate({-1, -1, -1}) * scale(2));
+      builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 2, -.5));
     } else {
-      kit.container(SphereShape{}, {}, kit.null(), kit.homogeneous({1, 2.5, 4}, rgb(1), .6));
+      builder.container(SphereShape{}, {}, builder.null(), builder.homogeneous({1, 2.5, 4}, rgb(1), .6));
     }
-    kit.look({.4, -3, .7}, {0, 0, 0}, 30);
+    builder.look({.4, -3, .7}, {0, 0, 0}, 30);
   };
   {
-    SceneKit kit;
-    filled(kit, true);
-    kit.environment();
-    a.add("furnace_constant_grid", kit, grey(1), 256, {kPower});
+    SceneBuilder builder;
+    filled(builder, true);
+    builder.environment();
+    a.add("furnace_constant_grid", builder, grey(1), 256, {kPower});
   }
   for (const bool grid : {false, true}) {
-    SceneKit kit;
-    filled(kit, grid);
-    add_sky(kit, SkyImage(16, 9, 1), rotate_x(30) * rotate_y(20));
-    a.add(grid ? "furnace_map_grid" : "furnace_map_chromatic_ball", kit, grey(1), 2048,
+    SceneBuilder builder;
+    filled(builder, grid);
+    add_sky(builder, SkyImage(16, 9, 1), rotate_x(30) * rotate_y(20));
+    a.add(grid ? "furnace_map_grid" : "furnace_map_chromatic_ball", builder, grey(1), 2048,
           {kEquiangular, kPower}, .01);
   }
   for (const bool grid : {false, true}) {
-    SceneKit kit;
-    filled(kit, grid);
-    Shape& walls = kit.shape(CubeShape{}, scale(4), kit.diffuse(0));
+    SceneBuilder builder;
+    filled(builder, grid);
+    Shape& walls = builder.shape(CubeShape{}, scale(4), builder.diffuse(0));
     walls.flip_normals = true;
-    walls.emitter = AreaEmitter{kit.texture(rgb(1))};
-    a.add(grid ? "furnace_walls_grid" : "furnace_walls_chromatic_ball", kit, grey(1), 2048,
+    walls.emitter = AreaEmitter{builder.texture(rgb(1))};
+    a.add(grid ? "furnace_walls_grid" : "furnace_walls_chromatic_ball", builder, grey(1), 2048,
           {kExponential, kEquiangular, kPower}, .01);
   }
 }

@@ -9,73 +9,73 @@ namespace {
 constexpr double kGreyReflectance = .5;
 constexpr double kSheet = 2 * .04 / 1.04;  // a sheet of n = 1.5 seen from above reflects
 
-BsdfIndex two_sided(SceneKit& kit, double reflectance) {
-  const BsdfIndex one = kit.diffuse(reflectance);
-  return kit.bsdf(TwoSidedBsdf{one, one});
+BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
+  const BsdfIndex one = builder.diffuse(reflectance);
+  return builder.bsdf(TwoSidedBsdf{one, one});
 }
-BsdfIndex mask(SceneKit& kit, double opacity, BsdfIndex inner) {
-  return kit.bsdf(MaskBsdf{kit.texture(rgb(opacity)), inner});
+BsdfIndex mask(SceneBuilder& builder, double opacity, BsdfIndex inner) {
+  return builder.bsdf(MaskBsdf{builder.texture(rgb(opacity)), inner});
 }
-BsdfIndex sheet(SceneKit& kit, double ior) {
-  const TextureIndex white = kit.texture(rgb(1));
-  return kit.bsdf(ThinDielectricBsdf{ior, 1, white, white});
+BsdfIndex sheet(SceneBuilder& builder, double ior) {
+  const TextureIndex white = builder.texture(rgb(1));
+  return builder.bsdf(ThinDielectricBsdf{ior, 1, white, white});
 }
 
 // The point of the floor at the origin seen from the side, below a sheet of something.
-SceneKit floor_below(auto material) {
-  SceneKit kit;
-  const BsdfIndex grey = kit.diffuse(kGreyReflectance), above = material(kit);
-  kit.shape(RectangleShape{}, scale(3), grey);
-  kit.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), above);
-  kit.scene.integrator.max_depth = 2;
-  kit.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
-  return kit;
+SceneBuilder floor_below(auto material) {
+  SceneBuilder builder;
+  const BsdfIndex grey = builder.diffuse(kGreyReflectance), above = material(builder);
+  builder.shape(RectangleShape{}, scale(3), grey);
+  builder.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), above);
+  builder.scene.integrator.max_depth = 2;
+  builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+  return builder;
 }
-SceneKit through(auto material) {  // along the normal of a sheet, the sky behind it
-  SceneKit kit;
-  const BsdfIndex b = material(kit);
-  kit.shape(RectangleShape{}, scale(3), b);
-  kit.environment();
-  kit.look({0, 0, 2}, {0, 0, 0}, 1e-3, {0, 1, 0});
-  return kit;
+SceneBuilder through(auto material) {  // along the normal of a sheet, the sky behind it
+  SceneBuilder builder;
+  const BsdfIndex b = material(builder);
+  builder.shape(RectangleShape{}, scale(3), b);
+  builder.environment();
+  builder.look({0, 0, 2}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  return builder;
 }
 
-void veils(std::vector<Case>& cases) {
-  const auto third = [](SceneKit& k) { return mask(k, .3, two_sided(k, 0)); };
-  const auto glass = [](SceneKit& k) { return sheet(k, 1.5); };
-  const auto direct = [&](const char* name, SceneKit kit, double irradiance) {
-    cases.push_back({name, std::move(kit), grey(irradiance * kGreyReflectance / kPi), 2048, .01});
+void null_transmission(std::vector<Case>& cases) {
+  const auto third = [](SceneBuilder& k) { return mask(k, .3, two_sided(k, 0)); };
+  const auto glass = [](SceneBuilder& k) { return sheet(k, 1.5); };
+  const auto direct = [&](const char* name, SceneBuilder builder, double irradiance) {
+    cases.push_back({name, std::move(builder), grey(irradiance * kGreyReflectance / kPi), 2048, .01});
   };
   cases.push_back({"mask_before_the_sky", through(third), grey(.7), 4096});
   {
     // Shadow rays alone get there: no path finds a point or a direction.
-    SceneKit kit = floor_below(third);
-    kit.scene.emitters.push_back(PointEmitter{{.5, 0, 2}, rgb(3)});
-    direct("mask_below_a_point", kit, .7 * 3 * 2 / std::pow(4.25, 1.5));
+    SceneBuilder builder = floor_below(third);
+    builder.scene.emitters.push_back(PointEmitter{{.5, 0, 2}, rgb(3)});
+    direct("mask_below_a_point", builder, .7 * 3 * 2 / std::pow(4.25, 1.5));
   }
   {
-    SceneKit kit = floor_below(glass);
-    kit.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(2)});
-    direct("sheet_below_the_sun", kit, 2 * (1 - kSheet));
+    SceneBuilder builder = floor_below(glass);
+    builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(2)});
+    direct("sheet_below_the_sun", builder, 2 * (1 - kSheet));
   }
   {
     // Both strategies: the light is found through the mask by shadow rays and by paths.
-    SceneKit kit = floor_below(third);
-    const TextureIndex one = kit.texture(rgb(1));
-    const BsdfIndex black = kit.diffuse(0);
-    kit.shape(SphereShape{}, translate({0, 0, 3}) * scale(1.5), black).emitter = AreaEmitter{one};
-    direct("mask_below_a_sphere", kit, .7 * kPi * 2.25 / 9);
+    SceneBuilder builder = floor_below(third);
+    const TextureIndex one = builder.texture(rgb(1));
+    const BsdfIndex black = builder.diffuse(0);
+    builder.shape(SphereShape{}, translate({0, 0, 3}) * scale(1.5), black).emitter = AreaEmitter{one};
+    direct("mask_below_a_sphere", builder, .7 * kPi * 2.25 / 9);
   }
   {
     // Two masks and an absorbing medium between them, for camera rays and for shadow rays.
-    SceneKit kit = through([&](SceneKit& k) { return mask(k, .5, two_sided(k, 0)); });
-    kit.scene.shapes.clear();
-    kit.container(CubeShape{}, {}, {static_cast<std::uint32_t>(kit.scene.bsdfs.size() - 1)},
-                  kit.homogeneous({1, .5, .25}, rgb(0)));
-    kit.look({0, 0, 3}, {0, 0, 0}, 1e-3, {0, 1, 0});
+    SceneBuilder builder = through([&](SceneBuilder& k) { return mask(k, .5, two_sided(k, 0)); });
+    builder.scene.shapes.clear();
+    builder.container(CubeShape{}, {}, {static_cast<std::uint32_t>(builder.scene.bsdfs.size() - 1)},
+                      builder.homogeneous({1, .5, .25}, rgb(0)));
+    builder.look({0, 0, 3}, {0, 0, 0}, 1e-3, {0, 1, 0});
     const auto t = [](double sigma) { return .25 * std::exp(-2 * sigma); };
-    cases.push_back({"mask_around_a_medium", kit, {t(1), t(.5), t(.25)}, 16384, .03});
-    SceneKit shadow = floor_below([](SceneKit& k) { return k.null(); });
+    cases.push_back({"mask_around_a_medium", builder, {t(1), t(.5), t(.25)}, 16384, .03});
+    SceneBuilder shadow = floor_below([](SceneBuilder& k) { return k.null(); });
     const BsdfIndex b = mask(shadow, .5, two_sided(shadow, 0));
     shadow.container(CubeShape{}, translate({0, 0, 2.5}), b, shadow.homogeneous({1, .5, .25}, rgb(0)));
     shadow.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
@@ -87,42 +87,42 @@ void veils(std::vector<Case>& cases) {
 void furnaces(std::vector<Case>& cases) {
   const auto add = [&](const char* name, const Geometry& g, auto material, std::uint64_t spp,
                        double slack = 0) {
-    SceneKit kit;
-    const BsdfIndex b = material(kit);
-    kit.shape(g, rotate_x(30) * rotate_y(20), b);
-    kit.environment();
-    kit.look({.4, -6, .7}, {0, 0, 0}, 10);
-    Case c{name, kit, grey(1), spp};
+    SceneBuilder builder;
+    const BsdfIndex b = material(builder);
+    builder.shape(g, rotate_x(30) * rotate_y(20), b);
+    builder.environment();
+    builder.look({.4, -6, .7}, {0, 0, 0}, 10);
+    Case c{name, builder, grey(1), spp};
     c.slack = slack;
     cases.push_back(std::move(c));
   };
   add(
-      "furnace_sheet_cube", CubeShape{}, [](SceneKit& k) { return sheet(k, 1.5); }, 256);
+      "furnace_sheet_cube", CubeShape{}, [](SceneBuilder& k) { return sheet(k, 1.5); }, 256);
   add(
-      "furnace_masked_cube", CubeShape{}, [](SceneKit& k) { return mask(k, .4, two_sided(k, 1)); }, 256);
+      "furnace_masked_cube", CubeShape{}, [](SceneBuilder& k) { return mask(k, .4, two_sided(k, 1)); }, 256);
   add(
       "furnace_white_plastic", SphereShape{},
-      [](SceneKit& k) {
+      [](SceneBuilder& k) {
         const TextureIndex white = k.texture(rgb(1));
         return k.bsdf(PlasticBsdf{1.5, 1, true, white, white});
       },
       1024);
   add(
       "furnace_blend_of_mirror_and_white", CubeShape{},
-      [](SceneKit& k) {
+      [](SceneBuilder& k) {
         return k.bsdf(BlendBsdf{k.texture(rgb(.3)), k.mirror(), two_sided(k, 1)});
       },
       256);
   add(
       "furnace_blend_with_a_mask", CubeShape{},
-      [](SceneKit& k) {
+      [](SceneBuilder& k) {
         return k.bsdf(BlendBsdf{k.texture(rgb(.3)), mask(k, .2, k.mirror()), two_sided(k, 1)});
       },
       256);
   // Facets as flat as these mask less than alpha^2 of the light.
   add(
       "furnace_nearly_smooth_glass", SphereShape{},
-      [](SceneKit& k) {
+      [](SceneBuilder& k) {
         const TextureIndex white = k.texture(rgb(1)), alpha = k.texture(rgb(2e-3));
         return k.bsdf(RoughDielectricBsdf{Microfacet::ggx, alpha, alpha, 1.5, 1, white, white});
       },
@@ -131,25 +131,25 @@ void furnaces(std::vector<Case>& cases) {
 
 void sheets(std::vector<Case>& cases) {
   const auto add = [&](const char* name, auto material, double expected, double slack) {
-    SceneKit kit = through(material);
-    const BsdfIndex black = kit.diffuse(0);
-    kit.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), black);
-    cases.push_back({name, kit, grey(expected), 8192, .02, slack});
+    SceneBuilder builder = through(material);
+    const BsdfIndex black = builder.diffuse(0);
+    builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), black);
+    cases.push_back({name, builder, grey(expected), 8192, .02, slack});
   };
   add(
-      "sheet_before_black", [](SceneKit& k) { return sheet(k, 1.5); }, kSheet, 0);
+      "sheet_before_black", [](SceneBuilder& k) { return sheet(k, 1.5); }, kSheet, 0);
   {
     // The same from two rough faces, as flat as this: light turns by 2e-3, and Fresnel's terms by its square.
-    SceneKit kit;
-    const TextureIndex white = kit.texture(rgb(1)), alpha = kit.texture(rgb(2e-3));
+    SceneBuilder builder;
+    const TextureIndex white = builder.texture(rgb(1)), alpha = builder.texture(rgb(2e-3));
     const BsdfIndex rough =
-        kit.bsdf(RoughDielectricBsdf{Microfacet::beckmann, alpha, alpha, 1.5, 1, white, white});
-    const BsdfIndex black = kit.diffuse(0);
-    kit.shape(CubeShape{}, scale(9, 9, .25), rough);
-    kit.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), black);
-    kit.environment();
-    kit.look({0, 0, 2}, {0, 0, 0}, 1e-3, {0, 1, 0});
-    cases.push_back({"nearly_smooth_plate", kit, grey(kSheet), 8192, .02, 1e-4});
+        builder.bsdf(RoughDielectricBsdf{Microfacet::beckmann, alpha, alpha, 1.5, 1, white, white});
+    const BsdfIndex black = builder.diffuse(0);
+    builder.shape(CubeShape{}, scale(9, 9, .25), rough);
+    builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), black);
+    builder.environment();
+    builder.look({0, 0, 2}, {0, 0, 0}, 1e-3, {0, 1, 0});
+    cases.push_back({"nearly_smooth_plate", builder, grey(kSheet), 8192, .02, 1e-4});
   }
 }
 
@@ -168,41 +168,41 @@ void plastic(std::vector<Case>& cases) {
   const double n = 1.5, ci = .5, ct = std::sqrt(1 - .75 / (n * n));
   const double rs = (ci - n * ct) / (ci + n * ct), rp = (n * ci - ct) / (n * ci + ct);
   const double through = .96 * (1 - (rs * rs + rp * rp) / 2) / (n * n), r = 1 - (1 - walsh(n)) / (n * n);
-  SceneKit kit;
-  const TextureIndex base = kit.texture({.2, .5, .8}), white = kit.texture(rgb(1));
-  const BsdfIndex b = kit.bsdf(PlasticBsdf{n, 1, true, base, white});
-  kit.shape(RectangleShape{}, scale(3), b);
-  kit.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
-  kit.scene.integrator.max_depth = 2;
-  kit.look({-std::sqrt(3.), 0, 1}, {0, 0, 0}, 1e-3);
+  SceneBuilder builder;
+  const TextureIndex base = builder.texture({.2, .5, .8}), white = builder.texture(rgb(1));
+  const BsdfIndex b = builder.bsdf(PlasticBsdf{n, 1, true, base, white});
+  builder.shape(RectangleShape{}, scale(3), b);
+  builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
+  builder.scene.integrator.max_depth = 2;
+  builder.look({-std::sqrt(3.), 0, 1}, {0, 0, 0}, 1e-3);
   const auto f = [&](double d) { return d / (1 - d * r) * through / kPi; };
-  cases.push_back({"plastic_by_the_sun", kit, {f(.2), f(.5), f(.8)}, 16});
+  cases.push_back({"plastic_by_the_sun", builder, {f(.2), f(.5), f(.8)}, 16});
 }
 
 void normal_map(std::vector<Case>& cases) {
   // A grey floor whose normal leans to the light by 36.87 degrees, lit from above: the cosine is .8. Bumps
   // cast no shadows on each other.
-  SceneKit kit;
-  const BsdfIndex grey_floor = kit.diffuse(kGreyReflectance);
-  const BsdfIndex b = kit.bsdf(NormalMapBsdf{kit.texture({.8, .5, .9}), grey_floor, true, false});
-  kit.shape(RectangleShape{}, scale(3), b);
-  kit.scene.integrator.max_depth = 2;
-  kit.look({2, 1, 1}, {0, 0, 0}, 1e-3);
-  SceneKit sun = kit;
+  SceneBuilder builder;
+  const BsdfIndex grey_floor = builder.diffuse(kGreyReflectance);
+  const BsdfIndex b = builder.bsdf(NormalMapBsdf{builder.texture({.8, .5, .9}), grey_floor, true, false});
+  builder.shape(RectangleShape{}, scale(3), b);
+  builder.scene.integrator.max_depth = 2;
+  builder.look({2, 1, 1}, {0, 0, 0}, 1e-3);
+  SceneBuilder sun = builder;
   sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
   cases.push_back({"normal_map_by_the_sun", sun, grey(.8 * kGreyReflectance / kPi), 16});
   // A sphere in the normal's direction, whole above the surface and above the leaning plane: E = pi r^2 /
   // d^2.
-  const TextureIndex one = kit.texture(rgb(1));
-  const BsdfIndex black = kit.diffuse(0);
-  kit.shape(SphereShape{}, translate({1.8, 0, 2.4}) * scale(1), black).emitter = AreaEmitter{one};
-  cases.push_back({"normal_map_by_a_sphere", kit, grey(kGreyReflectance / 9), 1024});
+  const TextureIndex one = builder.texture(rgb(1));
+  const BsdfIndex black = builder.diffuse(0);
+  builder.shape(SphereShape{}, translate({1.8, 0, 2.4}) * scale(1), black).emitter = AreaEmitter{one};
+  cases.push_back({"normal_map_by_a_sphere", builder, grey(kGreyReflectance / 9), 1024});
 }
 
 }  // namespace
 
 void add_materials(std::vector<Case>& cases) {
-  veils(cases);
+  null_transmission(cases);
   furnaces(cases);
   sheets(cases);
   plastic(cases);

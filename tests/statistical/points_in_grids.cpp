@@ -1,8 +1,8 @@
 // Lights without an extent inside grids: segments are sampled equi-angularly about them, too.
 #include <cmath>
 
-#include "cli/cases/stages.h"
 #include "tests/statistical/case.h"
+#include "validation/fixtures/fixtures.h"
 
 namespace ls::test {
 namespace {
@@ -29,15 +29,15 @@ std::array<double, 3> beside_a_ray(double sigma, const Rgb& albedo, F intensity)
   return {albedo[0] * at_albedo_1, albedo[1] * at_albedo_1, albedo[2] * at_albedo_1};
 }
 
-SceneKit along_a_slope(double sigma, const Rgb& albedo, const Emitter& light) {
-  SceneKit kit;
-  const VolumeIndex v = kit.grid({1, 1, 2}, {0, 2}, translate({-12, -12, -12}) * scale(24));
-  kit.scene.sensor.medium = kit.heterogeneous(v, albedo, sigma);
-  kit.shape(RectangleShape{}, translate({0, 0, 3}) * scale(4) * rotate_x(180), kit.diffuse(0));
-  kit.scene.emitters.push_back(light);
-  kit.scene.integrator.max_depth = 2;
-  kit.look({0, 0, -3}, {0, 0, 3}, 1e-4, {0, 1, 0});
-  return kit;
+SceneBuilder along_a_slope(double sigma, const Rgb& albedo, const Emitter& light) {
+  SceneBuilder builder;
+  const VolumeIndex v = builder.grid({1, 1, 2}, {0, 2}, translate({-12, -12, -12}) * scale(24));
+  builder.scene.sensor.medium = builder.heterogeneous(v, albedo, sigma);
+  builder.shape(RectangleShape{}, translate({0, 0, 3}) * scale(4) * rotate_x(180), builder.diffuse(0));
+  builder.scene.emitters.push_back(light);
+  builder.scene.integrator.max_depth = 2;
+  builder.look({0, 0, -3}, {0, 0, 3}, 1e-4, {0, 1, 0});
+  return builder;
 }
 
 }  // namespace

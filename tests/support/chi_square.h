@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/validate_stats.h"
 #include "tests/support/significance.h"
+#include "validation/measure/hypothesis_tests.h"
 
 namespace ls::test {
 
@@ -62,9 +62,9 @@ inline ChiSquare chi_square(std::span<const double> expected, std::span<const do
 
 // The tests of one share. At their end they prove their number and say the least p that they have met: of n
 // right tests about 1 / n.
-class ChiSquareBook {
+class ChiSquareTally {
  public:
-  explicit ChiSquareBook(std::string_view file) : tests_(file) {}
+  explicit ChiSquareTally(std::string_view file) : tests_(file) {}
 
   void expect(const std::string& name, std::span<const double> expected, std::span<const double> observed) {
     const ChiSquare r = chi_square(expected, observed);

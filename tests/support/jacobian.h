@@ -9,8 +9,8 @@
 #include <optional>
 #include <string>
 
-#include "worker/render/hash.h"
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
+#include "worker/render/math/random.h"
 
 namespace ls::test {
 
@@ -27,7 +27,7 @@ inline constexpr double kFloats = 2e-4;
 struct Stretch2 {
   double area = 0, error = 0;  // error: of the differences, and of rounding, relative
 };
-inline std::optional<Stretch2> stretch_of(const SquareMap& map, const render::V2& u, double rounding) {
+inline std::optional<Stretch2> optical_depth_of(const SquareMap& map, const render::V2& u, double rounding) {
   const auto area = [&](float h, double& noise) -> std::optional<double> {
     const auto a = map({u.x + h, u.y}), b = map({u.x - h, u.y}), c = map({u.x, u.y + h}),
                d = map({u.x, u.y - h});
@@ -57,7 +57,7 @@ inline void expect_jacobian(const std::string& name, const SquareMap& map, doubl
     const auto here = map(u);
     if (!here) continue;
     ++met;
-    const auto s = stretch_of(map, u, rounding);
+    const auto s = optical_depth_of(map, u, rounding);
     if (!s || s->error > .1) continue;
     ++told;
     ASSERT_NEAR(s->area * here->pdf, 1, 1.5 * s->error + kFloats) << name << " at " << u.x << " " << u.y;

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
 #include "worker/render/render.h"
 
 namespace ls::test {
@@ -36,16 +36,17 @@ struct Estimate {
 };
 
 // Throws std::runtime_error with the renderer's message if the world can't be built: a test's own mistake.
-inline std::shared_ptr<const render::World> world_of(const SceneKit& kit, std::uint64_t seed = 0,
+inline std::shared_ptr<const render::World> world_of(const SceneBuilder& builder, std::uint64_t seed = 0,
                                                      int threads = 1) {
-  auto w = render::build_world(kit.scene, settings_of(kit.scene, seed), kit.files, threads);
+  auto w = render::build_world(builder.scene, settings_of(builder.scene, seed), builder.files, threads);
   if (!w) throw std::runtime_error(w.error().message);
   return *w;
 }
 
-inline Estimate estimate(const SceneKit& kit, std::uint64_t spp, std::uint64_t seed = 0, int threads = 2) {
-  const auto world = world_of(kit, seed, threads);
-  const FrameSize size = kit.scene.film.image_size();
+inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::uint64_t seed = 0,
+                         int threads = 2) {
+  const auto world = world_of(builder, seed, threads);
+  const FrameSize size = builder.scene.film.image_size();
   const auto rows = static_cast<std::size_t>(size.height);
   std::vector<render::TileResult> results(rows);
   std::atomic<std::size_t> next{0};

@@ -16,7 +16,7 @@
 #include <string>
 #include <string_view>
 
-#include "cli/validate_stats.h"
+#include "validation/measure/hypothesis_tests.h"
 
 namespace ls::test {
 
@@ -34,8 +34,8 @@ struct Rate {
   Family family;
   double rate;
 };
-// Those of table and closed_forms are the product's own (cli/cases/level.h). Files of tests that `lightshaft
-// validate` is given have the level that they state, .01 if none: they are no part of this.
+// Those of table and closed_forms are the product's own (validation/significance_level.h). Files of tests
+// that `lightshaft validate` is given have the level that they state, .01 if none: they are no part of this.
 inline constexpr std::array kRates = {Rate{Family::table, 2e-4},      Rate{Family::closed_forms, 2e-4},
                                       Rate{Family::chi_square, 1e-4}, Rate{Family::scenes, 1e-4},
                                       Rate{Family::coverage, 1e-4},   Rate{Family::single_figures, 2e-4}};

@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::test {
 

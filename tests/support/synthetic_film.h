@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "common/image/error_estimate.h"
+#include "common/image/error/error_estimate.h"
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/limits.h"
 #include "tests/unit/domain/stop_oracle.h"

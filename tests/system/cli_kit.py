@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 import struct
 import subprocess
@@ -64,7 +65,7 @@ def write_fog(folder, n=12):
 
 def lightshaft(*arguments, cwd=None, env=None, code=0, patience=PATIENCE):
     """Runs the command; it must return `code`, and come back before `patience` (seconds) is over."""
-    done = subprocess.run([str(bin_dir() / "lightshaft"), *map(str, arguments)], cwd=cwd, env=env, text=True,
+    done = subprocess.run([os.environ.get("LIGHTSHAFT_CLI", bin_dir() / "lightshaft"), *map(str, arguments)], cwd=cwd, env=env, text=True,
                           capture_output=True, timeout=patience)
     assert done.returncode == code, f"exit code {done.returncode}, not {code}\n{done.stdout}\n{done.stderr}"
     return done

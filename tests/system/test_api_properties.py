@@ -78,6 +78,7 @@ def api(tmp_path_factory):
 
 
 # One test for all, since the operations are known only once a coordinator runs.
+@pytest.mark.slow
 def test_every_operation_keeps_to_the_document_whatever_it_is_asked(api):
     operations = list(api.generator.operations())
     assert len(operations) > 25

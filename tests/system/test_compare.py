@@ -209,6 +209,7 @@ def test_a_set_of_scenes_has_one_table(tmp_path):
     assert "fog.0.exr and fog.1.exr, two independent references" in fog and "pictures of all other seeds" in b
 
 
+@pytest.mark.slow
 def test_interrupting_keeps_what_was_done(tmp_path):
     scene = write_fog(tmp_path)
     shutil.copy(scene, tmp_path / "long.xml")

@@ -66,8 +66,22 @@ def test_the_coordinator_killed_twice(farm, fog, expected):
 
 
 @pytest.mark.sanitized
+def test_a_farm_that_loses_a_worker(fog):
+    """Small, for sanitizer builds, whose numeric class is their own: two jobs of one scene agree."""
+    with LocalFarm() as farm:
+        env = {**os.environ, "LIGHTSHAFT_URL": f"http://127.0.0.1:{farm.http}/", "LIGHTSHAFT_TOKEN": farm.token}
+        farm.add_worker(fake=False)
+        quiet = lightshaft("submit", fog, "--spp", 10, env=env).stdout.split()[0]
+        expected = finished(farm, quiet)
+        farm.add_worker(fake=False)
+        disturbed = lightshaft("submit", fog, "--spp", 10, env=env).stdout.split()[0]
+        farm.wait_for_progress(disturbed, 1)
+        farm.workers[0].kill()
+        assert finished(farm, disturbed) == expected
+
+
 def test_a_farm_and_its_partials(fog, tmp_path):
-    """Small, for sanitizer builds too: render, its merged partials and a farm agree."""
+    """Render, its merged partials and a farm agree."""
     few = ("--spp", 10)
     alone = digest(lightshaft("render", fog, "-o", tmp_path / "a.exr", *few, "--threads", 2, "--partial-dir", tmp_path / "partials"))
     merged = digest(lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "m.exr"))

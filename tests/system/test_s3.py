@@ -97,6 +97,7 @@ def test_a_store_that_is_busy_is_asked_again(s3, s3_farm):
     assert not s3.refuse
 
 
+@pytest.mark.slow
 def test_a_store_that_stays_away_is_named_and_the_upload_can_be_tried_again(s3, s3_farm):
     s3.refuse = [503] * 12
     data = os.urandom(1000)
@@ -132,6 +133,7 @@ def readiness(farm):
         return error.status, error.body
 
 
+@pytest.mark.slow
 def test_a_coordinator_whose_store_does_not_answer_says_that_it_is_not_ready_and_goes_on(s3, s3_farm, expected):
     s3_farm.add_worker("--fake-delay", 20)
     job = s3_farm.submit(SCENE, spp=8, seed=3)

@@ -13,6 +13,8 @@ import s3_server
 from local_farm import SCENE, HttpError, LocalFarm, Process, bin_dir, wait_until
 from redis_server import RedisServer
 
+pytestmark = pytest.mark.slow
+
 SPEC = dict(spp=64, seed=3)
 
 

@@ -3,19 +3,19 @@
 
 #include <algorithm>
 
+#include "common/base/failpoint.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
-#include "common/base/step.h"
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
 constexpr Duration kWelcomeLimit = std::chrono::seconds(30);  // from connect to Welcome
-// A connection that lived this long was a good one: the next back-off starts small again.
+// A connection that lasted this long resets the back-off.
 constexpr Duration kGoodConnection = std::chrono::seconds(5);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
-constexpr int kProgressWhenIdle = 5;  // periods
+constexpr int kProgressWhenIdle = 5;  // progress periods between reports while idle
 constexpr std::size_t kJobsRemembered = 64;
 }  // namespace
 
@@ -48,7 +48,7 @@ Result<void> Agent::Impl::run() {
     for (FromWorker& message : due_messages()) {
       const bool result = std::holds_alternative<UnitResult>(message);
       link.send(std::move(message));
-      if (result) step("result-sent");
+      if (result) failpoint("result-sent");
     }
     if (!ended) ended = verdict();
   }
@@ -98,15 +98,15 @@ void Agent::Impl::handle_message(ToWorker& message) {
                      log_warn(fmt::format("job={} tile={} round={}", ack.unit.job.value, ack.unit.tile,
                                           ack.unit.round),
                               "result refused: " + ack.refused->message);
-                   step("acknowledged-seen");
+                   failpoint("acknowledged-seen");
                    const std::lock_guard lock(mutex);
                    outbox.acknowledge(ack.unit);
-                   book.acknowledged(ack.unit, ack.refused.has_value());
+                   table.acknowledged(ack.unit, ack.refused.has_value());
                  },
                  [this](CancelJob& c) { cancel(c.job); },
                  [this](CancelLease& c) {
                    const std::lock_guard lock(mutex);
-                   book.drop_lease(c.lease);
+                   table.drop_lease(c.lease);
                    stop_dropped_units();
                  },
                  [this](DrainNow&) { drain_requested = true; },
@@ -145,14 +145,14 @@ void Agent::Impl::open_connection() {
 }
 
 void Agent::Impl::accept_lease(AssignLease& assign) {
-  step("lease-received");
+  failpoint("lease-received");
   const std::lock_guard lock(mutex);
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
     if (it != jobs.end() &&
-        it->second.brief != *assign.brief) {  // another coordinator's data: same name, other job
-      book.drop_job(id);
+        it->second.brief != *assign.brief) {  // another coordinator's data: same id, different job
+      table.drop_job(id);
       outbox.drop_job(id);
       stop_dropped_units();
       jobs.erase(it);
@@ -163,7 +163,7 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
     job.last_use = ++uses;
   }
   const auto job = jobs.find(id);
-  if (draining || job == jobs.end() || book.lease_count() >= limits::kLeasesPerWorker) {
+  if (draining || job == jobs.end() || table.lease_count() >= limits::kLeasesPerWorker) {
     LeaseReturned returned{assign.lease.id, {}};
     for (const LeaseUnit& unit : assign.lease.units)
       returned.unrendered.push_back({id, unit.tile, unit.round});
@@ -171,12 +171,12 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
     return;
   }
   job->second.cancelled = false;
-  book.add(assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); });
-  // Briefs are small, but a worker may live for years.
+  table.add(assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); });
+  // Briefs are small, but a worker may run for years.
   while (jobs.size() > kJobsRemembered) {
     auto oldest = jobs.end();
     for (auto it = jobs.begin(); it != jobs.end(); ++it)
-      if (it->second.state == Job::State::idle && !book.holds(it->first) &&
+      if (it->second.state == Job::State::idle && !table.holds(it->first) &&
           (oldest == jobs.end() || it->second.last_use < oldest->second.last_use))
         oldest = it;
     if (oldest == jobs.end()) break;
@@ -186,7 +186,7 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
 
 void Agent::Impl::cancel(const JobId& job) {
   const std::lock_guard lock(mutex);
-  book.drop_job(job);
+  table.drop_job(job);
   outbox.drop_job(job);
   stop_dropped_units();
   if (const auto it = jobs.find(job); it != jobs.end()) {
@@ -197,7 +197,7 @@ void Agent::Impl::cancel(const JobId& job) {
 
 void Agent::Impl::stop_dropped_units() {
   for (auto& slot : slots)
-    if (slot->unit && !book.is_running(*slot->unit)) slot->stop = true;
+    if (slot->unit && !table.is_running(*slot->unit)) slot->stop = true;
 }
 
 void Agent::Impl::look_at_backend() {
@@ -214,7 +214,7 @@ void Agent::Impl::begin_drain() {
   draining = true;
   drain_deadline = clock.now() + options.drain_limit;
   outgoing.push_back(WorkerDraining{});
-  for (LeaseReturned& returned : book.return_waiting()) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting()) outgoing.push_back(std::move(returned));
   work.notify_all();
   log_info(fmt::format("worker={}", id.value), "draining: finishing the units in hand");
 }
@@ -236,13 +236,13 @@ std::vector<FromWorker> Agent::Impl::due_messages() {
 
 WorkerProgress Agent::Impl::progress() const {
   WorkerProgress p;
-  p.leases = book.progress();
+  p.leases = table.progress();
   const std::string bad = trouble();
-  p.activity = draining             ? "draining"
-               : !bad.empty()       ? bad
-               : book.running() > 0 ? "rendering"
-               : !loading.empty()   ? "loading " + loading
-                                    : "idle";
+  p.activity = draining              ? "draining"
+               : !bad.empty()        ? bad
+               : table.running() > 0 ? "rendering"
+               : !loading.empty()    ? "loading " + loading
+                                     : "idle";
   p.cpu_seconds_total = cpu_seconds;
   p.rss_bytes = backend.rss_bytes();
   p.load_seconds = load_seconds;
@@ -269,7 +269,7 @@ Duration Agent::Impl::until_next_timer() const {
   TimePoint next = now + kLongestWait;
   if (connection == Connection::up) {
     const std::lock_guard lock(mutex);
-    const bool working = book.lease_count() > 0;
+    const bool working = table.lease_count() > 0;
     next = std::min(next, working ? std::min(next_progress, now + options.progress_period) : next_progress);
   } else {
     next = std::min(next, connection_timer);

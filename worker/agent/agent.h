@@ -3,9 +3,9 @@
 // acknowledged.
 //
 // Threads: run() is the control thread (connection, progress, timers); one loader fetches blobs and prepares
-// worlds ahead of need; `threads` render threads each take the next unit as soon as they have handed in the
-// last. One mutex guards the state (worker/agent/lease_book.h, outbox.h); while it is held nothing is called
-// that may block: of the backend only forget() and rss_bytes(), of the link and the files nothing.
+// worlds ahead of need; each of `threads` render threads takes the next unit as soon as it has delivered the
+// last. One mutex guards the state (worker/agent/held_leases.h, result_outbox.h). No call that may block is
+// made while it is held: only forget() and rss_bytes() of the backend, and nothing of the link or the files.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +14,24 @@
 #include "common/base/clock.h"
 #include "common/base/error.h"
 #include "common/protocol/messages.h"
+#include "worker/agent/backend.h"
 #include "worker/agent/blob_files.h"
-#include "worker/backend.h"
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 
 struct AgentOptions {
-  WorkerHello hello;  // threads, numeric_class and blobs_held are filled in by the agent
+  WorkerHello hello;  // the agent fills in threads, numeric_class and blobs_held
   int threads = 1;
-  std::size_t outbox_bytes = 64 << 20;  // unacknowledged results; when full, rendering waits
+  std::size_t outbox_bytes = 64 << 20;  // of unacknowledged results; when full, rendering waits
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_first = std::chrono::milliseconds(100);
   Duration backoff_most = std::chrono::seconds(10);
-  Duration trouble_first = std::chrono::seconds(1);  // after a full disk and the like; up to backoff_most
+  // pause after a full disk and the like; grows up to backoff_most
+  Duration trouble_first = std::chrono::seconds(1);
   Duration drain_limit =
-      std::chrono::seconds(60);    // to hand in what is finished; then run() ends with an error
-  std::uint64_t backoff_seed = 0;  // of the jitter; workers of a farm should differ
+      std::chrono::seconds(60);    // time to deliver finished results; then run() ends with an error
+  std::uint64_t backoff_seed = 0;  // for the jitter; should differ between the workers of a farm
 };
 
 class Agent {
@@ -40,15 +41,15 @@ class Agent {
         const Clock& clock);
   ~Agent();
 
-  // Until drained (success), refused for good (the coordinator's error), its backend is broken (that's error;
-  // what is finished is handed in first) or stopped. Once.
+  // Returns when drained (success), rejected for good (the coordinator's error), when the backend is broken
+  // (its error, after finished results are delivered) or when stopped. Call once.
   Result<void> run();
 
-  // From any thread. drain(): finish the units in hand, hand in every result, return the rest. stop(): as
-  // soon as possible, handing in nothing more.
+  // From any thread. drain(): finish the running units, deliver all results, return the other units. stop():
+  // end as soon as possible and deliver nothing more.
   void drain();
   void stop();
-  // The injected clock has moved: look at the timers again. Only needed by tests.
+  // Re-evaluates the timers after the injected clock was moved. For tests only.
   void wake();
 
  private:

@@ -1,4 +1,5 @@
-// The loader thread: makes jobs ready ahead of need. Blobs first, then the world; both without the lock.
+// The loader thread: prepares jobs ahead of need, first the blobs, then the world; both without holding the
+// lock.
 #include <fmt/format.h>
 
 #include <exception>
@@ -9,14 +10,15 @@
 
 namespace ls::worker {
 namespace {
-// The world being rendered and the next one: so that a thread never waits between two jobs, and memory stays
+// The world being rendered and the next one, so that threads never wait between two jobs and memory stays
 // bounded.
 constexpr std::size_t kWorldsKept = 2;
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// Trouble that did not come again for so long after it was due has gone with its job.
+// A problem that has not recurred for this long after its retry was due is dropped from the report, as its
+// job has gone.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
-// A full disk says nothing about the job: no unit may be counted as failed for it.
+// A full disk is not the job's fault: no unit may be counted as failed for it.
 bool of_this_machine(const Error& error) {
   return error.code == Errc::resource_exhausted || error.code == Errc::internal;
 }
@@ -34,14 +36,14 @@ void Agent::Impl::load_loop(std::stop_token token) {
       try_to_load(brief);
       lock.lock();
     } else {
-      // A cut transfer is tried again after a pause; otherwise there is a notification.
+      // Interrupted transfers are retried after a pause; all else sends a notification.
       work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
     }
   }
 }
 
 std::optional<JobId> Agent::Impl::next_to_load() {
-  for (const JobId& id : book.wanted()) {
+  for (const JobId& id : table.wanted()) {
     const auto it = jobs.find(id);
     if (it != jobs.end() && it->second.state == Job::State::idle && clock.now() >= it->second.retry_at)
       return id;
@@ -55,7 +57,7 @@ bool Agent::Impl::make_room() {
   for (auto it = jobs.begin(); it != jobs.end(); ++it) {
     if (it->second.state != Job::State::ready) continue;
     ++kept;
-    if (!book.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use))
+    if (!table.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use))
       idlest = it;
   }
   if (kept < kWorldsKept) return true;
@@ -109,33 +111,33 @@ void Agent::Impl::load(const JobBrief& brief) {
   loading.clear();
   load_seconds = seconds(clock.now() - start);
   const auto it = jobs.find(id);
-  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // replaced meanwhile
+  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // replaced in the meantime
   it->second.state = Job::State::ready;
   it->second.local = std::move(local);
   it->second.files = std::move(pins);
   it->second.last_use = ++uses;
   it->second.trouble.clear();
-  it->second.untold.load += seconds(start - begin);
-  it->second.untold.build += load_seconds;
+  it->second.unreported.load += seconds(start - begin);
+  it->second.unreported.build += load_seconds;
   trouble_backoff.reset();
   work.notify_all();
 }
 
-// One unit is reported, the others go back: so that a job which this worker can't load costs one attempt, not
-// hundreds.
+// Reports one unit as failed and returns the others, so that a job that this worker cannot load costs one
+// attempt instead of hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();
   if (const auto it = jobs.find(id); it != jobs.end()) it->second.state = Job::State::idle;
   backend.forget(id);
   log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + failure.reason);
-  if (const auto first = book.take([&](const JobId& job) { return job == id; })) {
+  if (const auto first = table.take([&](const JobId& job) { return job == id; })) {
     failure.unit = first->key;
     failure.lease = first->lease;
-    book.finish(first->key);
+    table.finish(first->key);
     outbox.add(std::move(failure));
   }
-  for (LeaseReturned& returned : book.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 
@@ -149,7 +151,7 @@ void Agent::Impl::postpone(const JobId& id, const Error& why) {
   log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
 }
 
-// Others shall have the units. If they come back here, they wait for the next attempt.
+// Returns the job's units for other workers. If they are assigned here again, they wait for the next attempt.
 void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
   const std::lock_guard lock(mutex);
   loading.clear();
@@ -161,7 +163,7 @@ void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
   }
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
-  for (LeaseReturned& returned : book.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 

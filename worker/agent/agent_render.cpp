@@ -1,4 +1,4 @@
-// The render threads: one unit at a time, each from the front of the lease book.
+// The render threads: each takes one unit at a time from the front of the lease table.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,16 +6,16 @@
 #include <new>
 #include <utility>
 
-#include "common/base/step.h"
+#include "common/base/failpoint.h"
 #include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
 
-constexpr std::int64_t kExrOverhead = 16 << 10;  // header and line offsets
+constexpr std::int64_t kExrOverhead = 16 << 10;  // bytes of header and line offsets
 
-// A result that would not fit into a message is refused before it costs anything.
+// Rejects a unit whose result would not fit into a message, before rendering it.
 std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
   const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
   const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
@@ -30,7 +30,7 @@ std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit)
 }  // namespace
 
 tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slot, const LocalJob& job,
-                                                                 const LeaseBook::Held& held) {
+                                                                 const HeldLeases::Held& held) {
   if (auto failure = too_large(job, held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
   auto rendered = backend.render(job, held.unit, slot.stop);
   if (!rendered) {
@@ -55,9 +55,9 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   return result;
 }
 
-// A backend in this process may run out of memory: that costs the unit, not the process.
+// A backend in this process may run out of memory: that fails the unit, not the process.
 tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
-                                                          const LeaseBook::Held& held) {
+                                                          const HeldLeases::Held& held) {
   UnitFailure failure;
   try {
     return rendered_unit(slot, job, held);
@@ -92,17 +92,17 @@ void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   }
 }
 
-// Blocks until there is something to do; nothing at the end.
-std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
-                                                      std::shared_ptr<const LocalJob>& job) {
+// Blocks until there is a unit to render; nullopt when the thread should end.
+std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
+                                                       std::shared_ptr<const LocalJob>& job) {
   std::unique_lock lock(mutex);
-  std::optional<LeaseBook::Held> held;
+  std::optional<HeldLeases::Held> held;
   const auto ready = [this](const JobId& id) {
     const auto it = jobs.find(id);
     return it != jobs.end() && it->second.state == Job::State::ready;
   };
   const auto found = [&] {
-    if (!draining && outbox.bytes() < options.outbox_bytes) held = book.take(ready);
+    if (!draining && outbox.bytes() < options.outbox_bytes) held = table.take(ready);
     return held.has_value();
   };
   if (!work.wait(lock, token, found)) return std::nullopt;
@@ -116,20 +116,20 @@ std::optional<LeaseBook::Held> Agent::Impl::next_unit(RenderSlot& slot, std::sto
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
                            tl::expected<UnitResult, UnitFailure> outcome) {
-  step("unit-rendered");
+  failpoint("unit-rendered");
   const bool innocent = !outcome && backend.broken();
   {
     const std::lock_guard lock(mutex);
     slot.unit.reset();
     if (outcome) cpu_seconds += outcome->cpu_seconds;
-    // A unit that was told to stop is no longer ours, whatever came of it.
-    const auto lease = slot.stop ? std::nullopt : book.finish(key);
+    // A stopped unit is no longer ours, whatever its outcome.
+    const auto lease = slot.stop ? std::nullopt : table.finish(key);
     if (lease && outcome) {
       outcome->lease = *lease;
       if (const auto job = jobs.find(key.job); job != jobs.end()) {
-        const UnitTimes told = std::exchange(job->second.untold, {});
-        outcome->times.load = told.load;
-        outcome->times.build = told.build;
+        const UnitTimes load_times = std::exchange(job->second.unreported, {});
+        outcome->times.load = load_times.load;
+        outcome->times.build = load_times.build;
       }
       outbox.add(std::move(*outcome));
     } else if (lease && innocent) {

@@ -1,6 +1,6 @@
-// Exponential back-off with jitter: the n-th wait is between a half and the whole of first * 2^n, at most
-// `most`. The jitter keeps a thousand workers from coming back in the same instant; seeded, so that a test
-// can tell what it does.
+// Exponential back-off with jitter: the n-th wait is between half and all of first * 2^n, and at most `most`.
+// The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that tests can
+// predict it.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Where an agent gets the files of a job's blobs: a cache that fetches what it lacks (worker/cache), or files
-// that are here already (`lightshaft render`).
+// Provides the files of a job's blobs: a cache that fetches missing ones (worker/cache), or files that are
+// already local (`lightshaft render`).
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace ls::worker {
 
-// A blob on this machine, complete and verified. The file stays for as long as the object lives.
+// A complete, verified blob on this machine. The file is kept while the object lives.
 class BlobFile {
  public:
   virtual ~BlobFile() = default;
@@ -22,16 +22,16 @@ class BlobFile {
 class BlobFiles {
  public:
   virtual ~BlobFiles() = default;
-  // Blocks while it fetches. unavailable: the transfer was cut, try again later (what came is kept).
-  // resource_exhausted, internal: trouble of this machine or its coordinator (a full disk, the cache limit, a
-  // blob that the coordinator lacks) that says nothing about the job and may pass. Other errors are final:
-  // not_found of files that can come from nowhere.
+  // Blocks while it fetches. unavailable: the transfer was interrupted; retry later (received bytes are
+  // kept). resource_exhausted, internal: a problem of this machine or its coordinator (a full disk, the cache
+  // limit, a blob missing at the coordinator) that is not the job's fault and may pass. Other errors are
+  // final: not_found if the file has no source.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
-  // For the hello: at most `limit`, the most recently used first.
+  // For the hello: at most `limit` blobs, most recently used first.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;
 };
 
-// Files that are here already, by digest.
+// Files that are already on this machine, by digest.
 class LocalFiles final : public BlobFiles {
  public:
   explicit LocalFiles(std::map<Digest, std::filesystem::path> files) : files_(std::move(files)) {}

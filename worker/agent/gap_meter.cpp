@@ -12,7 +12,7 @@ constexpr double kStepsPerOctave = 8;
 }  // namespace
 
 void GapMeter::add(double seconds) {
-  seconds = std::max(seconds, 0.);  // the two clocks that it is the difference of may disagree by a little
+  seconds = std::max(seconds, 0.);  // the two clocks that are subtracted may disagree a little
   const double step = seconds > kFirst ? kStepsPerOctave * std::log2(seconds / kFirst) : 0;
   ++counts_[static_cast<std::size_t>(std::min(step, kSteps - 1.))];
   ++count_;
@@ -24,7 +24,7 @@ double GapMeter::quantile(double q) const {
   if (count_ == 0) return 0;
   const auto wanted = static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_)));
   std::uint64_t seen = 0;
-  for (int i = 0; i < kSteps - 1; ++i) {  // the last bucket has no upper end
+  for (int i = 0; i < kSteps - 1; ++i) {  // the last bucket is unbounded
     seen += counts_[static_cast<std::size_t>(i)];
     if (seen >= wanted) return std::min(longest_, kFirst * std::exp2((i + 1) / kStepsPerOctave));
   }

@@ -1,6 +1,6 @@
-// How long render threads stand still between two units of one job: from the last sample of one to the first
-// of the next. A histogram of eight steps an octave from a microsecond on, so that quantiles are good to 10
-// %.
+// Measures how long render threads idle between two units of one job: from the last sample of one to the
+// first of the next. A histogram with eight steps per octave from a microsecond on, so that quantiles are
+// accurate to 10 %.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ class GapMeter {
   std::uint64_t count() const { return count_; }
   double total() const { return total_; }      // seconds
   double longest() const { return longest_; }  // seconds
-  // Seconds that a share q of all gaps stays within; 0 if there were none.
+  // The quantile q in seconds; 0 without gaps.
   double quantile(double q) const;
   std::string text() const;  // for the log
 

@@ -1,5 +1,5 @@
-// What wakes the agent's control thread: messages of the current connection, its loss, or a nudge from
-// another thread. Shared with the link's observer, so that a late callback never finds a dead agent.
+// Events that wake the agent's control thread: messages of the current connection, its loss, or a nudge from
+// another thread. Shared with the link's observer, so that a late callback cannot reach a destroyed agent.
 #pragma once
 
 #include <condition_variable>
@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "common/base/clock.h"
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 
@@ -18,7 +18,7 @@ struct ConnectionLost {
   Error why;
 };
 struct Arrival {
-  std::uint64_t connection = 0;  // counted by the agent; arrivals of older ones are stale
+  std::uint64_t connection = 0;  // numbered by the agent; events of older connections are stale
   std::variant<ToWorker, ConnectionLost> what;
 };
 
@@ -34,7 +34,7 @@ class Inbox {
     nudged_ = true;
     changed_.notify_one();
   }
-  // Everything that has arrived; waits for something to happen, at most this long.
+  // Returns all events; waits for one for at most this long.
   std::deque<Arrival> wait(Duration at_most) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });

@@ -5,7 +5,7 @@
 
 namespace ls::worker {
 
-// Between a stream and the agent: sees what comes, and tells of the stream's end once.
+// Observer between a stream and the agent: inspects messages, and reports the stream's end once.
 class LinkRing::Watch final : public LinkObserver {
  public:
   Watch(std::shared_ptr<State> state, std::shared_ptr<LinkObserver> agent)
@@ -21,13 +21,13 @@ class LinkRing::Watch final : public LinkObserver {
     agent_->received(std::move(message));
   }
   void lost(Error why) override {
-    if (!told_.exchange(true)) agent_->lost(std::move(why));
+    if (!reported_.exchange(true)) agent_->lost(std::move(why));
   }
 
  private:
   std::shared_ptr<State> state_;
   std::shared_ptr<LinkObserver> agent_;
-  std::atomic<bool> told_{false};
+  std::atomic<bool> reported_{false};
 };
 
 LinkRing::LinkRing(std::vector<std::unique_ptr<CoordinatorLink>> links, std::size_t first)
@@ -44,7 +44,7 @@ Result<void> LinkRing::connect(const WorkerHello& hello, std::shared_ptr<LinkObs
   {
     const std::lock_guard lock(mutex_);
     const std::lock_guard state_lock(state_->mutex);
-    // One that has welcomed us gets a second chance: it may only have been started again.
+    // A coordinator that has welcomed us is tried again first: it may only have restarted.
     if (go_on_ || (tried_ && !state_->welcomed)) current_ = (current_ + 1) % links_.size();
     tried_ = true;
     go_on_ = state_->welcomed = false;

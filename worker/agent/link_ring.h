@@ -1,7 +1,7 @@
-// Several coordinators as one link: those that share a farm, each with jobs of its own. The worker has a
-// stream to one of them at a time, and goes on to the next when that one has not welcomed it, or has had
-// nothing for it to do for a while. So workers come to a coordinator that has taken over another one's jobs,
-// and idle ones find those that have work.
+// Several coordinators as one link, for farms that share workers between coordinators with jobs of their own.
+// The worker has a stream to one coordinator at a time, and moves to the next when that one does not welcome
+// it or has no work for a while. So workers reach a coordinator that has taken over another's jobs, and idle
+// workers find those that have work.
 #pragma once
 
 #include <cstddef>
@@ -9,16 +9,16 @@
 #include <mutex>
 #include <vector>
 
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 
-// Progress reports without a lease, one every few seconds, after which an idle worker goes on.
+// Progress reports without a lease (one every few seconds) after which an idle worker moves on.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {
  public:
-  // `first`: any number; which of them is asked first. Workers that begin at different ones spread.
+  // `first`: any number; decides which coordinator is tried first. Different numbers spread the workers.
   LinkRing(std::vector<std::unique_ptr<CoordinatorLink>> links, std::size_t first);
   ~LinkRing() override;
 
@@ -34,7 +34,7 @@ class LinkRing final : public CoordinatorLink {
     std::mutex mutex;
     bool welcomed = false;
     int idle_reports = 0;
-    int unacknowledged = 0;  // results
+    int unacknowledged = 0;  // number of results
   };
   CoordinatorLink& current();
   bool idle_for_long(const FromWorker& message);

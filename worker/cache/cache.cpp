@@ -17,9 +17,9 @@ namespace ls::worker {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kAttempts = 3;  // at bytes that arrive whole but wrong
+constexpr int kAttempts = 3;  // for complete transfers with a wrong digest
 
-// Holds a shared lock on the file for as long as somebody uses it.
+// Holds a shared lock on the file during its lifetime.
 class LockedFile final : public BlobFile {
  public:
   LockedFile(fs::path path, int fd) : path_(std::move(path)), fd_(fd) {}
@@ -33,8 +33,7 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// What the coordinator cannot give now, as it is missing there, damaged or refused to this worker, it may
-// give later.
+// A blob that is missing, damaged or denied at the coordinator may become available later.
 Error passing(Error error) {
   const bool says_so = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!says_so) error.code = Errc::internal;
@@ -77,8 +76,8 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) 
   return fail(Errc::internal, fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
 }
 
-// Null if it is not here, or is not what its name says (then it is removed). An error if this machine cannot
-// tell: another copy would not help.
+// Null if the blob is not here, or its digest is wrong (then it is removed). An error if this machine cannot
+// check it: another copy would not help.
 Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& digest) {
   const std::shared_ptr<const BlobFile> none;
   const fs::path path = blob_path(folder_, digest);
@@ -99,7 +98,7 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
     }
     verified_.insert(digest);
   }
-  ::futimens(fd, nullptr);  // used now
+  ::futimens(fd, nullptr);  // update the time of last use
   return file;
 }
 
@@ -108,7 +107,7 @@ Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong) {
   auto partial = PartialFile::open(folder_ / kPartialFolder / blob.digest.hex());
   if (!partial) return tl::unexpected<Error>(partial.error());
   const auto received = receive(blob, arrived_wrong, *partial);
-  // What came of a cut transfer is kept; anything else is not worth keeping.
+  // Bytes of an interrupted transfer are kept; those of other failures are useless.
   if (!received && received.error().code != Errc::unavailable) partial->discard();
   if (!received) return received;
   const auto finished = partial->finish(blob.digest, blob_path(folder_, blob.digest));
@@ -125,7 +124,7 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
     if (blob.bytes != 0 && size > blob.bytes)
       return fail(Errc::invalid_argument,
                   fmt::format("'{}' is longer than the {} bytes announced", blob.name, blob.bytes));
-    // The canonical scene's size is not announced: room is made as it comes.
+    // The canonical scene's size is not known in advance: make room as it arrives.
     if (blob.bytes == 0)
       if (auto ok = make_room(size, partial.path()); !ok) return ok;
     return partial.append(bytes);
@@ -135,7 +134,7 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
 Result<void> BlobCache::make_room(std::uint64_t bytes, const fs::path& but) {
   if (limit_ == 0) return {};
   std::uint64_t total = bytes;
-  // What was left behind first: nobody may want it any more.
+  // Partial files first: they may be abandoned.
   std::vector<StoredFile> files = stored_partials(folder_);
   std::erase_if(files, [&](const StoredFile& file) { return file.path == but; });
   for (StoredFile& blob : stored_blobs(folder_)) files.push_back(std::move(blob));

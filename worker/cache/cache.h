@@ -1,12 +1,12 @@
 // The worker's content-addressed store of blobs: DIR/ab/abcdef... by SHA-256.
 //
-// A blob is visible only complete and verified. What an interrupted transfer left (DIR/partial/...) is gone
-// on with. A file that no longer has its digest (bad disk, meddling) is found when it is first used by this
-// process, thrown away and fetched again. One that arrives wrong is complained of, and tried again: no error
-// of a transfer is ever the job's fault. Above the limit, which counts what is on its way too, the least
-// recently used go first, never one in use: the file is held by a shared flock while a BlobFile lives, also
-// against other workers that use the same folder. Only files of the cache's own names at their own places are
-// ever removed; CACHEDIR.TAG tells backups to pass by.
+// Blobs become visible only when complete and verified. Interrupted transfers (DIR/partial/...) are resumed.
+// A file that no longer has its digest (bad disk, manipulation) is detected at its first use by this process,
+// removed and fetched again. A blob that arrives with a wrong digest is reported to the coordinator and
+// fetched again: no transfer error is ever the job's fault. Above the size limit, which includes transfers in
+// progress, the least recently used blobs are evicted, but never one in use: a BlobFile holds a shared flock
+// on its file, which also protects it from other workers that use the same folder. Only files with the
+// cache's own names in their own places are ever removed; CACHEDIR.TAG makes backups skip the folder.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 #include "common/base/error.h"
 #include "worker/agent/blob_files.h"
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 
@@ -31,7 +31,7 @@ class BlobCache final : public BlobFiles {
   using Fetch =
       std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
 
-  // limit_bytes 0: none. Makes the folder.
+  // limit_bytes 0: no limit. Creates the folder.
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
                                                  Fetch fetch);
 
@@ -41,17 +41,17 @@ class BlobCache final : public BlobFiles {
  private:
   BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
   Result<std::shared_ptr<const BlobFile>> open_verified(const Digest& digest);
-  // `arrived_wrong`: of the blob, before.
+  // `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
   Result<void> download(const BlobRef& blob, bool arrived_wrong);
   Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
-  // Until `bytes` fit beside everything but the file `but`.
+  // Evicts until `bytes` fit beside the file `but`, which is kept.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
   const Fetch fetch_;
   std::mutex mutex_;           // one acquire at a time
-  std::set<Digest> verified_;  // by this process
+  std::set<Digest> verified_;  // digests verified by this process
 };
 
 }  // namespace ls::worker

@@ -1,6 +1,6 @@
-// A blob on its way: bytes appended to a file of their own while their digest is computed; goes on from what
-// an earlier attempt left. The file is locked, so that two workers on one folder do not write into each
-// other's.
+// A blob in transfer: bytes are appended to a separate file while their digest is computed; resumes from the
+// bytes of an earlier attempt. The file is locked, so that two workers on one folder cannot write to the same
+// one.
 //
 // Errors: resource_exhausted if the disk is full, internal if this machine cannot write or read for another
 // reason.
@@ -17,13 +17,13 @@
 
 namespace ls::worker {
 
-// What errno says of `path`: resource_exhausted if the disk is full, else internal.
+// Error for errno on `path`: resource_exhausted if the disk is full, else internal.
 tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path);
 
 class PartialFile {
  public:
-  // Reads what is there already. If another process is writing the same blob, starts an own file from
-  // nothing.
+  // Reads the bytes that exist already. If another process is writing the same blob, starts a new file of its
+  // own.
   static Result<PartialFile> open(const std::filesystem::path& path);
   PartialFile(PartialFile&&) noexcept;
   PartialFile& operator=(PartialFile&&) = delete;
@@ -32,8 +32,8 @@ class PartialFile {
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
   Result<void> append(std::span<const std::byte> bytes);
-  // Verifies, syncs and moves the file to its final place; false: what is there already stays, somebody may
-  // have it in use. invalid_argument: other bytes than promised; the file is removed.
+  // Verifies, syncs and moves the file to its final place. false: a file was already there and is kept, as it
+  // may be in use. invalid_argument: the digest differs; the file is removed.
   Result<bool> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();
 

@@ -1,5 +1,5 @@
-// What lies in a cache folder: only files with the cache's own names at their own places are seen, so that a
-// folder which holds other things, too, keeps them.
+// Lists and removes files in a cache folder. Considers only files with the cache's own names in their own
+// places, so that other files in the folder are safe.
 #pragma once
 
 #include <sys/stat.h>
@@ -25,18 +25,18 @@ struct StoredFile {
 
 std::filesystem::path blob_path(const std::filesystem::path& folder, const Digest& digest);
 
-// The least recently used first. Links and whatever else is no regular file are not seen.
+// Least recently used first. Ignores links and other non-regular files.
 std::vector<StoredFile> stored_blobs(const std::filesystem::path& folder);
-std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);  // on their way, or left behind
+std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);  // in transfer, or left behind
 
-// Removes the file unless somebody has it locked.
+// Removes the file unless another process has it locked.
 bool remove_unused(const std::filesystem::path& path);
 
-// Removes what nobody will ever go on with: parts that a process which is gone had for itself alone.
+// Removes partial files that cannot be resumed: those private to a process that has ended.
 void remove_orphans(const std::filesystem::path& folder);
 
-// Takes a lock (of flock) without waiting. `lost`: somebody else has it, or the path was given to another
-// file between opening and locking. `failed`: this file system cannot lock; see errno.
+// Takes a flock without waiting. `lost`: another process has it, or the path was given to another file
+// between opening and locking. `failed`: this file system cannot lock; see errno.
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 

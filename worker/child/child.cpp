@@ -23,18 +23,19 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// A unit that is innocent of so many deaths in a row is not tried in this worker any more. Each such death
-// fails another unit, and the farm gives a worker no more of a job after three: an innocent one must not run
-// out before the guilty do.
+// A unit that survives this many deaths of the child in a row, caused by others, is no longer tried in this
+// worker. Each such death fails another unit, and after three the farm gives the worker no more units of that
+// job: an innocent unit must not reach the limit before the guilty ones do.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
   return static_cast<std::size_t>(unit.rect.pixels()) *
          (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
 }
-// New children in a row that end by themselves before they are ready.
+// Consecutive children that may end by themselves before they are ready.
 constexpr int kUnreadyChildren = 5;
-constexpr Duration kStopLimit = std::chrono::seconds(10);  // from the stop flag to its obedience
+// from setting the stop flag to the child's reaction
+constexpr Duration kStopLimit = std::chrono::seconds(10);
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
   return tl::unexpected<UnitFailure>(UnitFailure{.reason = std::move(reason)});
@@ -65,14 +66,14 @@ class ChildBackend final : public RenderBackend {
  private:
   struct Attempt {
     tl::expected<RenderedUnit, UnitFailure> outcome;
-    bool innocent = false;  // the child died, of something else
+    bool innocent = false;  // the child died, but because of another unit
   };
   Result<std::shared_ptr<Process>> living_process();
   Result<std::shared_ptr<Process>> spawn_greeted();
   Result<void> greet(Process& process);
   tl::unexpected<Error> broken_by(std::string why);
-  bool tell_forgotten(Process& process);
-  // A child that knows the job, and the job's number in it.
+  bool send_forgotten(Process& process);
+  // A child that has the job's world, with the job's number in it.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
                                                                     std::uint64_t& number);
   tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
@@ -84,15 +85,15 @@ class ChildBackend final : public RenderBackend {
   const ChildOptions options_;
   const SystemClock clock_;
   Digest numeric_class_;
-  std::mutex control_mutex_;  // one request at a time on the control channel; also who respawns
+  std::mutex control_mutex_;  // one request at a time on the control channel; also protects respawning
   mutable std::mutex mutex_;
-  std::shared_ptr<Process> process_;  // guarded by mutex_, like all below
+  std::shared_ptr<Process> process_;  // guarded by mutex_, like everything below
   std::map<WorldKey, std::uint64_t> numbers_;
-  std::vector<std::uint64_t> forgotten_;  // told to the child before the next world is built
+  std::vector<std::uint64_t> forgotten_;  // to be sent to the child before the next world is built
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
   bool shut_down_ = false;
-  std::condition_variable ending_;  // it is set
+  std::condition_variable ending_;  // signalled when shut_down_ is set
   std::optional<Error> broken_;
 };
 
@@ -112,7 +113,7 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   return process;
 }
 
-// What a new child lacks at the moment (address space, descriptors) it may have a little later.
+// A new child may lack resources (address space, descriptors) that are available a little later.
 Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   Duration pause = options_.respawn_pause;
   for (int tries = 1;; ++tries, pause *= 2) {
@@ -143,7 +144,7 @@ Result<void> ChildBackend::greet(Process& process) {
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
   if (numeric_class_ == Digest{})
-    numeric_class_ = answer->reply.numeric_class;  // the first child, before any other thread
+    numeric_class_ = answer->reply.numeric_class;  // the first child, started before any other thread
   if (numeric_class_ != answer->reply.numeric_class)
     return broken_by(
         fmt::format("a new render child has the numeric class {}, not {} as this worker began with",
@@ -199,16 +200,16 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   }
   const std::lock_guard control(control_mutex_);
   auto process = living_process();
-  // A child that dies of forgetting is replaced by one that has nothing to forget.
-  if (process && !tell_forgotten(**process)) process = living_process();
+  // If the child dies while freeing worlds, its replacement has none to free.
+  if (process && !send_forgotten(**process)) process = living_process();
   if (!process) return failed(process.error().message);
   if (knows(**process)) return *process;
   if (auto ok = prepare_in(**process, job, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
   return *process;
 }
 
-// False: the child is dead.
-bool ChildBackend::tell_forgotten(Process& process) {
+// False if the child is dead.
+bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {
     const std::lock_guard lock(mutex_);

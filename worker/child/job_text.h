@@ -1,11 +1,11 @@
-// A LocalJob as text, for the way into the render child.
+// Serialises a LocalJob for the render child.
 #pragma once
 
 #include <string>
 #include <string_view>
 
 #include "common/base/error.h"
-#include "worker/backend.h"
+#include "worker/agent/backend.h"
 
 namespace ls::worker::child {
 

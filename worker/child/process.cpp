@@ -15,7 +15,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "worker/resident.h"
+#include "worker/agent/resident.h"
 
 extern char** environ;
 
@@ -28,8 +28,8 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
               fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
 
-// The child's ends, by the number that they will have there from kSharedMemoryFd on. They are first moved
-// above all those numbers, so that no dup2 overwrites another.
+// The child's descriptors, in order of their number in the child, from kSharedMemoryFd on. They are first
+// moved above all those numbers, so that no dup2 overwrites another.
 class TheirEnds {
  public:
   explicit TheirEnds(int slots) : lowest_(kFirstSlotFd + slots + 1) {}
@@ -41,7 +41,7 @@ class TheirEnds {
 
   Result<int> add(int fd) {
     const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest_);
-    const int error = errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit is below lowest_
+    const int error = errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit on descriptors is below lowest_
     ::close(fd);
     if (high < 0) return system_error("file descriptors", error);
     fds_.push_back(high);
@@ -54,8 +54,8 @@ class TheirEnds {
   std::vector<int> fds_;
 };
 
-// What the child's libraries may want to know, and nothing else: the agent's environment may hold secrets
-// (the join token, a cloud's keys) that a renderer of strangers' files has no use for.
+// Environment variables passed to the child: only those that its libraries use. The agent's environment may
+// hold secrets (the join token, cloud keys) that a renderer of untrusted files must not see.
 bool may_see(std::string_view variable) {
   constexpr std::array kNames{"PATH=", "HOME=", "USER=", "TMPDIR=", "TZ=", "LANG=", "LANGUAGE="};
   constexpr std::array kFamilies{"LC_", "LD_", "MALLOC_", "GLIBC_TUNABLES=", "TBB_", "LIGHTSHAFT_LOG="};
@@ -114,7 +114,7 @@ Result<void> Process::start(const ChildOptions& options, const std::vector<int>&
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
 
-  std::error_code no_link;  // /proc/self/exe: people see the name behind it
+  std::error_code no_link;  // the process list should show the name behind /proc/self/exe
   const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
   std::vector<std::string> arguments = {no_link ? options.executable.string() : behind.string()};
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
@@ -145,7 +145,7 @@ void Process::kill() {
 }
 
 Process::End Process::end() {
-  if (alive()) {  // not under the lock, which kill() needs; not reaped, so that the id stays its own
+  if (alive()) {  // not under the lock, which kill() needs; WNOWAIT does not reap it, so the id is not reused
     siginfo_t info{};
     while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
     }
@@ -189,7 +189,7 @@ std::optional<Process::Answer> Process::ask(int fd, Request request, const std::
                                             const Watch& watch) {
   request.text_bytes = static_cast<std::uint32_t>(text.size());
   auto answer = exchange(fd, request, text, watch);
-  // It may have closed its end and live on: whoever asks for its end() next would wait for ever.
+  // The child may have closed its end but still run: without the kill, end() would wait forever.
   if (!answer) kill();
   return answer;
 }

@@ -1,4 +1,4 @@
-// One render child, from spawn to its end.
+// One render child process, from spawn to exit.
 #pragma once
 
 #include <sys/types.h>
@@ -29,13 +29,12 @@ class Process {
     Reply reply;
     std::string text;
   };
-  // While the child keeps it waiting `watch` is called about every 50 ms and may kill(). Nothing: the child
-  // died, or answered nonsense and was killed.
+  // Sends a request and waits for the answer, calling `watch` about every 50 ms, which may kill(). nullopt:
+  // the child died, or sent a malformed answer and was killed.
   std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
   void kill();
-  // How it ended, in words and as a signal. Waits for the end, which must be near; kill() gets through
-  // meanwhile.
+  // How the process ended. Waits for its end, which must be imminent; kill() works meanwhile.
   struct End {
     std::optional<int> signal;
     int exit_code = 0;
@@ -51,11 +50,11 @@ class Process {
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  std::atomic<int> hung_slot{-1};      // the watchdog killed it for this one
-  std::atomic<bool> garbled{false};    // it was killed because it answered nonsense
+  std::atomic<int> hung_slot{-1};      // the slot for whose lack of progress the watchdog killed it
+  std::atomic<bool> garbled{false};    // it was killed because of a malformed answer
   std::atomic<bool> preparing{false};  // a world is being built
   std::mutex prepared_mutex;
-  std::set<std::uint64_t> prepared;  // jobs it knows; guarded by prepared_mutex
+  std::set<std::uint64_t> prepared;  // jobs whose worlds it has; guarded by prepared_mutex
 
  private:
   Process() = default;

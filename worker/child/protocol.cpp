@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kPollMs = 50;
 
-// Moves all bytes with `move(p, bytes)`, a send or receive that does not wait.
+// Transfers all bytes with `move(p, bytes)`, a non-blocking send or receive.
 template <class Move, class Byte>
 bool move_all(int fd, short ready, Byte* p, std::size_t bytes, const Watch& watch, Move move) {
   while (bytes > 0) {

@@ -1,5 +1,5 @@
-// What agent and render child say to each other: fixed-size frames over a socket pair for each channel, sums
-// and breadcrumbs through one shared memory. Both are the same executable, so plain structs do.
+// Protocol between agent and render child: fixed-size frames over a socket pair per channel; sums and
+// breadcrumbs through one shared memory. Both are the same executable, so plain structs suffice.
 #pragma once
 
 #include <atomic>
@@ -11,29 +11,29 @@
 #include <type_traits>
 
 #include "common/base/error.h"
-#include "common/image/frame.h"
-#include "common/image/rounds.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "common/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/render/render.h"
 
 namespace ls::worker::child {
 
-// File descriptors of the child, set up by posix_spawn. Channel i of the render slots is kFirstSlotFd + i.
+// File descriptors in the child, set up by posix_spawn. Render slot i has the channel kFirstSlotFd + i.
 inline constexpr int kSharedMemoryFd = 3;
 inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// A prepared job as JSON (child/job_text.h): its settings as a string, and of each asset, the scene's file
-// among them, digest, bytes and name, and the digest again with the path. Names and paths may double by
-// escapes.
+// Size limit of a prepared job as JSON (child/job_text.h): the settings as a string; for each asset and the
+// scene's file the digest, bytes and name, then the digest again with the path. Escapes may double names and
+// paths.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
 inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
-inline constexpr std::size_t kReasonBytes = 64 << 10;  // of a reply
+inline constexpr std::size_t kReasonBytes = 64 << 10;  // longest text of a reply
 
-// The largest partial that fits a message: of a tile of 202 x 202 pixels without AOVs.
+// Floats of the largest partial that fits into a message: a tile of 202 x 202 pixels without AOVs.
 inline constexpr std::size_t kSlotFloats = 202 * 202 * 6;
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
@@ -42,7 +42,7 @@ enum class Kind : std::uint32_t { hello, prepare, forget, render };
 struct Request {
   Kind kind{};
   std::uint32_t text_bytes = 0;  // prepare: the job (child/job_text.h)
-  std::uint64_t job = 0;         // the parent's number for it
+  std::uint64_t job = 0;         // number assigned by the parent
   std::uint32_t tile = 0, round = 0;
   PixelRect rect;
   SampleRange samples;
@@ -52,25 +52,24 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  std::uint32_t text_bytes =
-      0;                 // the reason, when it failed; of a rendered unit its health, if it isn't clean
-  Digest numeric_class;  // hello
+  std::uint32_t text_bytes = 0;  // reason of a failure; health of a rendered unit that is not clean
+  Digest numeric_class;          // hello
   double cpu_seconds = 0, wall_seconds = 0;
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
 
-// One for each render thread, in the shared memory.
+// One per render thread, in the shared memory.
 struct Slot {
   render::Breadcrumb where;
   std::atomic<std::int32_t> tile{-1}, round{-1};
   std::atomic<bool> stop{false};     // set by the parent
-  std::atomic<bool> crashed{false};  // set by the child's signal handler: this thread is the guilty one
+  std::atomic<bool> crashed{false};  // set by the child's signal handler: this thread crashed
   float sums[kSlotFloats];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Blocking; false at the end of the other side. While the other side keeps them waiting they call `watch`, if
-// there is one, about every 50 ms.
+// Blocking; false when the other side has closed. While waiting they call `watch`, if given, about every 50
+// ms.
 using Watch = std::function<void()>;
 bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
 bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});

@@ -26,10 +26,10 @@ namespace {
 
 constexpr std::size_t kAltStackBytes = 64 << 10;
 
-thread_local Slot* t_slot = nullptr;  // of this render thread, for the signal handler
+thread_local Slot* t_slot = nullptr;  // slot of this render thread, for the signal handler
 
-// Marks the guilty thread's slot, then dies of the same signal (SA_RESETHAND has put the default action
-// back).
+// Marks the slot of the crashing thread, then dies of the same signal (SA_RESETHAND has restored the default
+// action).
 extern "C" void on_fatal_signal(int signal) {
   if (t_slot) t_slot->crashed.store(true, std::memory_order_relaxed);
   ::raise(signal);
@@ -42,7 +42,7 @@ void watch_fatal_signals() {
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
 }
 
-// A stack of its own for the handler: the thread's may be what overflowed.
+// A separate stack for the handler, as the thread's own may have overflowed.
 struct AltStack {
   AltStack() : memory(kAltStackBytes) {
     stack_t stack{};
@@ -73,7 +73,7 @@ class Server {
       std::string reason = guarded(reply, [&] { return control(request, text, reply); });
       if (!answer(kControlFd, reply, reason)) break;
     }
-    ::_exit(0);  // the agent is gone; render threads may be deep in a sample
+    ::_exit(0);  // the agent is gone; do not wait for render threads in the middle of a sample
   }
 
   void render_loop(int index) {
@@ -88,7 +88,7 @@ class Server {
   }
 
  private:
-  // Runs it; an exception becomes the reply's outcome. What comes back is the reply's text.
+  // Runs `run`; an exception becomes the reply's outcome. Returns the reply's text.
   template <class Run>
   static std::string guarded(Reply& reply, Run run) {
     try {
@@ -168,10 +168,11 @@ class Server {
 
 void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  ::prctl(PR_SET_NAME, "ls-render-child");  // started as /proc/self/exe it would be called "exe"
+  // otherwise it would be called "exe", as it is started as /proc/self/exe
+  ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  // A terminal's Ctrl-C goes to the agent alone; it decides.
+  // Ctrl-C in a terminal is handled by the agent alone.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
 #if !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)  // their shadow memory is larger than any limit

@@ -5,18 +5,18 @@
 #include <optional>
 #include <string>
 
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 
-// What both sides show each other. PEM.
+// Certificates for mutual TLS, in PEM.
 struct LinkTls {
-  std::string ca;         // whose certificate the coordinator must show
-  std::string cert, key;  // ours
+  std::string ca;         // CA of the coordinator's certificate
+  std::string cert, key;  // our own
 };
 
-// `address` is "host:port". `join_token` goes with blob fetches (the hello has its own). Without `tls`
-// nothing is encrypted. Nothing is connected yet.
+// `address` is "host:port". `join_token` is sent with blob fetches (the hello has its own). Without `tls` the
+// connection is not encrypted. Does not connect yet.
 std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token,
                                                 const std::optional<LinkTls>& tls = {});
 

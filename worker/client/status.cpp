@@ -19,7 +19,7 @@ Errc code_of(grpc::StatusCode code) {
       return Errc::permission_denied;
     case grpc::StatusCode::UNAUTHENTICATED:
       return Errc::unauthenticated;
-    // A peer that vanished, was cut off or went down: come back later.
+    // The peer vanished, was cut off or went down: retry later.
     case grpc::StatusCode::UNAVAILABLE:
     case grpc::StatusCode::CANCELLED:
     case grpc::StatusCode::ABORTED:

@@ -1,4 +1,4 @@
-// gRPC status to Error, as the coordinator's table has it the other way round.
+// Converts a gRPC status to an Error; the inverse of the coordinator's table.
 #pragma once
 
 #include <grpcpp/support/status.h>

@@ -11,12 +11,12 @@
 #include <mutex>
 #include <vector>
 
-#include "common/image/fake_pixels.h"
+#include "common/image/film/fake_pixels.h"
 
 namespace ls::worker {
 namespace {
 
-constexpr std::size_t kMouthful = 64 << 20;  // bytes that the `memory` fault takes at a time
+constexpr std::size_t kAllocationChunk = 64 << 20;  // size of each allocation of the `memory` fault
 
 double thread_cpu_seconds() {
   timespec t{};
@@ -45,7 +45,7 @@ class FakeBackend final : public LocalBackend {
       where->sample.store(unit.samples.s0, std::memory_order_relaxed);
     }
     const bool faulty = matches(brief.settings.seed, unit);
-    if (faulty) misbehave(stop);
+    if (faulty) inject_fault(stop);
     const double work = options_.sample_seconds * static_cast<double>(unit.rect.pixels()) *
                         static_cast<double>(unit.samples.count());
     if (!pause(options_.delay + from_seconds(work), stop))
@@ -72,18 +72,18 @@ class FakeBackend final : public LocalBackend {
            is(f.round, unit.round);
   }
 
-  static void misbehave_with_memory() {
-    std::vector<std::vector<char>> meals;
-    while (true) meals.emplace_back(kMouthful, 'x');
+  static void inject_fault_with_memory() {
+    std::vector<std::vector<char>> chunks;
+    while (true) chunks.emplace_back(kAllocationChunk, 'x');
   }
 
-  void misbehave(const std::atomic<bool>& stop) {
+  void inject_fault(const std::atomic<bool>& stop) {
     switch (options_.fault.kind) {
       case FakeFault::Kind::crash:
         ::raise(SIGSEGV);
         break;
       case FakeFault::Kind::memory:
-        misbehave_with_memory();
+        inject_fault_with_memory();
         break;
       case FakeFault::Kind::hang:
         while (!stop) ::usleep(1000);
@@ -95,7 +95,7 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // False if told to stop meanwhile.
+  // False if stopped meanwhile.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
     while (!stop && std::chrono::steady_clock::now() < end)

@@ -1,4 +1,4 @@
-// The renderer's public face. It knows scenes, files and pixels; nothing of jobs or networks.
+// The renderer's public interface. It knows scenes, files and pixels, but nothing of jobs or networks.
 #pragma once
 
 #include <atomic>
@@ -11,9 +11,9 @@
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
-#include "common/image/frame.h"
-#include "common/image/health.h"
-#include "common/image/rounds.h"
+#include "common/image/film/health.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
 #include "common/scene/scene.h"
 
@@ -22,64 +22,66 @@ namespace ls::render {
 class World;
 using ls::Health;
 
-// Where the bytes of the scene's assets lie on this machine.
+// Local file of each of the scene's assets, by digest.
 using AssetFiles = std::map<Digest, std::filesystem::path>;
 
-// Builds BVH, grids and light tables. invalid_argument: the scene or one of its files is at fault, and the
-// message says which and why; resource_exhausted: a limit. Deterministic for any `threads`.
+// Builds BVH, grids and light tables; deterministic for any `threads`.
+// invalid_argument: the scene or one of its files is at fault (the message names which and why);
+// resource_exhausted: a limit is exceeded.
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
-// Where the renderer is, for whoever must explain its death. Written with relaxed stores.
+// The sample being rendered, for crash reports. Written with relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
 };
 
 struct TileResult {
-  std::vector<float> sums;  // planes, see common/image/partial.h: six, and those of the settings' AOVs
-  Health health;            // of the samples, by cause and pixel; not of the inputs
-  bool stopped = false;     // `stop` was seen: sums are not valid
+  std::vector<float> sums;  // planes as in common/image/film/partial.h: six, plus those of the requested AOVs
+  Health health;            // of the samples, by cause and pixel; inputs are not included
+  bool stopped = false;     // `stop` was set: sums are not valid
 };
 
-// Renders the sample range of a tile, on the calling thread. A pure function of (world, tile, samples).
+// Renders a sample range of a tile on the calling thread. A pure function of (world, tile, samples).
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// The integrator variants that cover the world, cheapest first, and rendering with one of them: all give the
-// same bits.
+// Names of the integrator variants that cover the world, cheapest first. render_tile_as() renders with one of
+// them; all give the same bits.
 std::vector<std::string> covering_variants(const World& world);
-std::vector<std::string> all_variants(const World& world);  // of the world's integrator
+std::vector<std::string> all_variants(const World& world);  // all variants of the world's integrator
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// One sample of one pixel, for replay: its radiance, and what was wrong with it.
+// The value of one sample of one pixel, for replay.
 struct SampleValue {
   double rgb[3];
-  bool finite;    // false: it is rejected
-  Health health;  // of this sample alone
+  bool finite;    // false: the sample is rejected
+  Health health;  // of this sample only
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
 
-// What the scene makes us use and leave out, in words; and the bytes of each structure.
+// The features that the scene uses and leaves out, in words, and the size of each structure.
 struct WorldReport {
   struct Structure {
     std::string name;
     std::uint64_t bytes = 0;
-    std::string detail;  // "12 triangles"; or, where there are no bytes, why not
+    std::string detail;  // "12 triangles"; if bytes is 0, the reason
   };
   std::vector<std::string> used, left_out;
   std::vector<Structure> structures;
-  std::string variant;  // the integrator instantiation, one of `variants` that there are
+  std::string variant;  // the chosen integrator instantiation, out of `variants` compiled ones
   std::size_t variants = 0;
-  // Negative densities and texels set to 0, degenerate triangles dropped, ...
+  // Inputs that were corrected: negative densities and texels set to 0, degenerate triangles dropped, ...
   std::uint64_t clamped_inputs = 0;
 };
-// The same by cause.
+// The corrected inputs by cause.
 const Health& changed_inputs(const World& world);
 WorldReport describe(const World& world);
 
-// SHA-256 of the build and a start-up battery: machines of one class give the same bits. Computed once.
+// SHA-256 of the build and of the results of a start-up battery: machines of the same class produce the same
+// bits. Computed once.
 const Digest& numeric_class();
 
 }  // namespace ls::render

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/image/fake_pixels.h"
+#include "common/image/film/fake_pixels.h"
 #include "tests/unit/agent/agent_rig.h"
 
 namespace ls::worker {

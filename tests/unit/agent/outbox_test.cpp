@@ -1,4 +1,4 @@
-#include "worker/agent/outbox.h"
+#include "worker/agent/result_outbox.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

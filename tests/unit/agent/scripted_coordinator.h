@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "worker/link.h"
+#include "worker/agent/link.h"
 
 namespace ls::worker {
 

@@ -9,38 +9,40 @@ import re
 
 CODE = (".h", ".cpp")
 CHECKED = (".h", ".cpp", ".proto", ".cmake", ".py", ".js", ".css", ".html", ".sh")
-FOLDERS = ("common", "proto", "worker", "coordinator", "cli", "web", "cmake", "deploy", "scenes", "tests")
+FOLDERS = ("common", "proto", "worker", "coordinator", "validation", "compare", "cli", "web", "cmake", "deploy", "scenes", "tests")
 
 # ---- who may include whom ----
 # The longest prefix that fits a file names its area; an area may include itself, and the areas (or single files) listed.
 # "worker/*" are all areas under worker.
-COORDINATOR_BASE = ["common", "coordinator/domain", "coordinator/limits.h", "coordinator/service.h"]
+# What all of the coordinator knows; what talks to its facade, and no further.
+COORDINATOR_BASE = ["common", "coordinator/base", "coordinator/domain", "coordinator/views"]
+FACADE = COORDINATOR_BASE + ["coordinator/store/blobs/blob_store.h", "coordinator/service/coordinator.h"]
 AREAS = {
     "common": [],
     "proto": ["common"],
     "worker/render": ["common"],
     "worker": ["common", "worker/*"],
     "worker/client": ["common", "worker", "proto"],
-    "coordinator/domain": ["common"],
-    "coordinator/limits.h": ["common"],
-    "coordinator/service.h": ["common", "coordinator/domain"],
+    "coordinator/base": ["common"],
+    "coordinator/domain": ["common", "coordinator/base"],
+    "coordinator/views": ["common", "coordinator/base", "coordinator/domain"],
     "coordinator/store": COORDINATOR_BASE,
     # It folds partials out of the store's log.
     "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store"],
-    "coordinator/rpc": COORDINATOR_BASE + ["proto"],
+    "coordinator/admission": COORDINATOR_BASE + ["coordinator/store"],
+    # It wires domain, store and assembler together, and knows no network.
+    "coordinator/service": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble", "coordinator/admission"],
+    "coordinator/rpc": FACADE + ["proto"],
     "coordinator/tls": ["common"],
-    "coordinator/http": COORDINATOR_BASE + ["coordinator/views.h"],
-    # It keeps what it must still tell in files.
-    "coordinator/webhooks": COORDINATOR_BASE + ["coordinator/store", "coordinator/views.h"],
-    # What stands in coordinator/ itself wires domain, store and assembler into the service; it knows no network.
-    "coordinator": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble"],
-    "coordinator/main.cpp": ["common", "coordinator/*"],
-    "coordinator/options.h": COORDINATOR_BASE + ["coordinator/http/limits.h"],
-    "coordinator/options.cpp": COORDINATOR_BASE + ["coordinator/options.h"],
+    "coordinator/http": FACADE,
+    # It keeps what it must still send in files.
+    "coordinator/webhooks": FACADE + ["coordinator/store"],
+    "coordinator": ["common", "coordinator/*"],
     # `lightshaft render` is coordinator and worker in one process.
-    "cli": ["common", "worker/*", "coordinator/*", "cli/cases"],
-    # The validation cases see no more than the renderer's public face and what measures and judges them.
-    "cli/cases": ["common", "worker/render", "cli/validate_measure.h", "cli/validate_stats.h", "cli/validate_case.h"],
+    "cli": ["common", "worker/*", "coordinator/*", "validation", "compare"],
+    # The validation cases see no more than the renderer.
+    "validation": ["common", "worker/render"],
+    "compare": ["common", "worker/render", "validation"],
 }
 # Made by the build.
 GENERATED = re.compile(r"^proto/\w+(\.grpc)?\.pb\.h$")
@@ -54,45 +56,46 @@ class Door:
     why: str
 
 
-EVERYWHERE = r"^(common|worker|coordinator|cli)/"
+EVERYWHERE = r"^(common|worker|coordinator|validation|compare|cli)/"
 
 DOORS = [
-    Door("Embree", r"^embree\d?/", r"^worker/render/accel(_shapes)?\.(h|cpp)$", "accel.h and its parts"),
+    Door("Embree", r"^embree\d?/", r"^worker/render/geometry/accel(_shapes)?\.(h|cpp)$", "accel.h and its parts"),
     Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
     Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
-    Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr\w*\.(h|cpp)$", "common/image/exr*"),
+    Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr/", "common/image/exr"),
     Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
-    Door("Boost", r"^boost/(?!math/)", r"^coordinator/http/", "the HTTP server"),
-    Door("Boost.Math", r"^boost/math/", r"^cli/validate_stats\.cpp$", "the statistics of tests and races"),
-    Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/archive\.(h|cpp)$", "one file pair of the HTTP door"),
+    Door("Boost", r"^boost/(?!math/)", r"^coordinator/http/net/", "the HTTP server"),
+    Door("Boost.Math", r"^boost/math/", r"^validation/measure/hypothesis_tests\.cpp$", "the statistics of tests and races"),
+    Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/bundle/archive\.(h|cpp)$", "one file pair of the HTTP door"),
     Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
-    Door("hiredis", r"^hiredis/", r"^coordinator/store/redis_link\.cpp$", "the link to Redis"),
+    Door("hiredis", r"^hiredis/", r"^coordinator/store/redis/redis_link\.cpp$", "the link to Redis"),
     Door("pugixml", r"^pugixml\.hpp$", r"^common/scene/", "the scene reader"),
     Door("spdlog", r"^spdlog/", r"^common/base/log\.cpp$", "the log"),
-    Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/preview)\.cpp$", "its decoder, and the preview"),
+    Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/exr/preview)\.cpp$", "its decoder, and the preview"),
     Door("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^common/assets/jpeg_\w+\.cpp$", "its decoder"),
     Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
-    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|coordinator/http/(auth|token_file|stream)|coordinator/tls/certificates)\.cpp$", "digests, tokens, TLS"),
+    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|coordinator/http/(auth/auth|auth/token_file|net/byte_stream)|coordinator/tls/certificates)\.cpp$", "digests, tokens, TLS"),
     Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
     Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$", "the executables"),
-    Door("libcurl", r"^curl/", r"^cli/|^coordinator/(store/s3_link|webhooks/post)\.cpp$", "the command line's client, the link to S3, and what posts webhooks"),
-    Door("nlohmann-json", r"^nlohmann/", EVERYWHERE, "our own code"),
+    Door("libcurl", r"^curl/", r"^cli/|^coordinator/(store/blobs/s3_link|webhooks/post)\.cpp$", "the command line's client, the link to S3, and what posts webhooks"),
+    Door("nlohmann-json", r"^nlohmann/(?!json_fwd)", EVERYWHERE, "our own code"),
 ]
 # In tests a library may be needed as an oracle or to make broken files; doors bind the product.
 
+MAX_FILES = 30  # of C++ in a folder
 MAX_LINES = 800
 LONG_FILES = {}  # path: reason
 
 # Tests of real threads and sockets may bound their patience by a clock; those of the state machine have a fake one.
 CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)")
 CLOCK_EXCEPTIONS = {
-    "coordinator/http/auth.cpp": "a session's end is a wall-clock date inside the cookie; the function is injected",
-    "coordinator/http/body_reader.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "coordinator/http/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "coordinator/http/socket_io.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "coordinator/service.cpp": "the wall-clock time of a submission, for people",
-    "coordinator/rpc/server.cpp": "gRPC's Shutdown takes a point in time",
+    "coordinator/http/auth/auth.cpp": "a session's end is a wall-clock date inside the cookie; the function is injected",
+    "coordinator/http/net/body_reader.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/http/net/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/http/net/socket_io.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "coordinator/service/coordinator.cpp": "the wall-clock time of a submission, for people",
+    "coordinator/rpc/rpc_server.cpp": "gRPC's Shutdown takes a point in time",
     "worker/fake/fake.cpp": "plays a slow renderer",
 }
 
@@ -160,6 +163,12 @@ def folder(path):
     return path.rpartition("/")[0]
 
 
+def module(path):
+    """A folder with all its rooms: "common/scene", "cli"."""
+    parts = folder(path).split("/")
+    return parts[0] if parts[0] in ("cli", "validation", "compare") else "/".join(parts[:2])
+
+
 def door_of(name):
     return next((door for door in DOORS if re.search(door.headers, name)), None)
 
@@ -207,6 +216,45 @@ def include_cycles(tree):
     yield from (f"headers include each other: {cycle}" for cycle in cycles)
 
 
+def folder_graph(tree):
+    """{folder: {folder it includes: [(file, included file)]}} of the product."""
+    graph = {}
+    for path, text in product(tree).items():
+        for name, quoted in includes(text):
+            if quoted and name in tree and folder(name) != folder(path):
+                graph.setdefault(folder(path), {}).setdefault(folder(name), []).append((path, name))
+    return graph
+
+
+def folder_cycles(tree):
+    """No two folders include each other, by whatever way."""
+    graph = folder_graph(tree)
+
+    def reached(start):
+        seen, todo = set(), [start]
+        while todo:
+            for to in graph.get(todo.pop(), {}):
+                if to not in seen:
+                    seen.add(to)
+                    todo.append(to)
+        return seen
+
+    reach = {name: reached(name) for name in graph}
+    for name, edges in graph.items():
+        for to, files in edges.items():
+            if name in reach.get(to, set()):
+                yield f"{files[0][0]} includes {files[0][1]}: {name} and {to} include each other"
+
+
+def small_rooms(tree):
+    counts = {}
+    for path in product(tree):
+        counts[folder(path)] = counts.get(folder(path), 0) + 1
+    for name, count in counts.items():
+        if count > MAX_FILES:
+            yield f"{name} has {count} files; make rooms of at most {MAX_FILES} by subject"
+
+
 def doors(tree):
     for path, text in product(tree).items():
         for name, _ in includes(text):
@@ -216,7 +264,7 @@ def doors(tree):
 
 
 def library_types_stay_behind_their_doors(tree):
-    """A header that lets a library in is private: only .cpp files of its own folder see it, or of the library's door."""
+    """A header that lets a library in is private: only .cpp files of its own module see it, or of the library's door."""
     files = product(tree)
     names = {path: [name for name, _ in includes(text)] for path, text in files.items()}
     heavy = {}  # header -> the door whose library it shows, itself or through another
@@ -228,7 +276,7 @@ def library_types_stay_behind_their_doors(tree):
         heavy.update(found)
     for path, name in ((path, name) for path in names for name in names[path] if name in heavy):
         door = heavy[name]
-        at_home = folder(path) == folder(name) or (door.files != EVERYWHERE and re.search(door.files, path))
+        at_home = module(path) == module(name) or (door.files != EVERYWHERE and re.search(door.files, path))
         if not at_home:
             yield f"{path} includes {name}, which brings {door.library} along"
 
@@ -308,7 +356,7 @@ def exceptions_are_files(tree):
 # Numbers that decide pixels: named constants of the renderer, and literals that have no name and either an exponent or a
 # value of .01 or less. (Larger ones, such as .5, are nearly always arithmetic.) Grids' file formats are not pixels.
 CONSTANTS_PAGE = "docs/reference/constants.md"
-DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb[/_])")
+DECIDES_PIXELS = re.compile(r"^worker/render/(?!vdb/|media/vdb_)")
 NAMED_NUMBER = re.compile(r"\bconstexpr\s+(?:static\s+)?(?:float|double|int|std::\w+)\s+(k[A-Z]\w*)\s*(?:\[|=)")
 BARE_NUMBER = re.compile(r"(?<![\w.])(?:0x[0-9a-fA-F.]+p[+-]?\d+|(?:\d+\.?\d*|\.\d+)e[+-]?\d+|0?\.0(?:10*|0\d*[1-9]\d*))f?\b")
 
@@ -340,6 +388,6 @@ def constants_are_listed(tree):
             yield f"{CONSTANTS_PAGE} has a row for {number} in {path}, where it is not"
 
 
-RULES = [layering, quoted_includes_exist, include_cycles, doors, library_types_stay_behind_their_doors, headers_are_guarded,
+RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_rooms, doors, library_types_stay_behind_their_doors, headers_are_guarded,
          short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits, exceptions_are_files,
          constants_are_listed]

@@ -8,6 +8,7 @@ import sys
 import unittest
 
 import architecture
+import draw_folders
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 BIN = None  # folder of the built executables
@@ -24,6 +25,10 @@ class Tree(unittest.TestCase):
                 violations = sorted(set(rule(tree)))
                 self.assertEqual(violations, [], "\n  " + "\n  ".join(violations))
 
+    def test_the_drawing_of_its_folders_is_of_today(self):
+        drawn = draw_folders.drawing(draw_folders.graph_of(architecture.read_tree(ROOT)))
+        self.assertTrue(draw_folders.OUT.read_text(encoding="utf-8") == drawn, "run tests/unit/architecture/draw_folders.py")
+
 
 class Rules(unittest.TestCase):
     """Each rule on small made-up trees: what it must find, and what it must leave alone."""
@@ -36,24 +41,25 @@ class Rules(unittest.TestCase):
 
     def test_layering(self):
         self.assert_finds(architecture.layering, {
-            "common/a.cpp": '#include "worker/link.h"\n',
-            "worker/agent/a.cpp": '#include "coordinator/service.h"\n',
-            "coordinator/a.cpp": '  #  include "worker/link.h"\n#include "coordinator/http/server.h"\n',
-            "coordinator/domain/a.cpp": '#include "coordinator/store/job_store.h"\n',
-            "coordinator/store/a.cpp": '#include "coordinator/rpc/server.h"\n#include "coordinator/views.h"\n',
-            "worker/render/a.cpp": '#include "worker/link.h"\n',
+            "common/a.cpp": '#include "worker/agent/link.h"\n',
+            "worker/agent/a.cpp": '#include "coordinator/service/coordinator.h"\n',
+            "coordinator/a.cpp": '  #  include "worker/agent/link.h"\n#include "coordinator/http/net/http_server.h"\n',
+            "coordinator/service/a.cpp": '#include "coordinator/http/net/http_server.h"\n',
+            "coordinator/domain/a.cpp": '#include "coordinator/store/jobs/job_store.h"\n',
+            "coordinator/store/a.cpp": '#include "coordinator/rpc/rpc_server.h"\n#include "coordinator/service/coordinator.h"\n',
+            "worker/render/a.cpp": '#include "worker/agent/link.h"\n',
             "worker/agent/b.cpp": '#include "proto/farm.pb.h"\n',
-        }, "common/a.cpp", "worker/agent/a.cpp", "worker/link.h", "coordinator/http/server.h", "coordinator/domain/a.cpp",
-            "coordinator/rpc/server.h", "coordinator/views.h", "worker/render/a.cpp", "worker/agent/b.cpp")
+        }, "common/a.cpp", "worker/agent/a.cpp", "worker/agent/link.h", "coordinator/http/net/http_server.h", "coordinator/domain/a.cpp",
+            "coordinator/rpc/rpc_server.h", "includes coordinator/service/coordinator.h", "worker/render/a.cpp", "worker/agent/b.cpp")
 
     def test_layering_allows_what_is_drawn(self):
         self.assert_finds(architecture.layering, {
-            "worker/agent/a.cpp": '#include "common/base/id.h"\n#include "worker/render/render.h"\n#include "worker/link.h"\n// #include "coordinator/service.h"\n',
-            "coordinator/http/a.cpp": '#include "coordinator/service.h"\n#include "coordinator/domain/farm.h"\n#include "coordinator/views.h"\n',
-            "coordinator/main.cpp": '#include "coordinator/http/server.h"\n#include "coordinator/rpc/server.h"\n',
-            "cli/render.cpp": '#include "coordinator/service.h"\n#include "worker/agent/agent.h"\n#include "coordinator/assemble/merge.h"\n',
+            "worker/agent/a.cpp": '#include "common/base/id.h"\n#include "worker/render/render.h"\n#include "worker/agent/link.h"\n// #include "coordinator/service/coordinator.h"\n',
+            "coordinator/http/a.cpp": '#include "coordinator/service/coordinator.h"\n#include "coordinator/domain/farm/farm.h"\n#include "coordinator/views/views.h"\n',
+            "coordinator/main.cpp": '#include "coordinator/http/net/http_server.h"\n#include "coordinator/rpc/rpc_server.h"\n',
+            "cli/render.cpp": '#include "coordinator/service/coordinator.h"\n#include "worker/agent/agent.h"\n#include "coordinator/assemble/merge.h"\n',
             "coordinator/rpc/a.cpp": '#include "proto/farm.pb.h"\n',
-            "tests/unit/a_test.cpp": '#include "coordinator/http/server.h"\n#include "worker/link.h"\n',
+            "tests/unit/a_test.cpp": '#include "coordinator/http/net/http_server.h"\n#include "worker/agent/link.h"\n',
         })
 
     def test_quoted_includes(self):
@@ -65,26 +71,40 @@ class Rules(unittest.TestCase):
             "common/a.h": '#include "common/b.h"\n', "common/b.h": '#include "common/c.h"\n', "common/c.h": '#include "common/a.h"\n'},
             "common/a.h -> common/b.h -> common/c.h -> common/a.h")
 
+    def test_folder_cycles(self):
+        self.assert_finds(architecture.folder_cycles, {
+            "common/a/x.h": '#include "common/b/x.h"\n', "common/b/x.h": "", "common/b/y.h": '#include "common/c/x.h"\n',
+            "common/c/x.h": '#include "common/a/z.h"\n', "common/a/z.h": "", "common/d/x.h": '#include "common/a/x.h"\n#include "common/d/y.h"\n', "common/d/y.h": ""},
+            "common/a/x.h includes common/b/x.h", "common/b/y.h includes common/c/x.h", "common/c/x.h includes common/a/z.h")
+
+    def test_drawing_leaves_out_what_follows(self):
+        self.assertEqual(draw_folders.reduced({"a": ["b", "c"], "b": ["c"], "c": []}), {"a": ["b"], "b": ["c"], "c": []})
+        self.assertEqual(draw_folders.rows_of({"a": ["b", "c"], "b": ["c"], "c": []}), [["c"], ["b"], ["a"]])
+
+    def test_small_rooms(self):
+        self.assert_finds(architecture.small_rooms, {f"{room}/{i}.h": "" for room, many in (("common/a", 31), ("common/b", 30)) for i in range(many)}, "common/a has 31 files")
+
     def test_doors(self):
         self.assert_finds(architecture.doors, {
             "worker/render/world.cpp": "#include <embree3/rtcore.h>\n",
-            "worker/render/accel.cpp": "#include <embree3/rtcore.h>\n",
+            "worker/render/geometry/accel.cpp": "#include <embree3/rtcore.h>\n",
             "coordinator/rpc/a.cpp": "#include <boost/asio.hpp>\n#include <grpcpp/grpcpp.h>\n",
+            "coordinator/http/net/a.cpp": "#include <boost/asio.hpp>\n",
             "coordinator/http/a.cpp": "#include <sqlite3.h>\n",
-            "cli/validate_stats.cpp": "#include <boost/math/distributions/students_t.hpp>\n",
-            "cli/validate_case.cpp": "#include <boost/math/distributions/normal.hpp>\n",
-            "cli/validate_file.cpp": "#include <boost/asio.hpp>\n",
-            "coordinator/http/bundle.cpp": '#include "coordinator/http/archive.h"\n#include <archive_entry.h>\n',
+            "validation/measure/hypothesis_tests.cpp": "#include <boost/math/distributions/students_t.hpp>\n",
+            "validation/measure/judge.cpp": "#include <boost/math/distributions/normal.hpp>\n",
+            "validation/nori_test_run.cpp": "#include <boost/asio.hpp>\n",
+            "coordinator/http/bundle/bundle.cpp": '#include "coordinator/http/bundle/archive.h"\n#include <archive_entry.h>\n',
             "common/scene/a.cpp": "#include <ImfHeader.h>\n#include <pugixml.hpp>\n#include <Imath/ImathVec.h>\n",
             "coordinator/store/redis.cpp": "#include <hiredis/hiredis.h>\n",
             "common/base/error.cpp": "#include <spdlog/spdlog.h>\n",
             "tests/unit/x_test.cpp": "#include <ImfHeader.h>\n",
-        }, "worker/render/world.cpp", "boost/asio.hpp", "cli/validate_case.cpp", "cli/validate_file.cpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
+        }, "worker/render/world.cpp", "boost/asio.hpp", "validation/measure/judge.cpp", "validation/nori_test_run.cpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
 
     def test_library_types(self):
         self.assert_finds(architecture.library_types_stay_behind_their_doors, {
             "coordinator/http/json.h": HEADER + "#include <nlohmann/json.hpp>\n",
-            "coordinator/http/a.cpp": '#include "coordinator/http/json.h"\n',
+            "coordinator/http/api/a.cpp": '#include "coordinator/http/json.h"\n',
             "coordinator/main.cpp": '#include "coordinator/http/json.h"\n#include "coordinator/http/open.h"\n',
             "coordinator/http/open.h": HEADER + '#include "coordinator/http/json.h"\n',
         }, "coordinator/main.cpp includes coordinator/http/json.h", "coordinator/main.cpp includes coordinator/http/open.h")

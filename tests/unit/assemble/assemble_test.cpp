@@ -4,12 +4,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/image/fake_pixels.h"
+#include "common/image/film/fake_pixels.h"
 #include "coordinator/assemble/assembly.h"
-#include "coordinator/assemble/report.h"
+#include "coordinator/assemble/job_report.h"
 #include "coordinator/assemble/snapshot.h"
 #include "coordinator/assemble/verify.h"
-#include "coordinator/limits.h"
+#include "coordinator/base/limits.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
@@ -229,55 +229,55 @@ Health unwell(int x, std::uint64_t sample) {
   return h;
 }
 
-TEST(HealthBook, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
-  HealthBook book, at_once;
-  book.folded(0, 0, {0, 2}, unwell(1, 0));
-  book.folded(0, 1, {2, 4}, {});
-  book.folded(0, 2, {4, 6}, unwell(1, 5));
-  book.folded(1, 2, {4, 6}, unwell(33, 5));
-  EXPECT_EQ(book.total().nonfinite, 3u);
-  EXPECT_EQ(HealthBook::load(book.save()).value(), book);
+TEST(HealthTable, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
+  HealthTable table, at_once;
+  table.folded(0, 0, {0, 2}, unwell(1, 0));
+  table.folded(0, 1, {2, 4}, {});
+  table.folded(0, 2, {4, 6}, unwell(1, 5));
+  table.folded(1, 2, {4, 6}, unwell(33, 5));
+  EXPECT_EQ(table.total().nonfinite, 3u);
+  EXPECT_EQ(HealthTable::load(table.save()).value(), table);
 
   Health full = unwell(1, 5);
   full.merge(unwell(1, 7));
-  book.folded(0, 2, {4, 8}, full);
-  book.folded(1, 2, {4, 8}, {});
+  table.folded(0, 2, {4, 8}, full);
+  table.folded(1, 2, {4, 8}, {});
 
   at_once.folded(0, 0, {0, 2}, unwell(1, 0));
   at_once.folded(0, 2, {4, 8}, full);
-  EXPECT_EQ(book, at_once);
-  EXPECT_EQ(book.total().nonfinite, 3u);
+  EXPECT_EQ(table, at_once);
+  EXPECT_EQ(table.total().nonfinite, 3u);
 }
 
-TEST(HealthBook, ADiscardedTileSaysNothingAndIsFoldedAgain) {
-  HealthBook book, at_once;
-  book.folded(0, 0, {0, 2}, unwell(1, 0));
-  book.folded(1, 0, {0, 2}, unwell(40, 0));
-  book.folded(1, 2, {4, 6}, unwell(41, 5));
+TEST(HealthTable, ADiscardedTileSaysNothingAndIsFoldedAgain) {
+  HealthTable table, at_once;
+  table.folded(0, 0, {0, 2}, unwell(1, 0));
+  table.folded(1, 0, {0, 2}, unwell(40, 0));
+  table.folded(1, 2, {4, 6}, unwell(41, 5));
 
-  book.discard(1);
+  table.discard(1);
   at_once.folded(0, 0, {0, 2}, unwell(1, 0));
-  EXPECT_EQ(book, at_once);
+  EXPECT_EQ(table, at_once);
 
-  book.folded(1, 0, {0, 2}, unwell(42, 0));
+  table.folded(1, 0, {0, 2}, unwell(42, 0));
   at_once.folded(1, 0, {0, 2}, unwell(42, 0));
-  EXPECT_EQ(book, at_once);
+  EXPECT_EQ(table, at_once);
 }
 
-TEST(HealthBook, RefusesTextCutAnywhereAndOtherText) {
-  HealthBook book;
-  book.folded(0, 0, {0, 2}, unwell(1, 0));
-  book.folded(3, 2, {4, 6}, unwell(1, 5));
-  const std::string text = book.save();
+TEST(HealthTable, RefusesTextCutAnywhereAndOtherText) {
+  HealthTable table;
+  table.folded(0, 0, {0, 2}, unwell(1, 0));
+  table.folded(3, 2, {4, 6}, unwell(1, 5));
+  const std::string text = table.save();
   const auto lines = [](std::string_view s) { return std::count(s.begin(), s.end(), '\n'); };
   for (std::size_t n = 0; n < text.size(); ++n) {
     const auto part = text.substr(0, n);
-    EXPECT_EQ(HealthBook::load(part).has_value(), part.empty() || (part.ends_with('\n') && lines(part) == 1))
+    EXPECT_EQ(HealthTable::load(part).has_value(), part.empty() || (part.ends_with('\n') && lines(part) == 1))
         << part;
   }
   for (const char* bad : {"x\n", "{}\n", "f 1{}\n", "f -1 {}\n", "t 1 []\n", "g 1 {}\n", "f 1\n"})
-    EXPECT_FALSE(HealthBook::load(bad)) << bad;
-  EXPECT_TRUE(HealthBook::load(""));
+    EXPECT_FALSE(HealthTable::load(bad)) << bad;
+  EXPECT_TRUE(HealthTable::load(""));
 }
 
 TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {

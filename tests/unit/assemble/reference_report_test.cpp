@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "coordinator/assemble/report.h"
+#include "coordinator/assemble/job_report.h"
 
 namespace ls::coordinator {
 namespace {
@@ -19,7 +19,8 @@ ReportFacts compared(double floor, std::optional<double> standard_error) {
   for (double spp = 8; spp <= 1024; spp *= 2) {
     const double e = 1 / spp;
     ConvergencePoint point{spp, spp, spp, {e, e, .9 * e, 1.1 * e}};
-    point.truth = TrueFigures{std::sqrt(e + floor), e + floor, {}, standard_error, standard_error};
+    point.reference_error =
+        ReferenceError{std::sqrt(e + floor), e + floor, {}, standard_error, standard_error};
     facts.convergence.push_back(point);
   }
   return facts;

@@ -8,7 +8,7 @@
 
 #include <jpeglib.h>
 
-#include "common/image/exr_file.h"
+#include "common/image/exr/exr_file.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {

@@ -9,19 +9,19 @@
 namespace ls::render::test {
 namespace {
 
-const V3 kUp(0, 0, 1), kDown(0, 0, -1);
+const V3 kAbove(0, 0, 1), kBelow(0, 0, -1);
 
 // At normal incidence, roughness r: base / pi (1 + r^2 0), plus facets with F0 = ((n-1)/(n+1))^2, D = 1 /
 // (pi alpha^2), alpha = r^2.
 TEST(Principled, AtNormalIncidenceIsTheHandMadeValue) {
   const auto b = bench(principled({.roughness = .6}));
   const double D = 1 / (M_PI * std::pow(.36, 2));
-  EXPECT_NEAR(b->eval(kUp, kUp).f_cos.x, .8 / M_PI + .04 * D / 4, 1e-6);
-  EXPECT_NEAR(b->eval(kUp, kUp).f_cos.z, .1 / M_PI + .04 * D / 4, 1e-6);
+  EXPECT_NEAR(b->eval(kAbove, kAbove).f_cos.x, .8 / M_PI + .04 * D / 4, 1e-6);
+  EXPECT_NEAR(b->eval(kAbove, kAbove).f_cos.z, .1 / M_PI + .04 * D / 4, 1e-6);
   const auto metal = bench(principled({.roughness = .6, .metallic = 1}));
-  EXPECT_NEAR(metal->eval(kUp, kUp).f_cos.y, .4 * D / 4, 1e-6) << "a metal reflects its colour";
-  EXPECT_EQ(b->eval(kDown, kDown).f_cos, C3(0));
-  EXPECT_FALSE(b->sample(kDown, .3f, {.1f, .2f})) << "without spec_trans it has one side";
+  EXPECT_NEAR(metal->eval(kAbove, kAbove).f_cos.y, .4 * D / 4, 1e-6) << "a metal reflects its colour";
+  EXPECT_EQ(b->eval(kBelow, kBelow).f_cos, C3(0));
+  EXPECT_FALSE(b->sample(kBelow, .3f, {.1f, .2f})) << "without spec_trans it has one side";
 }
 
 TEST(Principled, WhollyTransparentIsRoughGlassWithTheRootOfItsColour) {
@@ -137,7 +137,8 @@ TEST(Principled, StaysFiniteAtEveryExtreme) {
 
 TEST(Principled, SaysWhatItNeeds) {
   const auto plain = bench(principled({})), stretched = bench(principled({.anisotropic = .1}));
-  EXPECT_FALSE(plain->bsdfs.reads_uv({0}) || plain->bsdfs.anisotropic({0}) || plain->bsdfs.has_veil({0}));
+  EXPECT_FALSE(plain->bsdfs.reads_uv({0}) || plain->bsdfs.anisotropic({0}) ||
+               plain->bsdfs.has_null_transmission({0}));
   EXPECT_TRUE(stretched->bsdfs.anisotropic({0}) && plain->bsdfs.has_smooth({0}));
 }
 

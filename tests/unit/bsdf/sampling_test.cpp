@@ -146,7 +146,7 @@ std::vector<double> observed_cells(const Bench& b, const V3& wo, unsigned seed) 
 }
 
 TEST(Sampling, FollowsItsDensity) {
-  ls::test::ChiSquareBook book("bsdf/sampling");
+  ls::test::ChiSquareTally tally("bsdf/sampling");
   auto all = smooth_materials();
   ASSERT_EQ(all.size(), std::size_t{kMaterials});
   unsigned seed = 1;
@@ -156,11 +156,11 @@ TEST(Sampling, FollowsItsDensity) {
       views.insert(views.end(), std::begin(kViewCosinesFromBehind), std::end(kViewCosinesFromBehind));
     for (const double mu : views) {
       const V3 wo = direction(mu, .7);
-      book.expect(fmt::format("{} at mu {}", m.name, mu), expected_cells(*m.bench, wo),
-                  observed_cells(*m.bench, wo, ++seed));
+      tally.expect(fmt::format("{} at mu {}", m.name, mu), expected_cells(*m.bench, wo),
+                   observed_cells(*m.bench, wo, ++seed));
     }
   }
-  book.close();
+  tally.close();
 }
 
 // Of lobes alone: what a mixture of them does is no map of the square.

@@ -125,7 +125,7 @@ TEST(ThinDielectric, SplitsLightAsASheetDoes) {
   const auto b = bench(thin_glass(1.5, {1, .5, 1}, {1, 1, .25}));
   const double R = 2 * .04 / 1.04;
   for (const V3& w : {kUp, kDown}) {
-    const Veil v = b->bsdfs.veil(b->bsdf, {0, 0}, w);
+    const NullTransmission v = b->bsdfs.null_transmission(b->bsdf, {0, 0}, w);
     EXPECT_NEAR(v.probability, 1 - R, 1e-7);
     EXPECT_NEAR(v.transmission.x, 1 - R, 1e-7);
     EXPECT_NEAR(v.transmission.z, .25 * (1 - R), 1e-7);
@@ -135,23 +135,24 @@ TEST(ThinDielectric, SplitsLightAsASheetDoes) {
     EXPECT_NEAR(s->weight.x, R, 1e-7);
     EXPECT_NEAR(s->weight.y, R / 2, 1e-7);
   }
-  EXPECT_EQ(bench(thin_glass(1))->bsdfs.veil({0}, {0, 0}, direction(.3, 1)).probability, 1);
-  EXPECT_EQ(bench(thin_glass(1.5))->bsdfs.veil({0}, {0, 0}, V3(1, 0, 0)).probability, 0)
+  EXPECT_EQ(bench(thin_glass(1))->bsdfs.null_transmission({0}, {0, 0}, direction(.3, 1)).probability, 1);
+  EXPECT_EQ(bench(thin_glass(1.5))->bsdfs.null_transmission({0}, {0, 0}, V3(1, 0, 0)).probability, 0)
       << "grazing: a mirror";
 }
 
 TEST(Mask, LetsTheRestPass) {
   const auto bare = bench(diffuse({.2, .5, .9})), b = bench(masked(diffuse({.2, .5, .9}), .25));
-  EXPECT_TRUE(b->bsdfs.has_veil(b->bsdf) && b->bsdfs.has_smooth(b->bsdf));
-  EXPECT_FALSE(bare->bsdfs.has_veil(bare->bsdf));
-  EXPECT_EQ(b->bsdfs.veil(b->bsdf, {0, 0}, kUp).transmission, C3(.75f));
-  EXPECT_EQ(b->bsdfs.veil(b->bsdf, {0, 0}, kDown).probability, .75f);
+  EXPECT_TRUE(b->bsdfs.has_null_transmission(b->bsdf) && b->bsdfs.has_smooth(b->bsdf));
+  EXPECT_FALSE(bare->bsdfs.has_null_transmission(bare->bsdf));
+  EXPECT_EQ(b->bsdfs.null_transmission(b->bsdf, {0, 0}, kUp).transmission, C3(.75f));
+  EXPECT_EQ(b->bsdfs.null_transmission(b->bsdf, {0, 0}, kDown).probability, .75f);
   EXPECT_EQ(b->eval(kUp, kUp).f_cos, bare->eval(kUp, kUp).f_cos * .25f);
   EXPECT_EQ(b->eval(kUp, kUp).pdf, bare->eval(kUp, kUp).pdf);
   EXPECT_EQ(b->sample(kUp, .3f, {.2f, .8f})->weight.x, .05f);
 
   const auto sheet = bench(masked(thin_glass(1.5), .5));  // half a sheet of glass
-  EXPECT_NEAR(sheet->bsdfs.veil(sheet->bsdf, {0, 0}, kUp).transmission.x, 1 - .5 * 2 * .04 / 1.04, 1e-7);
+  EXPECT_NEAR(sheet->bsdfs.null_transmission(sheet->bsdf, {0, 0}, kUp).transmission.x,
+              1 - .5 * 2 * .04 / 1.04, 1e-7);
   EXPECT_FALSE(sheet->bsdfs.has_smooth(sheet->bsdf));
 }
 
@@ -188,7 +189,7 @@ TEST(Blend, OfNothingAndSomethingSamplesTheSomething) {
   Scene s;
   add(s, NullBsdf{});
   const auto b = bench(blend(s, diffuse({.5, .5, .5}), .25));
-  EXPECT_EQ(b->bsdfs.veil(b->bsdf, {0, 0}, kUp).probability, .75f);
+  EXPECT_EQ(b->bsdfs.null_transmission(b->bsdf, {0, 0}, kUp).probability, .75f);
   for (const float lobe : {0.f, .5f, .99f}) {
     const auto d = b->sample(kUp, lobe, {.1f, .2f});
     ASSERT_TRUE(d);
@@ -258,19 +259,21 @@ TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {
     add(s, NormalMapBsdf{texture(s, Rgb{.85, .35, .75}), last(s), flips, shadows});  // (.7, -.3, .5)
     return bench(s);
   };
-  const auto veil = [](const Bench& b, const V3& w) { return b.bsdfs.veil(b.bsdf, V2(0, 0), w); };
+  const auto null_transmission = [](const Bench& b, const V3& w) {
+    return b.bsdfs.null_transmission(b.bsdf, V2(0, 0), w);
+  };
   const double slope2 = (.7 * .7 + .3 * .3) / (.5 * .5);
   for (const V3& w : {V3(.6f, 0, .8f), V3(-.6f, 0, -.8f)}) {
     const double lit = 2 / (1 + std::sqrt(1 + slope2 / 8 * sqr(.6 / .8)));
-    EXPECT_EQ(veil(*map(true, true), w).probability, .75f);
-    EXPECT_NEAR(veil(*map(true, true), w).transmission.y, .75 * lit, 1e-6);
-    EXPECT_EQ(veil(*map(true, false), w).transmission, C3(.75f));
-    EXPECT_EQ(veil(*map(false, false), w).transmission, C3(.75f));
+    EXPECT_EQ(null_transmission(*map(true, true), w).probability, .75f);
+    EXPECT_NEAR(null_transmission(*map(true, true), w).transmission.y, .75 * lit, 1e-6);
+    EXPECT_EQ(null_transmission(*map(true, false), w).transmission, C3(.75f));
+    EXPECT_EQ(null_transmission(*map(false, false), w).transmission, C3(.75f));
   }
   const V3 away(-.8f, 0, .6f);
-  EXPECT_EQ(veil(*map(false, false), away).probability, 0);
+  EXPECT_EQ(null_transmission(*map(false, false), away).probability, 0);
   EXPECT_FALSE(map(false, false)->sample(away, .5f, {.3f, .6f}));
-  EXPECT_EQ(veil(*map(true, false), away).probability, .75f);
+  EXPECT_EQ(null_transmission(*map(true, false), away).probability, .75f);
 }
 
 TEST(Nesting, FlagsFollowFromTheParts) {

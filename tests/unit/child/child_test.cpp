@@ -14,7 +14,7 @@
 #include <iterator>
 #include <thread>
 
-#include "common/image/fake_pixels.h"
+#include "common/image/film/fake_pixels.h"
 #include "common/protocol/limits.h"
 #include "worker/child/protocol.h"
 #include "worker/child/serve.h"

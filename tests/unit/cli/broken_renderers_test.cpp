@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/cases/run.h"
+#include "validation/run.h"
 
 namespace ls::cases {
 namespace {

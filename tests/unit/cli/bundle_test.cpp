@@ -1,9 +1,9 @@
-#include "cli/bundle.h"
+#include "cli/farm/upload_bundle.h"
 
 #include <gtest/gtest.h>
 
-#include "coordinator/http/spec_query.h"
-#include "coordinator/http/uri.h"
+#include "coordinator/http/api/spec_query.h"
+#include "coordinator/http/message/uri.h"
 
 namespace ls::cli {
 namespace {

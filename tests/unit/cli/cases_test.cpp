@@ -6,11 +6,11 @@
 #include <map>
 #include <set>
 
-#include "cli/cases/checks.h"
-#include "cli/cases/endless.h"
-#include "cli/cases/run.h"
-#include "cli/cases/ways.h"
-#include "cli/validate_stats.h"
+#include "validation/fixtures/checks.h"
+#include "validation/fixtures/configurations.h"
+#include "validation/fixtures/endless.h"
+#include "validation/measure/hypothesis_tests.h"
+#include "validation/run.h"
 
 namespace ls::cases {
 namespace {
@@ -77,12 +77,12 @@ Table one_case(double expected, double band) {
   Table t;
   t.mean("one", "N0", "",
          [] {
-           SceneKit kit;
-           kit.container(CubeShape{}, {}, kit.null(), kit.homogeneous(rgb(.25), rgb(.5)));
-           kit.environment();
-           kit.scene.integrator.max_depth = 1;
-           kit.look({-3, .5, .5}, {.5, .5, .5});
-           return kit;
+           SceneBuilder builder;
+           builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous(rgb(.25), rgb(.5)));
+           builder.environment();
+           builder.scene.integrator.max_depth = 1;
+           builder.look({-3, .5, .5}, {.5, .5, .5});
+           return builder;
          },
          grey(expected), {.band = band});
   return t;
@@ -107,9 +107,9 @@ TEST(Cases, ASceneThatIsRefusedFails) {
   t.mean(
       "bad", "N0", "",
       [] {
-        SceneKit kit;
-        kit.container(CubeShape{}, {}, kit.null(), kit.homogeneous(rgb(1e38), rgb(0)));
-        return kit;
+        SceneBuilder builder;
+        builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous(rgb(1e38), rgb(0)));
+        return builder;
       },
       grey(1));
   const auto line = run_cases(t, {}).at(0);
@@ -119,12 +119,12 @@ TEST(Cases, ASceneThatIsRefusedFails) {
 // Pruning may take out just what a case is about: then it would pass whatever the renderer does.
 TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
   const auto nothing = [](bool grid) {
-    SceneKit kit;
-    const Way way{grid, false};
-    way.choose(kit);
-    kit.container(CubeShape{}, {}, kit.null(), way.medium(kit, rgb(0), rgb(0), 0, {}));
-    kit.environment();
-    return kit;
+    SceneBuilder builder;
+    const Configuration way{grid, false};
+    way.choose(builder);
+    builder.container(CubeShape{}, {}, builder.null(), way.medium(builder, rgb(0), rgb(0), 0, {}));
+    builder.environment();
+    return builder;
   };
   for (const bool grid : {false, true}) {
     const std::string id = grid ? "mine/grid/volpath" : "mine/homogeneous/volpath";

@@ -1,9 +1,9 @@
-#include "cli/farm_api.h"
+#include "cli/farm/farm_api.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/farm_tables.h"
+#include "cli/farm/farm_tables.h"
 
 namespace ls::cli {
 namespace {

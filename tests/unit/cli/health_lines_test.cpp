@@ -1,4 +1,4 @@
-#include "cli/health_lines.h"
+#include "cli/output/health_lines.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

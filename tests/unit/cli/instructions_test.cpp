@@ -1,4 +1,4 @@
-#include "cli/instructions.h"
+#include "cli/local/instructions.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <array>
 #include <cerrno>
 
-#include "cli/variants.h"
+#include "cli/local/variants.h"
 #include "common/base/digest.h"
 
 namespace ls::cli {

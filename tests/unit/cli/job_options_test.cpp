@@ -1,4 +1,4 @@
-#include "cli/job_options.h"
+#include "cli/output/job_options.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

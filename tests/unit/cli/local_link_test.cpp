@@ -1,4 +1,4 @@
-#include "cli/local_link.h"
+#include "cli/local/local_link.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/store/memory_blobs.h"
+#include "coordinator/store/blobs/memory_blobs.h"
 
 namespace ls::cli {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/report.h"
+#include "cli/output/final_report.h"
 
 namespace ls::cli {
 namespace {

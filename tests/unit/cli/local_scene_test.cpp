@@ -1,4 +1,4 @@
-#include "cli/local_scene.h"
+#include "cli/local/local_scene.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "cli/progress.h"
+#include "cli/output/progress.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "cli/say.h"
+#include "cli/output/console.h"
 
 namespace ls::cli {
 namespace {

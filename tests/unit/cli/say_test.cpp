@@ -1,4 +1,4 @@
-#include "cli/say.h"
+#include "cli/output/console.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <new>
 
-#include "cli/progress.h"
+#include "cli/output/progress.h"
 #include "common/base/plain_text.h"
 
 namespace ls::cli {
@@ -26,7 +26,7 @@ std::string said(Run run) {
 TEST(ExitCode, IsTheUsersFaultOnlyIfTheInputIsWrong) {
   const auto code = [](Errc errc) {
     int code = 0;
-    said([&] { code = say_rejected({{errc, "no"}, {}}); });
+    said([&] { code = print_rejected({{errc, "no"}, {}}); });
     return code;
   };
 
@@ -85,9 +85,9 @@ TEST(Say, ShowsForeignTextPlainly) {
 
   for (const std::string& shown :
        {said([&] {
-          say_error({Errc::internal, evil});
+          print_error({Errc::internal, evil});
         }),
-        said([&] { say_diagnostics({d}); }), progress_line({.state = evil, .trouble = evil}, 200)}) {
+        said([&] { print_diagnostics({d}); }), progress_line({.state = evil, .trouble = evil}, 200)}) {
     EXPECT_THAT(shown, AllOf(Not(HasSubstr("\x1b")), Not(HasSubstr("\x07")), Not(HasSubstr("\xc2\x9b"))));
     EXPECT_THAT(shown, Not(HasSubstr("\n  2J.xml")));
     EXPECT_THAT(shown, HasSubstr("fog ]0;title   2J.xml"));

@@ -4,10 +4,10 @@
 
 #include <fstream>
 
-#include "cli/farm_tables.h"
-#include "cli/fetch_results.h"
-#include "cli/job_options.h"
-#include "cli/output_file.h"
+#include "cli/farm/farm_tables.h"
+#include "cli/farm/fetch_results.h"
+#include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
 
 namespace ls::cli {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "cli/validate_chi2.h"
-#include "cli/validate_file.h"
-#include "cli/validate_stats.h"
-#include "tests/support/scene_kit.h"
+#include "tests/support/scene_builder.h"
+#include "validation/chi_square.h"
+#include "validation/measure/hypothesis_tests.h"
+#include "validation/nori_test_run.h"
 
 namespace ls::cli {
 namespace {
@@ -71,11 +71,11 @@ TEST(ValidateTable, JsonHasEveryCaseAndTheCounts) {
 TEST(ValidateFile, ABsdfIsSeenFromTheAngleThatIsAsked) {
   // What a smooth boundary of index 1.5 reflects, by Fresnel's formulas at 0 and 60 degrees, as a metal that
   // absorbs nothing.
-  test::SceneKit kit;
-  kit.shape(RectangleShape{}, {},
-            kit.bsdf(ConductorBsdf{{1.5, 1.5, 1.5}, {0, 0, 0}, kit.texture({1, 1, 1})}));
+  test::SceneBuilder builder;
+  builder.shape(RectangleShape{}, {},
+                builder.bsdf(ConductorBsdf{{1.5, 1.5, 1.5}, {0, 0, 0}, builder.texture({1, 1, 1})}));
   NoriTest t;
-  t.bsdfs.push_back(kit.scene);
+  t.bsdfs.push_back(builder.scene);
   t.angles = {0, 60};
   const double c = std::cos(test::kPi / 3), ct = std::sqrt(1 - .75 / 2.25);
   const double rs = (c - 1.5 * ct) / (c + 1.5 * ct), rp = (ct - 1.5 * c) / (ct + 1.5 * c);
@@ -87,11 +87,11 @@ TEST(ValidateFile, ABsdfIsSeenFromTheAngleThatIsAsked) {
 }
 
 TEST(ValidateFile, DeltaLobesHaveNoDensityToTest) {
-  test::SceneKit kit;
-  kit.shape(RectangleShape{}, {}, kit.mirror());
+  test::SceneBuilder builder;
+  builder.shape(RectangleShape{}, {}, builder.mirror());
   NoriTest t;
   t.kind = NoriTestKind::chi2_test;
-  t.bsdfs.push_back(kit.scene);
+  t.bsdfs.push_back(builder.scene);
   const auto cases = validate_test(t, {}, {.threads = 1});
   ASSERT_FALSE(cases);
   EXPECT_EQ(cases.error().code, Errc::invalid_argument);
@@ -100,11 +100,11 @@ TEST(ValidateFile, DeltaLobesHaveNoDensityToTest) {
 TEST(ValidateChi2, FollowsItsDegreesOfFreedomForARightSampler) {
   // A diffuse surface's samples against its own density pass; the statistic is that of its degrees of
   // freedom.
-  test::SceneKit kit;
-  kit.shape(RectangleShape{}, {}, kit.diffuse(.5));
+  test::SceneBuilder builder;
+  builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
   NoriTest t;
   t.kind = NoriTestKind::chi2_test;
-  t.bsdfs.push_back(kit.scene);
+  t.bsdfs.push_back(builder.scene);
   t.sample_count = 200'000;
   const auto c = chi2_case(t, 0, {}, 1);
   ASSERT_TRUE(c) << c.error().message;

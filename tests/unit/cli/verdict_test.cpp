@@ -1,12 +1,12 @@
-#include "cli/verdict.h"
+#include "cli/output/convergence_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/farm_tables.h"
-#include "cli/farm_wait.h"
-#include "cli/report.h"
-#include "cli/say.h"
+#include "cli/farm/farm_tables.h"
+#include "cli/farm/farm_wait.h"
+#include "cli/output/console.h"
+#include "cli/output/final_report.h"
 
 namespace ls::cli {
 namespace {
@@ -147,7 +147,7 @@ TEST(ProgressOfAJob, IsInDoubtWithItsVerdict) {
 std::string said_at_the_end(json job, bool quiet) {
   job["state"] = "done";
   testing::internal::CaptureStderr();
-  EXPECT_EQ(say_end(job, quiet), kOk);
+  EXPECT_EQ(print_end(job, quiet), kOk);
   return testing::internal::GetCapturedStderr();
 }
 

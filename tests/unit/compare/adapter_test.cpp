@@ -1,5 +1,5 @@
 // Adapters: what they may say, and what of a program's claims is believed.
-#include "cli/compare/adapter.h"
+#include "compare/adapter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -101,15 +101,17 @@ TEST(MadePictures, AreRefusedWithTheirLine) {
 TEST(Claims, OfMoreTimeThanTheProcessHadAreNotBelieved) {
   const Cost process{10, 18};
 
-  EXPECT_EQ(believable({"", 4, 9, 17}, process, RaceClock::cpu)->cpu, 17);
-  EXPECT_THAT(believable({"", 4, 11, 17}, process, RaceClock::wall).error().message,
+  EXPECT_EQ(plausible_cost({"", 4, 9, 17}, process, RaceClock::cpu)->cpu, 17);
+  EXPECT_THAT(plausible_cost({"", 4, 11, 17}, process, RaceClock::wall).error().message,
               HasSubstr("ran for 10 s"));
-  EXPECT_THAT(believable({"", 4, 9, 25}, process, RaceClock::wall).error().message, HasSubstr("CPU seconds"));
+  EXPECT_THAT(plausible_cost({"", 4, 9, 25}, process, RaceClock::wall).error().message,
+              HasSubstr("CPU seconds"));
 }
 
 TEST(Claims, WithoutCpuSecondsServeWallClocksOnly) {
-  EXPECT_TRUE(believable({"", 4, 9, {}}, {10, 18}, RaceClock::wall));
-  EXPECT_THAT(believable({"", 4, 9, {}}, {10, 18}, RaceClock::cpu).error().message, HasSubstr("--clock cpu"));
+  EXPECT_TRUE(plausible_cost({"", 4, 9, {}}, {10, 18}, RaceClock::wall));
+  EXPECT_THAT(plausible_cost({"", 4, 9, {}}, {10, 18}, RaceClock::cpu).error().message,
+              HasSubstr("--clock cpu"));
 }
 
 }  // namespace

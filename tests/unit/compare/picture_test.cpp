@@ -1,5 +1,5 @@
 // Pictures handed in by others.
-#include "cli/compare/picture.h"
+#include "compare/picture.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "cli/compare/references.h"
-#include "common/image/exr_file.h"
+#include "common/image/exr/exr_file.h"
+#include "compare/references.h"
 
 namespace ls::race {
 namespace {

@@ -1,5 +1,5 @@
 // Programs that end well, badly, or not at all.
-#include "cli/compare/program.h"
+#include "compare/program.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Races of made-up entrants whose pictures have a known error.
-#include "cli/compare/race.h"
+#include "compare/race.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "cli/compare/summary.h"
+#include "compare/summary.h"
 
 namespace ls::race {
 namespace {

@@ -1,5 +1,5 @@
 // Curves, predictions and the files that are made of them.
-#include "cli/compare/results.h"
+#include "compare/results.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

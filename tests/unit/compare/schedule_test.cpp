@@ -1,5 +1,5 @@
 // Turns, rounds and runs of a race, at times that are told.
-#include "cli/compare/schedule.h"
+#include "compare/schedule.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Intervals over seeds, against figures worked out by hand.
-#include "cli/compare/statistics.h"
+#include "compare/statistics.h"
 
 #include <gtest/gtest.h>
 

@@ -200,7 +200,7 @@ TEST(AdaptiveStop, ForeseesWhereItWillEnd) {
   const auto out = stop_at_once(grid, kMany, .003, error);
   for (TileIndex t = 0; t < 3; ++t) {
     const double there = static_cast<double>(spp_of(out, t)),
-                 told = static_cast<double>(round_range(rule.foreseen(t) - 1).s1);
+                 told = static_cast<double>(round_range(rule.predicted_last(t) - 1).s1);
     EXPECT_NEAR(told, there, .091 * there + 64) << t;
   }
   EXPECT_NEAR(*rule.samples_left(), 3 * 1024 * (out.mean_spp - 8), 3 * 1024 * (.091 * out.mean_spp + 64));

@@ -13,12 +13,12 @@ TEST(Failure, OnlyAWorkerThatHoldsTheUnitCanFailIt) {
   JobPlan plan = plan_of("j", 1, 2);
   rig.submit(plan);
   const bool first = !rig.held[{"holder"}].empty();
-  const std::string liar = first ? "stranger" : "holder";
+  const std::string faulty = first ? "stranger" : "holder";
   const UnitKey unit{{"j"}, 0, 0};
 
   for (int i = 0; i < 5; ++i) {
     for (const bool scene_at_fault : {false, true})
-      rig.send(UnitFailed{{liar}, {unit, {"t-1"}, scene_at_fault, "I say so", {}, {}, {}}});
+      rig.send(UnitFailed{{faulty}, {unit, {"t-1"}, scene_at_fault, "I say so", {}, {}, {}}});
   }
 
   EXPECT_EQ(rig.job().state, JobState::running);

@@ -78,10 +78,10 @@ const Story kStories[] = {
        return rig.send(JobPaused{{"j"}});
      }},
     {FreedCause::round_reopened, extend_while_its_cut_round_is_out},
-    {FreedCause::worker_barred,
+    {FreedCause::worker_quarantined,
      [](Rig& rig) {
        lend(rig);
-       return rig.send(WorkerBarred{{"w"}, "found elsewhere"});
+       return rig.send(WorkerQuarantined{{"w"}, "found elsewhere"});
      }},
     {FreedCause::not_wanted, stop_by_error_with_rounds_ahead},
     {FreedCause::job_ended,

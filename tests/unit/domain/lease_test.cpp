@@ -105,7 +105,7 @@ TEST(Lease, TwoLeasesWaitBehindTheOneThatIsRendered) {
 
   for (int i = 0; i < 20; ++i) {
     rig.render("w");
-    EXPECT_GE(rig.worker("w").leases, kLeasesPerWorker);
+    EXPECT_GE(rig.worker("w").leases, kQueuedLeases);
   }
 }
 

@@ -117,7 +117,7 @@ void Month::see(int home, const Effect& effect) {
                           StoredJob& job = jobs_.at(e.unit.job);
                           if (!job.accepted.emplace(std::pair(e.unit.tile, e.unit.round), e).second)
                             blame("a unit is accepted twice");
-                          if (barred_[at].contains(e.worker.value))
+                          if (quarantined_[at].contains(e.worker.value))
                             blame("a result of a barred worker is accepted");
                           ++counts_.units;
                         },
@@ -128,11 +128,11 @@ void Month::see(int home, const Effect& effect) {
                           if (e.to == JobState::failed || e.to == JobState::cancelled) see_end(e.job);
                         },
                         [&](const JobFinished& e) { see_end(e.job); },
-                        [&](const WorkerDistrusted& e) {
+                        [&](const WorkerFoundFaulty& e) {
                           if (!liars_.contains(e.worker.value))
                             blame("an honest worker is barred: " + e.evidence);
-                          ++counts_.barred;
-                          barred_[at].insert(e.worker.value);
+                          ++counts_.quarantined;
+                          quarantined_[at].insert(e.worker.value);
                         },
                         [&](const TileDiscarded& e) {
                           StoredJob& job = jobs_.at(e.job);
@@ -186,7 +186,7 @@ void Month::see_end(const JobId& id) {
       return blame("a done job lacks rounds");
     for (RoundIndex k = 0; k < job.film[t].size(); ++k) {
       const RecordUnit& by = job.accepted.at({t, k});
-      if (barred_[static_cast<std::size_t>(job.home)].contains(by.worker.value))
+      if (quarantined_[static_cast<std::size_t>(job.home)].contains(by.worker.value))
         return blame("something of a barred worker's is in an image");
       if (job.film[t][k] != honest({id, t, k}, cut_range(k, *job.plan.spp)) &&
           !liars_.contains(by.worker.value))
@@ -245,8 +245,8 @@ void Month::arrive() {
   const std::string name = "w" + std::to_string(counts_.workers++);
   Worker& worker = workers_[name];
   worker.threads = 1 + static_cast<int>(pick(4));
-  worker.liar = chance(kLiars);
-  if (worker.liar) liars_.insert(name);
+  worker.faulty = chance(kLiars);
+  if (worker.faulty) liars_.insert(name);
   later(about(kWorkerLives), What::leave, name);
   join(name, up_[kDies] && chance(.5) ? kDies : kLives);
 }
@@ -286,7 +286,7 @@ void Month::rendered(const std::string& name, const Rig::Held& unit) {
     ++counts_.failures;
     return send(worker.home, UnitFailed{{name}, {unit.key(), unit.lease, false, "crashed", 11, {}, {}}});
   }
-  const bool lies = worker.liar && chance(.5);
+  const bool lies = worker.faulty && chance(.5);
   const Digest digest = lies ? digest_number(1 + pick(1000)) : honest(unit.key(), unit.unit.samples);
   // Its connection may have been to the coordinator that had the job before.
   send(worker.home, UnitAccepted{unit.key(), unit.unit.samples, digest, {name}, 40});
@@ -316,8 +316,8 @@ void Month::coordinator_dies() {
     std::erase_if(jobs_, [&](const auto& j) { return j.second.home == kDies && j.second.ended; });
     counts_.takeovers += orphans.size();
     if (!orphans.empty())  // their records say who has lied
-      for (const std::string& liar : barred_[kDies])
-        if (barred_[kLives].insert(liar).second) send(kLives, WorkerBarred{{liar}, "lied"});
+      for (const std::string& faulty : quarantined_[kDies])
+        if (quarantined_[kLives].insert(faulty).second) send(kLives, WorkerQuarantined{{faulty}, "lied"});
     for (const JobId& id : orphans) give(kLives, id, false);
     later(60s, What::coordinator_back);
   }
@@ -327,8 +327,8 @@ void Month::coordinator_dies() {
 
 void Month::come_back(int home, bool with_results) {
   up_[static_cast<std::size_t>(home)] = true;
-  for (const std::string& liar : barred_[static_cast<std::size_t>(home)])
-    farms_[static_cast<std::size_t>(home)].handle(WorkerBarred{{liar}, "lied"}, now_);
+  for (const std::string& faulty : quarantined_[static_cast<std::size_t>(home)])
+    farms_[static_cast<std::size_t>(home)].handle(WorkerQuarantined{{faulty}, "lied"}, now_);
   std::vector<JobId> own;
   for (const auto& [id, job] : jobs_)
     if (job.home == home && !job.ended) own.push_back(id);

@@ -27,7 +27,7 @@ class Month {
 
   struct Counts {
     std::uint64_t events = 0, submitted = 0, ended = 0, units = 0, again = 0, workers = 0, failures = 0,
-                  restarts = 0, takeovers = 0, audits = 0, barred = 0, user_acts = 0;
+                  restarts = 0, takeovers = 0, audits = 0, quarantined = 0, user_acts = 0;
   };
   const Counts& counts() const { return counts_; }
   // Of the coordinator that lives all the time.
@@ -36,7 +36,7 @@ class Month {
  private:
   struct Worker {
     int home = 0;  // the coordinator that it is connected to
-    bool connected = false, liar = false;
+    bool connected = false, faulty = false;
     std::uint64_t epoch = 0;
     int threads = 1, busy = 0;
     std::deque<Rig::Held> held;
@@ -95,7 +95,7 @@ class Month {
   std::map<std::string, Worker> workers_;
   std::map<JobId, StoredJob> jobs_;
   std::set<std::string> liars_;
-  std::array<std::set<std::string>, 2> barred_;  // by the coordinator that knows
+  std::array<std::set<std::string>, 2> quarantined_;  // by the coordinator that knows
   std::deque<std::pair<int, UnitFolded>> to_fold_;
   Counts counts_;
   std::string wrong_;

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/domain/farm.h"
+#include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
 
 namespace ls::coordinator {

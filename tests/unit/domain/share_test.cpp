@@ -16,7 +16,7 @@ JobPlan plan_for(const std::string& owner, const std::string& id, int tiles = 40
 // Of a farm of four workers with two threads: what one lease and the unit that ends it can be too much, for
 // each of them, and what the farm may prefer worlds that are loaded for.
 constexpr double kThreads = 8;
-constexpr double kBound = kThreads * (kLeasesPerWorker * kLeaseSeconds + 1) + kThreads * kLocalitySeconds;
+constexpr double kBound = kThreads * (kQueuedLeases * kLeaseSeconds + 1) + kThreads * kLocalitySeconds;
 
 Clockwork four_workers(Farm::Options options = {.lease_prefix = "t"}) {
   Clockwork work(std::move(options));
@@ -88,7 +88,7 @@ TEST(Shares, CountWithinAPriorityOnly) {
 
   work.run(20);
 
-  EXPECT_GT(work.seconds["urgent"], 20 * kThreads - 2 * kThreads * kLeasesPerWorker * kLeaseSeconds);
+  EXPECT_GT(work.seconds["urgent"], 20 * kThreads - 2 * kThreads * kQueuedLeases * kLeaseSeconds);
 }
 
 // Users with any number of jobs of any cost, workers that come and go: who has work all the time has had as
@@ -124,8 +124,7 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
     for (const auto& [id, owner] : owners) had[owner] += work.seconds[id];
     const auto [least, most] = std::minmax_element(
         had.begin(), had.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    EXPECT_LE(most->second - least->second,
-              threads * (kLeasesPerWorker * kLeaseSeconds + 2 + kLocalitySeconds))
+    EXPECT_LE(most->second - least->second, threads * (kQueuedLeases * kLeaseSeconds + 2 + kLocalitySeconds))
         << "seed " << seed;
   }
 }
@@ -298,7 +297,7 @@ TEST(Locality, WorkersStayWithTheWorldTheyHoldAndNobodyStarves) {
 
   EXPECT_LT(work.units["two"].size(), 8u) << "half of the farm is enough for half of its time";
   EXPECT_NEAR(work.seconds["one"] - before, work.seconds["two"],
-              8 * (kLeasesPerWorker * kLeaseSeconds + 1) + 2 * 8 * kLocalitySeconds);
+              8 * (kQueuedLeases * kLeaseSeconds + 1) + 2 * 8 * kLocalitySeconds);
 }
 
 TEST(Tail, CopiesOfTheSlowestUnitsEndAJobSooner) {

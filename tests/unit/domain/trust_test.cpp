@@ -175,25 +175,25 @@ TEST(Audit, IsNotEndedByTheWordOfAWorkerThatNobodyAsked) {
   EXPECT_EQ(rig.farm.audits().equal, 0u);
 }
 
-TEST(Audit, DoesNotGoOnByTheWordOfABarredWorker) {
+TEST(Audit, DoesNotGoOnByTheWordOfAQuarantinedWorker) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
   rig.join("a", 1);
   rig.join("c", 1);
 
-  rig.send(WorkerBarred{{"b"}, "found out elsewhere"});
+  rig.send(WorkerQuarantined{{"b"}, "found out elsewhere"});
 
   EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
 }
 
-TEST(Liar, WhatItsPixelsWereACheckpointOfIsOneAgain) {
+TEST(FaultyWorker, WhatItsPixelsWereACheckpointOfIsOneAgain) {
   Rig rig(audited_farm(0));
   rig.join("a", 1);
   rig.submit(plan_of("j", 2, 6));
   rig.render("a");
   ASSERT_EQ(of<Checkpoint>(rig.render("a")).size(), 1u);
 
-  rig.send(WorkerBarred{{"a"}, "found out elsewhere"});
+  rig.send(WorkerQuarantined{{"a"}, "found out elsewhere"});
   rig.join("b", 1);
   const auto effects = rig.render_all();
 
@@ -208,8 +208,8 @@ TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
 
   const auto effects = rig.render_all();
 
-  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
-  EXPECT_EQ(of<WorkerDistrusted>(effects)[0].worker.value, "a");
+  ASSERT_EQ(of<WorkerFoundFaulty>(effects).size(), 1u);
+  EXPECT_EQ(of<WorkerFoundFaulty>(effects)[0].worker.value, "a");
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
@@ -223,8 +223,8 @@ TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
 
   const auto effects = rig.render_all();
 
-  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
-  EXPECT_EQ(of<WorkerDistrusted>(effects)[0].worker.value, "b");
+  ASSERT_EQ(of<WorkerFoundFaulty>(effects).size(), 1u);
+  EXPECT_EQ(of<WorkerFoundFaulty>(effects)[0].worker.value, "b");
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
@@ -250,7 +250,7 @@ TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
   EXPECT_EQ(rig.farm.audit(), "");
 }
 
-TEST(Liar, IsFoundByAThirdWorkerBarredAndItsTilesAreRenderedAgain) {
+TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) {
   Clockwork work(audited_farm(.01));
   for (int i = 0; i < 8; ++i) work.join("w" + std::to_string(i), 2);
   work.pixels = liars({"w3"});
@@ -261,15 +261,15 @@ TEST(Liar, IsFoundByAThirdWorkerBarredAndItsTilesAreRenderedAgain) {
 
   EXPECT_EQ(work.rig.job().state, JobState::done);
   EXPECT_TRUE(all_honest(work, plan));
-  const auto found = work.seen<WorkerDistrusted>();
+  const auto found = work.seen<WorkerFoundFaulty>();
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].worker.value, "w3");
   EXPECT_THAT(found[0].evidence, testing::HasSubstr("both rendered it to"));
   EXPECT_FALSE(work.seen<TileDiscarded>().empty());
-  EXPECT_TRUE(work.rig.farm.barred({"w3"}));
+  EXPECT_TRUE(work.rig.farm.quarantined({"w3"}));
   EXPECT_EQ(work.rig.worker("w3").state, WorkerState::sick);
   EXPECT_TRUE(work.rig.held[{"w3"}].empty());
-  EXPECT_EQ(work.rig.farm.audits().workers_barred, 1u);
+  EXPECT_EQ(work.rig.farm.audits().workers_quarantined, 1u);
 }
 
 // Takes the unit from the worker that was asked to render it again.
@@ -287,7 +287,7 @@ std::vector<Effect> says(Rig& rig, const Rig::Held& unit, const std::string& wor
   return rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest, {worker}, .1});
 }
 
-TEST(Liar, WhoFoundItFirstDoesNotMatter) {
+TEST(FaultyWorker, WhoFoundItFirstDoesNotMatter) {
   for (const bool lies_first : {false, true}) {
     Rig rig(audited_farm(1));
     for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
@@ -302,8 +302,8 @@ TEST(Liar, WhoFoundItFirstDoesNotMatter) {
 
     const auto verdict = says(rig, unit, asked(rig, unit.key()), truth);
 
-    ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
-    EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, lies_first ? "a" : second);
+    ASSERT_EQ(of<WorkerFoundFaulty>(verdict).size(), 1u);
+    EXPECT_EQ(of<WorkerFoundFaulty>(verdict)[0].worker.value, lies_first ? "a" : second);
     EXPECT_EQ(of<TileDiscarded>(verdict).size(), lies_first ? 1u : 0u);
     rig.render_all();
     EXPECT_EQ(rig.job().state, JobState::done);
@@ -311,30 +311,30 @@ TEST(Liar, WhoFoundItFirstDoesNotMatter) {
   }
 }
 
-TEST(Liar, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
+TEST(FaultyWorker, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "c", "d", "x1", "x2"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
   const Rig::Held unit = rig.take("h");
   rig.result("h", unit);
 
-  for (const char* liar : {"x1", "x2"})
-    EXPECT_TRUE(of<WorkerDistrusted>(says(rig, unit, liar, digest_number(666))).empty()) << liar;
+  for (const char* faulty : {"x1", "x2"})
+    EXPECT_TRUE(of<WorkerFoundFaulty>(says(rig, unit, faulty, digest_number(666))).empty()) << faulty;
   EXPECT_EQ(rig.job().state, JobState::running);
   const std::string third = asked(rig, unit.key());
   ASSERT_THAT(third, testing::AnyOf("c", "d")) << "not who accuses";
 
   const auto verdict = says(rig, unit, third, honest(unit.key(), unit.unit.samples));
 
-  ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
-  EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, "x1");
-  EXPECT_FALSE(rig.farm.barred({"h"}));
+  ASSERT_EQ(of<WorkerFoundFaulty>(verdict).size(), 1u);
+  EXPECT_EQ(of<WorkerFoundFaulty>(verdict)[0].worker.value, "x1");
+  EXPECT_FALSE(rig.farm.quarantined({"h"}));
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
   EXPECT_EQ(rig.farm.audit(), "");
 }
 
-TEST(Liar, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
+TEST(FaultyWorker, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "x"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -348,7 +348,7 @@ TEST(Liar, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Liar, ALateResultCountsSinceItsWorkerWasAsked) {
+TEST(FaultyWorker, ALateResultCountsSinceItsWorkerWasAsked) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "x", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 3, 2));
@@ -362,11 +362,11 @@ TEST(Liar, ALateResultCountsSinceItsWorkerWasAsked) {
   says(rig, unit, "x", digest_number(666));
   const auto verdict = says(rig, unit, asked(rig, unit.key()), honest(unit.key(), unit.unit.samples));
 
-  ASSERT_EQ(of<WorkerDistrusted>(verdict).size(), 1u);
-  EXPECT_EQ(of<WorkerDistrusted>(verdict)[0].worker.value, "x");
+  ASSERT_EQ(of<WorkerFoundFaulty>(verdict).size(), 1u);
+  EXPECT_EQ(of<WorkerFoundFaulty>(verdict)[0].worker.value, "x");
 }
 
-TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
+TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
   Rig rig(audited_farm(0));
   for (const char* name : {"a", "b"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -374,7 +374,7 @@ TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
   rig.result("a", unit);
   ASSERT_FALSE(rig.held[{"a"}].empty());
 
-  const auto effects = rig.send(WorkerBarred{{"a"}, "it rendered wrong pixels of job x"});
+  const auto effects = rig.send(WorkerQuarantined{{"a"}, "it rendered wrong pixels of job x"});
 
   EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
   EXPECT_TRUE(rig.held[{"a"}].empty());
@@ -385,7 +385,7 @@ TEST(Liar, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Liar, OneThatContradictsItselfNeedsNoThirdWorker) {
+TEST(FaultyWorker, OneThatContradictsItselfNeedsNoThirdWorker) {
   Rig rig(audited_farm(0));
   rig.join("a", 1);
   rig.join("b", 1);
@@ -395,12 +395,12 @@ TEST(Liar, OneThatContradictsItselfNeedsNoThirdWorker) {
 
   const auto effects = rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest_number(5), {"a"}, .1});
 
-  ASSERT_EQ(of<WorkerDistrusted>(effects).size(), 1u);
+  ASSERT_EQ(of<WorkerFoundFaulty>(effects).size(), 1u);
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Liar, ThreeDifferentAnswersFailTheJob) {
+TEST(FaultyWorker, ThreeDifferentAnswersFailTheJob) {
   Rig rig(audited_farm(1));
   for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -412,18 +412,18 @@ TEST(Liar, ThreeDifferentAnswersFailTheJob) {
 
   ASSERT_EQ(of<JobFailed>(effects).size(), 1u);
   EXPECT_THAT(of<JobFailed>(effects)[0].error, testing::HasSubstr("no third one agrees"));
-  EXPECT_TRUE(of<WorkerDistrusted>(effects).empty());
+  EXPECT_TRUE(of<WorkerFoundFaulty>(effects).empty());
 }
 
 // With a job that another coordinator had, and knew the liar by.
-TEST(Liar, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
+TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   Rig rig(audited_farm(0));
   rig.join("a", 1);
   rig.join("b", 1);
   rig.submit(plan_of("j", 6, 2));
   ASSERT_GT(rig.worker("a").units_out, 0u);
 
-  const auto effects = rig.send(WorkerBarred{{"a"}, "barred: it lied"});
+  const auto effects = rig.send(WorkerQuarantined{{"a"}, "barred: it lied"});
 
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
@@ -434,9 +434,9 @@ TEST(Liar, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
+TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
   Rig rig(audited_farm(0));
-  rig.send(WorkerBarred{{"a"}, "it rendered wrong pixels of job x"});
+  rig.send(WorkerQuarantined{{"a"}, "it rendered wrong pixels of job x"});
   rig.join("a", 1);
   rig.submit(plan_of("j", 6, 2));
   EXPECT_TRUE(rig.held[{"a"}].empty());
@@ -451,11 +451,11 @@ TEST(Liar, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
 
 // Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin
 // again.
-TEST(Liar, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
-  const auto ends = [](bool with_liar) {
-    Clockwork work(audited_farm(with_liar ? .05 : 0));
+TEST(FaultyWorker, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
+  const auto ends = [](bool with_faulty_worker) {
+    Clockwork work(audited_farm(with_faulty_worker ? .05 : 0));
     for (int i = 0; i < 5; ++i) work.join("w" + std::to_string(i), 2);
-    if (with_liar) work.pixels = liars({"w2"});
+    if (with_faulty_worker) work.pixels = liars({"w2"});
     JobPlan plan = plan_of("j", 4, 4096);
     plan.grid = {{4 * 32, 32}, 32};
     plan.target_error = 1 / 400.;
@@ -467,7 +467,7 @@ TEST(Liar, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
     work.rig.submit(plan);
     work.run();
     EXPECT_EQ(work.rig.job().state, JobState::done);
-    EXPECT_EQ(work.seen<WorkerDistrusted>().size(), with_liar ? 1u : 0u);
+    EXPECT_EQ(work.seen<WorkerFoundFaulty>().size(), with_faulty_worker ? 1u : 0u);
     std::vector<RoundIndex> rounds;
     for (TileIndex t = 0; t < 4; ++t) rounds.push_back(work.rig.farm.tile({"j"}, t)->rounds_folded);
     return rounds;

@@ -11,7 +11,7 @@ Walk::Walk(std::uint64_t seed) : random_(seed), farm_(Farm::Options{"r0"}) {
   };
   if (chance(50)) limits_ = {some(4), some(12), some(4), some(16)};
   if (chance(33)) audit_rate_ = chance(50) ? 1 : .2;
-  if (audit_rate_ > 0 && chance(50)) liar_ = "w" + std::to_string(1 + pick(3));
+  if (audit_rate_ > 0 && chance(50)) faulty_ = "w" + std::to_string(1 + pick(3));
   farm_ = Farm(options());
 }
 
@@ -23,7 +23,7 @@ Farm::Options Walk::options() const {
 }
 
 Digest Walk::pixels(const std::string& worker, const UnitKey& unit, const SampleRange& range) {
-  return worker == liar_ && chance(70) ? digest_number(1 + pick(1000)) : honest(unit, range);
+  return worker == faulty_ && chance(70) ? digest_number(1 + pick(1000)) : honest(unit, range);
 }
 
 std::string Walk::run(int events) {
@@ -223,7 +223,7 @@ void Walk::restart() {
   }
   farm_ = std::move(fresh);
   for (auto& [name, worker] : workers_) worker.connected = false;
-  if (found_) farm_.handle(WorkerBarred{{liar_}, "it rendered wrong pixels"}, now_);
+  if (found_) farm_.handle(WorkerQuarantined{{faulty_}, "it rendered wrong pixels"}, now_);
   for (const Event& event : restored) {
     for (const Effect& effect : farm_.handle(event, now_)) see(effect);
   }

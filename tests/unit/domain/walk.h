@@ -56,7 +56,7 @@ class Walk {
   void see_fold(const Fold& fold);
   void see_end(const JobId& id, StopReason reason);
   void see_film(const JobId& id);
-  void see_liar(const WorkerDistrusted& found);
+  void see_faulty_worker(const WorkerFoundFaulty& found);
   void see_discard(const TileDiscarded& discarded);
   void fold(const UnitFolded& folded);
   Digest pixels(const std::string& worker, const UnitKey& unit, const SampleRange& range);
@@ -78,7 +78,7 @@ class Walk {
   static double error_sum(const StoredJob& job, TileIndex tile, RoundIndex round);
 
   std::mt19937_64 random_;
-  std::string liar_;  // empty: all are honest
+  std::string faulty_;  // empty: all are honest
   bool found_ = false;
   std::set<JobId> ended_before_;  // the liar was found, or a restart: what it had rendered of them stands
   ShareLimits limits_;

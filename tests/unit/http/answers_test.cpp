@@ -4,7 +4,7 @@
 #include <fstream>
 #include <future>
 
-#include "coordinator/http/process_figures.h"
+#include "coordinator/http/api/process_figures.h"
 #include "tests/unit/http/server_fixture.h"
 
 namespace ls::http::testing {

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <set>
 
-#include "coordinator/http/problem.h"
-#include "coordinator/http/spec_query.h"
+#include "coordinator/http/api/spec_query.h"
+#include "coordinator/http/message/problem.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

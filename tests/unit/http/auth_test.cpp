@@ -1,4 +1,4 @@
-#include "coordinator/http/auth.h"
+#include "coordinator/http/auth/auth.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "coordinator/http/token_file.h"
+#include "coordinator/http/auth/token_file.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -16,8 +16,8 @@ std::int64_t now = 1'000'000;
 
 class AuthTest : public ::testing::Test {
  protected:
-  TokenBook book{kToken, kJoinToken};
-  Auth auth{book, {}, [] { return now; }};
+  TokenRegistry tokens{kToken, kJoinToken};
+  Auth auth{tokens, {}, [] { return now; }};
 
   std::string cookie(std::string_view token = kToken) {
     const std::string set = std::get<std::string>(auth.open_session({}, token));
@@ -84,7 +84,7 @@ TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
 TEST_F(AuthTest, SurvivesARestartOfTheCoordinator) {
   const std::string before = cookie();
 
-  const TokenBook same(kToken, "another join token");
+  const TokenRegistry same(kToken, "another join token");
   Auth restarted(same, {}, [] { return now; });
 
   EXPECT_TRUE(std::holds_alternative<Caller>(
@@ -111,7 +111,7 @@ TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
 }
 
 TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
-  const auto made = book.add(Role::submit, "anna");
+  const auto made = tokens.add(Role::submit, "anna");
   ASSERT_TRUE(made);
   const std::string session = cookie(made->token);
 
@@ -121,11 +121,11 @@ TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
   EXPECT_EQ(std::get<Caller>(found).user, "anna");
   // The id inside is under the mac: it can't be made that of another token.
   std::string other = session;
-  const std::string admin_id = book.list().front().id;
+  const std::string admin_id = tokens.list().front().id;
   other.replace(other.find(made->info.id), admin_id.size(), admin_id);
   EXPECT_EQ(status(Method::get, {{"cookie", other}}), 401);
 
-  ASSERT_TRUE(book.revoke(made->info.id));
+  ASSERT_TRUE(tokens.revoke(made->info.id));
   EXPECT_EQ(status(Method::get, {{"cookie", session}}), 401);
   EXPECT_EQ(status(Method::get, bearer(made->token)), 401);
 }
@@ -133,19 +133,19 @@ TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
 TEST_F(AuthTest, AJoinTokenOpensNothing) {
   EXPECT_EQ(status(Method::get, bearer(kJoinToken)), 403);
   EXPECT_EQ(std::get<Response>(auth.open_session({}, kJoinToken)).status, 403);
-  EXPECT_TRUE(book.may_join(kJoinToken));
-  EXPECT_FALSE(book.may_join(kToken));
-  EXPECT_FALSE(book.may_join(""));
+  EXPECT_TRUE(tokens.may_join(kJoinToken));
+  EXPECT_FALSE(tokens.may_join(kToken));
+  EXPECT_FALSE(tokens.may_join(""));
 }
 
 TEST_F(AuthTest, OverTlsTheCookieIsForTlsAlone) {
-  Auth over_tls(book, {.secure = true}, [] { return now; });
+  Auth over_tls(tokens, {.secure = true}, [] { return now; });
   EXPECT_NE(std::get<std::string>(over_tls.open_session({}, kToken)).find("; Secure"), std::string::npos);
   EXPECT_EQ(std::get<std::string>(auth.open_session({}, kToken)).find("; Secure"), std::string::npos);
 }
 
 TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
-  Auth strict(book, {.failures = {.per_second = .5, .burst = 3}}, [] { return now; });
+  Auth strict(tokens, {.failures = {.per_second = .5, .burst = 3}}, [] { return now; });
   const auto ask = [&](const std::string& token, const std::string& from) {
     Request r = request(Method::get, "/api/v1/jobs", bearer(token));
     r.peer = from;
@@ -153,7 +153,7 @@ TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
     const auto* refused = std::get_if<Response>(&found);
     return refused ? refused->status : 200;
   };
-  const std::string read = book.add(Role::read, "").value().token;
+  const std::string read = tokens.add(Role::read, "").value().token;
   EXPECT_EQ(ask(kToken, "10.0.0.1"), 200);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(ask("wrong", "10.0.0.1"), 401) << i;
 
@@ -166,7 +166,7 @@ TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
 }
 
 TEST_F(AuthTest, ATokenHasItsOwnShareOfRequests) {
-  Auth strict(book, {.requests = {.per_second = 2, .burst = 4}}, [] { return now; });
+  Auth strict(tokens, {.requests = {.per_second = 2, .burst = 4}}, [] { return now; });
   const Request r = request(Method::get, "/api/v1/jobs");
   const Caller anna{Role::submit, "anna", "a"}, bert{Role::submit, "bert", "b"};
   for (int i = 0; i < 4; ++i) EXPECT_FALSE(strict.too_often(r, &anna)) << i;

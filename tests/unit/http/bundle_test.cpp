@@ -1,5 +1,5 @@
 // Bundles, good and hostile ones; all are written here with libarchive.
-#include "coordinator/http/bundle.h"
+#include "coordinator/http/bundle/bundle.h"
 
 #include <archive.h>
 #include <archive_entry.h>

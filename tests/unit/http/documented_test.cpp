@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/assemble/report.h"
-#include "coordinator/views.h"
+#include "coordinator/assemble/job_report.h"
+#include "coordinator/views/views.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -36,7 +36,7 @@ TEST(Documented, AreAllFiguresOfAReport) {
   facts.error = ImageError{};
   for (const double spp : {2., 4., 8., 16.}) {
     coordinator::ConvergencePoint point{spp, spp, spp, {1, .1 / spp, .05 / spp, .2 / spp, .9, 1.1}};
-    point.truth = coordinator::TrueFigures{1, .1 / spp, .5};
+    point.reference_error = coordinator::ReferenceError{1, .1 / spp, .5};
     facts.convergence.push_back(point);
   }
 

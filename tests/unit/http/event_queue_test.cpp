@@ -1,8 +1,8 @@
-#include "coordinator/http/event_queue.h"
+#include "coordinator/http/net/event_queue.h"
 
 #include <gtest/gtest.h>
 
-#include "coordinator/http/head_text.h"
+#include "coordinator/http/net/head_text.h"
 
 namespace ls::http {
 namespace {

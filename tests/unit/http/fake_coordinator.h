@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/service.h"
+#include "coordinator/service/coordinator.h"
 
 namespace ls::http::testing {
 
@@ -219,12 +219,12 @@ class FakeCoordinator final : public Coordinator {
   }
 
   BlobStore& blobs() override { return store; }
-  Result<std::optional<Elsewhere>> elsewhere(const JobId& id) override {
+  Result<std::optional<JobLocation>> locate_job(const JobId& id) override {
     if (before_asking_others) before_asking_others();
     const auto found = others.find(id.value);
     return found == others.end() ? std::nullopt : std::optional(found->second);
   }
-  std::map<std::string, Elsewhere> others;  // jobs that other coordinators have
+  std::map<std::string, JobLocation> others;  // jobs that other coordinators have
   std::function<void()> before_asking_others;
   std::filesystem::path final_file(const JobId&, const std::string& name) const override {
     return files.empty() ? files : files / name;

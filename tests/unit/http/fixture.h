@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/http/api.h"
-#include "coordinator/http/uri.h"
+#include "coordinator/http/api/api.h"
+#include "coordinator/http/message/uri.h"
 #include "tests/unit/http/fake_coordinator.h"
 
 namespace ls::http::testing {
@@ -46,7 +46,9 @@ class ApiTest : public ::testing::Test {
     const BodyKind kind = api.body_kind(*match.route, r);
     if (kind != BodyKind::blob && kind != BodyKind::archive) {
       Response answer = api.handle(match, r);
-      return api.may_be_elsewhere(match, answer) ? api.ask_elsewhere(match, r, std::move(answer)) : answer;
+      return api.may_be_another_coordinators(match, answer)
+                 ? api.ask_other_coordinator(match, r, std::move(answer))
+                 : answer;
     }
     auto opened = api.open_upload(match, r);
     if (auto* response = std::get_if<Response>(&opened)) return *response;
@@ -78,7 +80,7 @@ class ApiTest : public ::testing::Test {
 
   FakeCoordinator coordinator;
   Limits limits{.blob_bytes = 1000};
-  TokenBook tokens{kToken, kJoinToken};
+  TokenRegistry tokens{kToken, kJoinToken};
   Api api{coordinator, tokens, limits, StaticFiles(kPages)};
 };
 

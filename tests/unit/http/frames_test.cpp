@@ -1,5 +1,5 @@
 // Sequences at the HTTP door: the range goes in, ?frame= names one film, and streams tell of all frames.
-#include "coordinator/http/event_queue.h"
+#include "coordinator/http/net/event_queue.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

@@ -1,6 +1,6 @@
 // What a submit token sees of jobs, workers and events: its own. (All routes:
 // tests/system/test_authorisation.py.)
-#include "coordinator/http/visible.h"
+#include "coordinator/http/auth/visible.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -96,12 +96,12 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
 }
 
 TEST(Visible, AWorkerWithoutAJobMayNotSayWhatItDidOfOthers) {
-  const coordinator::StreamEvent barred{
+  const coordinator::StreamEvent quarantined{
       3, "worker", R"({"job":null,"activity":"barred: it rendered tile 3 of job j-1"})", "", ""};
-  const auto hidden = visible(barred, {Role::submit, "anna", "a"});
+  const auto hidden = visible(quarantined, {Role::submit, "anna", "a"});
   ASSERT_TRUE(hidden);
   EXPECT_EQ(json::parse(hidden->data)["activity"], "");
-  EXPECT_EQ(visible(barred, {Role::read, "", "r"})->data, barred.data);
+  EXPECT_EQ(visible(quarantined, {Role::read, "", "r"})->data, quarantined.data);
 }
 
 TEST(Visible, ToOneOfNoRoleNothingIs) {

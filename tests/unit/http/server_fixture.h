@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "coordinator/http/server.h"
+#include "coordinator/http/net/http_server.h"
 #include "tests/unit/http/fixture.h"
 #include "tests/unit/http/raw_client.h"
 
@@ -67,7 +67,7 @@ class ServerTest : public ::testing::Test {
   }
 
   FakeCoordinator coordinator;
-  TokenBook tokens{kToken};
+  TokenRegistry tokens{kToken};
   std::optional<Api> api;
   std::unique_ptr<Server> server;
 };

@@ -1,5 +1,5 @@
 // The server loop on a real port, with strangers that behave badly.
-#include "coordinator/http/server.h"
+#include "coordinator/http/net/http_server.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "coordinator/http/uri.h"
+#include "coordinator/http/message/uri.h"
 
 #include <gtest/gtest.h>
 
-#include "coordinator/http/limits.h"
+#include "coordinator/http/message/limits.h"
 
 namespace ls::http {
 namespace {

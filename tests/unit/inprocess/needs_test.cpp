@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/needs.h"
-#include "common/scene/serialize.h"
+#include "common/scene/analysis/needs.h"
+#include "common/scene/json/serialize.h"
 #include "tests/support/render_check.h"
 #include "worker/inprocess.h"
 
@@ -12,22 +12,22 @@ namespace {
 
 using ::testing::HasSubstr;
 
-LocalJob job_of(const test::SceneKit& kit, const test::ScratchFolder& folder) {
+LocalJob job_of(const test::SceneBuilder& builder, const test::ScratchFolder& folder) {
   LocalJob job;
-  const std::string text = serialize(kit.scene);
+  const std::string text = serialize(builder.scene);
   job.scene = folder.path() / "scene.json";
   std::ofstream(job.scene, std::ios::binary) << text;
   job.brief.job = JobId{"j-1"};
   job.brief.scene = sha256(text);
-  job.brief.settings = test::settings_of(kit.scene);
+  job.brief.settings = test::settings_of(builder.scene);
   job.brief.settings_digest = digest_of(job.brief.settings);
   return job;
 }
-test::SceneKit ball() {
-  test::SceneKit kit;
-  kit.shape(SphereShape{}, Transform{}, kit.diffuse(.5));
-  kit.environment();
-  return kit;
+test::SceneBuilder ball() {
+  test::SceneBuilder builder;
+  builder.shape(SphereShape{}, Transform{}, builder.diffuse(.5));
+  builder.environment();
+  return builder;
 }
 
 TEST(InProcess, RendersASceneWhoseNeedsAreThoseThatTheCoordinatorFound) {
@@ -40,7 +40,7 @@ TEST(InProcess, RendersASceneWhoseNeedsAreThoseThatTheCoordinatorFound) {
 TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
   const test::ScratchFolder folder;
   LocalJob job = job_of(ball(), folder);
-  test::SceneKit other = ball();
+  test::SceneBuilder other = ball();
   other.scene.emitters.push_back(PointEmitter{});
   job.brief.needs = canonical_json(scene::needs_of(other.scene, true));
 

@@ -7,8 +7,8 @@
 #include <cstring>
 #include <tuple>
 
-#include "common/image/exr_file.h"
-#include "common/image/fake_pixels.h"
+#include "common/image/exr/exr_file.h"
+#include "common/image/film/fake_pixels.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {

@@ -11,7 +11,7 @@
 
 #include "common/assets/image.h"
 #include "tests/unit/numeric_class/libraries.h"
-#include "worker/render/battery_images.h"
+#include "worker/render/numeric_class/battery_images.h"
 #include "worker/render/render.h"
 
 namespace ls::render {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "common/image/film.h"
+#include "common/image/film/film.h"
 #include "coordinator/domain/adaptive_stop.h"
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/numeric_class/libraries.h"
@@ -35,7 +35,7 @@ Partial scattered(TileIndex tile, SampleRange samples) {
 struct Decisions {
   std::vector<double> levels, predicted, errors;
   std::vector<AdaptiveStop::Verdict> verdicts;
-  std::vector<RoundIndex> ends, foreseen;
+  std::vector<RoundIndex> ends, predicted_last;
   bool operator==(const Decisions&) const = default;
 };
 
@@ -51,7 +51,7 @@ Decisions run_job() {
     if (!folded) throw std::logic_error(folded.error().message);
     out.errors.push_back(folded->relative.squares);
     rule.foresee(kTarget);
-    for (TileIndex i = 0; i < kGrid.count(); ++i) out.foreseen.push_back(rule.foreseen(i));
+    for (TileIndex i = 0; i < kGrid.count(); ++i) out.predicted_last.push_back(rule.predicted_last(i));
     return folded->relative.squares;
   };
   for (;;) {

@@ -6,13 +6,13 @@
 #include <random>
 #include <vector>
 
-#include "tests/unit/nvdb/nvdb_kit.h"
+#include "tests/unit/nvdb/nvdb_builder.h"
 #include "worker/render/vdb/refused.h"
 
 namespace ls::render {
 namespace {
 
-using test::NvdbKit;
+using test::NvdbBuilder;
 using testing::HasSubstr;
 
 struct Read {
@@ -42,7 +42,7 @@ Read read(const std::string& file, const std::string& wanted = "", std::uint64_t
 }
 
 // Active voxels 0..23, 0..7, 0..7, with a layer around them.
-void expect_the_kits_values(const Read& r, const NvdbKit& kit, float step = 1) {
+void expect_the_kits_values(const Read& r, const NvdbBuilder& builder, float step = 1) {
   ASSERT_EQ(r.error, "");
   EXPECT_EQ(r.grid.size[0], 26);
   EXPECT_EQ(r.grid.size[1], 10);
@@ -51,58 +51,58 @@ void expect_the_kits_values(const Read& r, const NvdbKit& kit, float step = 1) {
     for (int y = -1; y < 9; ++y)
       for (int x = -1; x < 25; ++x) {
         const bool inside = x >= 0 && x < 24 && y >= 0 && y < 8 && z >= 0 && z < 8;
-        const float value = kit.value(x, y, z), held = x < 16 ? std::floor(value / step) * step : value;
+        const float value = builder.value(x, y, z), held = x < 16 ? std::floor(value / step) * step : value;
         for (int c = 0; c < r.grid.channels; ++c)
-          ASSERT_EQ(r.at(x + 1, y + 1, z + 1, c),
-                    NvdbKit::of_channel(inside ? held : kit.background, static_cast<std::uint64_t>(c)))
+          ASSERT_EQ(r.at(x + 1, y + 1, z + 1, c), NvdbBuilder::of_channel(inside ? held : builder.background,
+                                                                          static_cast<std::uint64_t>(c)))
               << x << " " << y << " " << z << " " << c;
       }
 }
 
 TEST(Nvdb, ReadsEveryKindOfNumber) {
   for (const std::uint32_t type : {1, 2, 6, 7, 9, 13, 14, 15, 16}) {
-    NvdbKit kit;
-    kit.type = type;
+    NvdbBuilder builder;
+    builder.type = type;
     SCOPED_TRACE(type);
-    const Read r = read(kit.file());
-    EXPECT_EQ(r.grid.channels, static_cast<int>(kit.channels()));
-    expect_the_kits_values(r, kit, type == 13 ? 16 : 1);
+    const Read r = read(builder.file());
+    EXPECT_EQ(r.grid.channels, static_cast<int>(builder.channels()));
+    expect_the_kits_values(r, builder, type == 13 ? 16 : 1);
   }
 }
 
 TEST(Nvdb, ReadsEveryCompression) {
   for (const std::uint16_t codec : {0, 1, 2}) {
-    NvdbKit kit;
-    kit.codec = codec;
+    NvdbBuilder builder;
+    builder.codec = codec;
     SCOPED_TRACE(codec);
-    expect_the_kits_values(read(kit.file()), kit);
+    expect_the_kits_values(read(builder.file()), builder);
   }
 }
 
 TEST(Nvdb, PlacesTheGridByItsOwnMap) {
-  const NvdbKit kit;
-  const Read r = read(kit.file());
+  const NvdbBuilder builder;
+  const Read r = read(builder.file());
   // Node (0, 0, 0) is the voxel before the first active one.
-  const double x = kit.origin[0] - 1, y = kit.origin[1] - 1, z = kit.origin[2] - 1;
+  const double x = builder.origin[0] - 1, y = builder.origin[1] - 1, z = builder.origin[2] - 1;
   const double expected[16] = {.5, 0, 0, .5 * x + 1, 0, 2, 0, 2 * y + 2, 0, 0, 1, z + 3, 0, 0, 0, 1};
   for (int i = 0; i < 16; ++i) EXPECT_EQ(r.grid.index_to_scene[i], expected[i]) << i;
 }
 
 TEST(Nvdb, TilesOfTheRootAndNegativesAreReadToo) {
-  NvdbKit kit;
-  kit.background = -1;
-  std::string b = kit.buffer();
-  const Read r = read(kit.file(b));
+  NvdbBuilder builder;
+  builder.background = -1;
+  std::string b = builder.buffer();
+  const Read r = read(builder.file(b));
   EXPECT_EQ(r.at(0, 0, 0), 0);
   EXPECT_EQ(r.grid.negatives, 26u * 10 * 10 - 24 * 8 * 8);
   // Without its child the root's tile is a value.
-  NvdbKit::put(b, kit.upper() - 32 + 8, std::int64_t{0});
-  NvdbKit::put(b, kit.upper() - 32 + 20, 7.f);
-  EXPECT_EQ(read(kit.file(b)).at(5, 5, 5), 7);
+  NvdbBuilder::put(b, builder.upper() - 32 + 8, std::int64_t{0});
+  NvdbBuilder::put(b, builder.upper() - 32 + 20, 7.f);
+  EXPECT_EQ(read(builder.file(b)).at(5, 5, 5), 7);
 }
 
 TEST(Nvdb, ChoosesAGridByItsName) {
-  NvdbKit a, b;
+  NvdbBuilder a, b;
   a.name = "temperature";
   a.background = 3;
   b.codec = 1;
@@ -116,79 +116,79 @@ TEST(Nvdb, ChoosesAGridByItsName) {
 }
 
 TEST(Nvdb, RefusesWhatIsNoDensityByName) {
-  NvdbKit kit;
-  kit.grid_class = 1;
-  EXPECT_THAT(read(kit.file()).error, HasSubstr("grid 'density' is a level set"));
-  kit.grid_class = 0;
+  NvdbBuilder builder;
+  builder.grid_class = 1;
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("grid 'density' is a level set"));
+  builder.grid_class = 0;
   for (const auto& [type, name] :
        {std::pair{4u, "int32"}, {17u, "vec4f"}, {19u, "index"}, {77u, "number 77"}}) {
-    kit.type = type;
-    EXPECT_THAT(read(kit.file()).error, HasSubstr(std::string("has values of type ") + name));
+    builder.type = type;
+    EXPECT_THAT(read(builder.file()).error, HasSubstr(std::string("has values of type ") + name));
   }
-  kit.type = 1;
-  kit.version = 33u << 21;
-  EXPECT_THAT(read(kit.file()).error, HasSubstr("version 33.0; known is version 32"));
-  kit = {};
-  kit.hi = {-1, -1, -1};
-  EXPECT_THAT(read(kit.file()).error, HasSubstr("is empty"));
+  builder.type = 1;
+  builder.version = 33u << 21;
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("version 33.0; known is version 32"));
+  builder = {};
+  builder.hi = {-1, -1, -1};
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("is empty"));
 }
 
 TEST(Nvdb, RefusesWhatIsTooLargeBeforeItIsAllocated) {
-  NvdbKit kit;
-  EXPECT_THAT(read(kit.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
-  EXPECT_EQ(read(kit.file(), "", 2600).error, "");
-  kit.type = 6;
-  EXPECT_THAT(read(kit.file(), "", 7799).error, HasSubstr("2600 voxels of 3 values; the limit is 2599"));
-  EXPECT_EQ(read(kit.file(), "", 7800).error, "");
-  kit.type = 1;
-  kit.hi[1] = 20000;
-  EXPECT_THAT(read(kit.file()).error, HasSubstr("along an axis; the limit is 16384"));
-  kit = {};
-  kit.codec = 1;
-  std::string f = kit.file();
-  NvdbKit::put(f, 16, std::uint64_t{1} << 60);
+  NvdbBuilder builder;
+  EXPECT_THAT(read(builder.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
+  EXPECT_EQ(read(builder.file(), "", 2600).error, "");
+  builder.type = 6;
+  EXPECT_THAT(read(builder.file(), "", 7799).error, HasSubstr("2600 voxels of 3 values; the limit is 2599"));
+  EXPECT_EQ(read(builder.file(), "", 7800).error, "");
+  builder.type = 1;
+  builder.hi[1] = 20000;
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("along an axis; the limit is 16384"));
+  builder = {};
+  builder.codec = 1;
+  std::string f = builder.file();
+  NvdbBuilder::put(f, 16, std::uint64_t{1} << 60);
   EXPECT_THAT(read(f).error, HasSubstr("is damaged"));
 }
 
 TEST(Nvdb, RefusesDamage) {
-  const NvdbKit kit;
+  const NvdbBuilder builder;
   const auto with = [&](std::uint64_t at, auto v) {
-    std::string b = kit.buffer();
-    NvdbKit::put(b, at, v);
-    return read(kit.file(b)).error;
+    std::string b = builder.buffer();
+    NvdbBuilder::put(b, at, v);
+    return read(builder.file(b)).error;
   };
   const float nan = std::nanf("");
-  EXPECT_THAT(with(kit.leaf(0) + 96, nan),
+  EXPECT_THAT(with(builder.leaf(0) + 96, nan),
               HasSubstr("voxel (-4096, 0, 8192) of grid 'density' is not a finite"));
   EXPECT_THAT(with(0, 'X'), HasSubstr("begins with something else"));
   EXPECT_THAT(with(32, std::uint64_t{5}), HasSubstr("its sizes contradict each other"));
   EXPECT_THAT(with(672 + 24, ~std::uint64_t{0}), HasSubstr("its tree lies before it"));
   EXPECT_THAT(with(672 + 24, std::uint64_t{1} << 40), HasSubstr("damaged"));
-  EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{1} << 62), HasSubstr("damaged"));
-  EXPECT_THAT(with(kit.upper() - 32 + 8, std::int64_t{-8}), HasSubstr("points backwards"));
-  EXPECT_THAT(with(kit.lower() + 1088, std::int64_t{1} << 40), HasSubstr("damaged"));
+  EXPECT_THAT(with(builder.upper() - 32 + 8, std::int64_t{1} << 62), HasSubstr("damaged"));
+  EXPECT_THAT(with(builder.upper() - 32 + 8, std::int64_t{-8}), HasSubstr("points backwards"));
+  EXPECT_THAT(with(builder.lower() + 1088, std::int64_t{1} << 40), HasSubstr("damaged"));
   EXPECT_THAT(with(296 + 88, std::numeric_limits<double>::infinity()),
               HasSubstr("its transform is not finite"));
-  std::string b = kit.buffer();
-  NvdbKit::put(b, NvdbKit::kRoot + 24, std::uint32_t{2});
+  std::string b = builder.buffer();
+  NvdbBuilder::put(b, NvdbBuilder::kRoot + 24, std::uint32_t{2});
   std::string twice =
-      b.substr(0, kit.upper() - 32) + b.substr(kit.upper() - 32, 32) + b.substr(kit.upper() - 32);
-  NvdbKit::put(twice, 32, std::uint64_t{twice.size()});
-  EXPECT_THAT(read(kit.file(twice)).error, HasSubstr("two of its tiles are at one place"));
+      b.substr(0, builder.upper() - 32) + b.substr(builder.upper() - 32, 32) + b.substr(builder.upper() - 32);
+  NvdbBuilder::put(twice, 32, std::uint64_t{twice.size()});
+  EXPECT_THAT(read(builder.file(twice)).error, HasSubstr("two of its tiles are at one place"));
 }
 
 // A file that was cut off gives an error at whatever byte; one whose bytes were changed an answer.
 TEST(Nvdb, SurvivesTruncationsAndMutations) {
   std::mt19937 rng(5);
   for (const std::uint16_t codec : {1, 2}) {
-    NvdbKit kit;
-    kit.codec = codec;
-    const std::string file = kit.file();
+    NvdbBuilder builder;
+    builder.codec = codec;
+    const std::string file = builder.file();
     for (std::size_t n = 1; n < file.size(); n += 1 + n / 64)
       EXPECT_NE(read(file.substr(0, n)).error, "") << codec << " " << n;
   }
-  const NvdbKit kit;
-  const std::string file = kit.file();
+  const NvdbBuilder builder;
+  const std::string file = builder.file();
   for (int i = 0; i < 400; ++i) {
     std::string m = file;
     for (int e = 0; e < 4; ++e) {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "worker/render/grid.h"
+#include "worker/render/media/grid.h"
 
 namespace ls::render {
 

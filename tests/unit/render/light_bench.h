@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "tests/support/render_check.h"
-#include "worker/render/hash.h"
-#include "worker/render/world.h"
+#include "worker/render/math/random.h"
+#include "worker/render/world/world.h"
 
 namespace ls::render {
 
@@ -21,7 +21,7 @@ inline LightNumbers numbers(float light, float x, float y) {
 // A scene of one light; its world, and points given in scene coordinates.
 struct LightBench {
   std::shared_ptr<const World> world;
-  explicit LightBench(const test::SceneKit& kit) : world(test::world_of(kit)) {}
+  explicit LightBench(const test::SceneBuilder& builder) : world(test::world_of(builder)) {}
   V3 at(const V3d& p) const { return V3((p - world->geometry.center) * world->geometry.scale); }
 
   struct Irradiance {
@@ -44,14 +44,14 @@ struct LightBench {
             std::sqrt(std::max(0., square / count - mean * mean) / count)};  // of unstratified samples: more
   }
 };
-inline test::SceneKit area(const ls::Geometry& g, const Transform& t, bool flip = false) {
-  test::SceneKit kit;
-  const TextureIndex one = kit.texture({1, 1, 1});
-  const BsdfIndex black = kit.diffuse(0);
-  Shape& s = kit.shape(g, t, black);
+inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool flip = false) {
+  test::SceneBuilder builder;
+  const TextureIndex one = builder.texture({1, 1, 1});
+  const BsdfIndex black = builder.diffuse(0);
+  Shape& s = builder.shape(g, t, black);
   s.emitter = AreaEmitter{one};
   s.flip_normals = flip;
-  return kit;
+  return builder;
 }
 // 5 standard errors of what independent samples would give, and float32 (the light's offset from its own
 // surface: 2^-20 of the world).

@@ -9,7 +9,7 @@
 namespace ls::render {
 namespace {
 
-using test::SceneKit;
+using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
@@ -17,20 +17,20 @@ constexpr int kSamples = 100000;
 
 // `lights` small disks in a hall, each with a face to the middle, of strengths from 1 to 100, and some lights
 // without a place.
-SceneKit hall(int lights) {
-  SceneKit kit;
-  const BsdfIndex black = kit.diffuse(0);
+SceneBuilder hall(int lights) {
+  SceneBuilder builder;
+  const BsdfIndex black = builder.diffuse(0);
   RandomStream r(17);
   for (int i = 0; i < lights; ++i) {
     const double phi = 2 * M_PI * r.uniform(), height = 2. * r.uniform() - 1,
                  power = std::pow(10, 2. * r.uniform());
     const Vec3 at{3 * std::cos(phi), 3 * std::sin(phi), height};
-    kit.shape(DiskShape{}, test::look_at(at, {0, 0, 0}, {0, 0, 1}) * test::scale(.02), black).emitter =
-        AreaEmitter{kit.texture({power, power, power})};
+    builder.shape(DiskShape{}, test::look_at(at, {0, 0, 0}, {0, 0, 1}) * test::scale(.02), black).emitter =
+        AreaEmitter{builder.texture({power, power, power})};
   }
-  kit.scene.emitters.push_back(PointEmitter{{0, 0, 2}, {.01, .01, .01}});
-  kit.scene.emitters.push_back(DirectionalEmitter{{0, .2, -1}, {.01, .01, .01}});
-  return kit;
+  builder.scene.emitters.push_back(PointEmitter{{0, 0, 2}, {.01, .01, .01}});
+  builder.scene.emitters.push_back(DirectionalEmitter{{0, .2, -1}, {.01, .01, .01}});
+  return builder;
 }
 
 // The probability that a hit on each light claims: its density by area, divided by the point's own.
@@ -50,7 +50,7 @@ std::vector<double> claimed(const LightBench& b, const V3& x, const V3& n) {
 }
 
 TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
-  test::ChiSquareBook book("sampling/choice");
+  test::ChiSquareTally tally("sampling/choice");
   for (const int lights : {5, 300}) {
     const LightBench b(hall(lights));
     EXPECT_EQ(b.world->lights.has_tree(), lights == 300);
@@ -70,9 +70,9 @@ TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
           ++got[p[c.light] > 0 ? c.light : p.size() - 1];
         }
         for (double& q : p) q *= kSamples;
-        book.expect(fmt::format("{} lights at {} {} {}, normal {} {} {}", lights, place.x, place.y, place.z,
-                                n.x, n.y, n.z),
-                    p, got);
+        tally.expect(fmt::format("{} lights at {} {} {}, normal {} {} {}", lights, place.x, place.y, place.z,
+                                 n.x, n.y, n.z),
+                     p, got);
       }
   }
   // Triangles of a mesh by area: a cube squeezed flat, six faces of two triangles.
@@ -103,8 +103,8 @@ TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
     }
     ++got[best];
   }
-  book.expect("triangles of a mesh", p, got);
-  book.close();
+  tally.expect("triangles of a mesh", p, got);
+  tally.close();
 }
 
 }  // namespace

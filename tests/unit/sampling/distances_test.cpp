@@ -7,11 +7,11 @@
 #include "tests/support/chi_square.h"
 #include "tests/support/jacobian.h"
 #include "tests/unit/render/grids.h"
-#include "worker/render/equiangular.h"
-#include "worker/render/medium.h"
-#include "worker/render/stretch.h"
-#include "worker/render/truncated.h"
-#include "worker/render/variant.h"
+#include "worker/render/integrator/equiangular.h"
+#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/integrator/variant.h"
+#include "worker/render/media/medium.h"
+#include "worker/render/media/optical_depth.h"
 
 namespace ls::render {
 namespace {
@@ -20,7 +20,7 @@ constexpr int kCells = 64, kDistanceSamples = 100000;
 
 // Samples by cells between these edges, and a last one for what lies in none; `mass(a, b)` is the density's
 // integral.
-void compare(test::ChiSquareBook& book, const std::string& name, const std::vector<double>& edges,
+void compare(test::ChiSquareTally& tally, const std::string& name, const std::vector<double>& edges,
              const std::function<double(double, double)>& mass,
              const std::function<double(RandomStream&)>& sample) {
   std::vector<double> expected, got(edges.size(), 0);
@@ -38,7 +38,7 @@ void compare(test::ChiSquareBook& book, const std::string& name, const std::vect
     const bool in = it != edges.begin() && it != edges.end();
     ++got[in ? static_cast<std::size_t>(it - edges.begin()) - 1 : got.size() - 1];
   }
-  book.expect(name, expected, got);
+  tally.expect(name, expected, got);
 }
 
 // Of a density: Simpson's rule in 64 parts.
@@ -57,16 +57,17 @@ std::vector<double> even(double lo, double hi, int cells = kCells) {
   return e;
 }
 
-void exponentials(test::ChiSquareBook& book) {
+void exponentials(test::ChiSquareTally& tally) {
   const auto mass = [](double a, double b) { return std::exp(-a) - std::exp(-b); };
-  compare(book, "exponential of 32 bits", even(0, 8), mass,
+  compare(tally, "exponential of 32 bits", even(0, 8), mass,
           [](RandomStream& r) { return exponential(r.bits()); });
-  compare(book, "exponential of a stream", even(0, 8), mass, [](RandomStream& r) { return r.exponential(); });
+  compare(tally, "exponential of a stream", even(0, 8), mass,
+          [](RandomStream& r) { return r.exponential(); });
   for (const float depth : {1e-30f, 1e-7f, .1f, 3.f, 50.f, 1e5f})
     for (const float length : {1e-3f, 10.f}) {
       const float sigma = depth / length;
       const double reach = std::min<double>(length, 8. * length / std::max(depth, 1e-30f));
-      compare(book, fmt::format("truncated to depth {}, length {}", depth, length), even(0, reach),
+      compare(tally, fmt::format("truncated to depth {}, length {}", depth, length), even(0, reach),
               integral_of([=](double x) { return truncated_pdf(sigma, length, static_cast<float>(x)); }),
               [=](RandomStream& r) { return truncated_sample(sigma, length, (r.bits() + .5) * 0x1p-32); });
       // Half of the cells where all of the exponential share lies, if that is not everywhere.
@@ -76,7 +77,7 @@ void exponentials(test::ChiSquareBook& book) {
         const std::vector<double> rest = even(near, length, kCells / 2);
         edges.insert(edges.end(), rest.begin() + 1, rest.end());
       }
-      compare(book, fmt::format("mixed, depth {}, length {}", depth, length), edges,
+      compare(tally, fmt::format("mixed, depth {}, length {}", depth, length), edges,
               integral_of([=](double x) { return mixed_depth_pdf(sigma, length, static_cast<float>(x)); }),
               [=](RandomStream& r) { return mixed_depth_sample(sigma, length, r.bits()); });
     }
@@ -90,21 +91,21 @@ const Segment kSegments[] = {{-3, 3, .5f}, {-3, 3, .01f}, {100, 101, .01f},   {-
 EquiAngular angles(const Segment& s) { return {V3(s.a, 0, 0), V3(1, 0, 0), s.b - s.a, V3(0, s.distance, 0)}; }
 
 // Cells of equal angle about the foot: between them the density varies by orders of magnitude.
-void equiangular(test::ChiSquareBook& book) {
+void equiangular(test::ChiSquareTally& tally) {
   for (const Segment& s : kSegments) {
     const double a = std::atan2(double{s.a}, double{s.distance}),
                  b = std::atan2(double{s.b}, double{s.distance});
     std::vector<double> edges = even(a, b);
     for (double& e : edges) e = std::clamp(s.distance * std::tan(e) - s.a, 0., double{s.b} - s.a);
     edges.back() *= 1 + 1e-6;  // rounding may put the last ones at the end itself
-    compare(book, fmt::format("equi-angular {} {} at {}", s.a, s.b, s.distance), edges,
+    compare(tally, fmt::format("equi-angular {} {} at {}", s.a, s.b, s.distance), edges,
             integral_of([&](double t) { return angles(s).pdf(static_cast<float>(t)); }),
             [&](RandomStream& r) { return angles(s).sample(r.uniform()).t; });
   }
 }
 
 // The same where each channel has a density of its own: tracked, and followed exactly.
-void channel_flights(test::ChiSquareBook& book) {
+void channel_flights(test::ChiSquareTally& tally) {
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
   for (const float sigma : {.4f, 40.f}) {
     std::vector<Grid> grids;
@@ -125,7 +126,7 @@ void channel_flights(test::ChiSquareBook& book) {
       const auto depth = [&](double t) { return double{sigma} * own.exact_integral(V3d(o), V3d(d), 0, t); };
       MediumCounters counters;
       compare(
-          book, fmt::format("channel {} of a grid of {}", hero, sigma), even(1, sigma > 10 ? 3 : 14),
+          tally, fmt::format("channel {} of a grid of {}", hero, sigma), even(1, sigma > 10 ? 3 : 14),
           [&](double a, double b) { return std::exp(-depth(a)) - std::exp(-depth(b)); },
           [&](RandomStream& r) {
             const std::uint32_t bits = r.bits();
@@ -139,7 +140,7 @@ void channel_flights(test::ChiSquareBook& book) {
 }
 
 // Points that `volpath_distant_mis` proposes by depth: along the macro cells' means.
-void proposals_in_grids(test::ChiSquareBook& book) {
+void proposals_in_grids(test::ChiSquareTally& tally) {
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
   std::vector<float> plume(17 * 17 * 17, 0);
   for (std::size_t i = 0; i < plume.size(); ++i)
@@ -152,9 +153,9 @@ void proposals_in_grids(test::ChiSquareBook& book) {
     m.density = &grid;
     const float sigma = .8f;
     m.sigma_t = C3(sigma);
-    const Stretch s(m, o, d, 30);
+    const OpticalDepth s(m, o, d, 30);
     compare(
-        book, fmt::format("proposed by depth in a {} grid", name), even(s.from(), s.to() * (1 + 1e-6)),
+        tally, fmt::format("proposed by depth in a {} grid", name), even(s.from(), s.to() * (1 + 1e-6)),
         [&](double a, double b) {
           // The integral over a cell of the table, which is one of x: rate is dx / dt.
           const auto share = [&](double t) {
@@ -167,13 +168,13 @@ void proposals_in_grids(test::ChiSquareBook& book) {
         },
         [&](RandomStream& r) { return s.after(mixed_depth_sample(sigma, s.total(), r.bits())).t; });
     // And x and rate belong together.
-    const Stretch::Spot a = s.at(6), b = s.at(6.001f);
+    const OpticalDepth::Point a = s.at(6), b = s.at(6.001f);
     EXPECT_NEAR((b.x - a.x) / .001, a.rate, .01 * a.rate + 1e-3) << name;
   }
 }
 
 // First collisions of delta tracking in a grid: the hero's exact optical depth by quadrature of the voxels.
-void flights(test::ChiSquareBook& book) {
+void flights(test::ChiSquareTally& tally) {
   struct Field {
     const char* name;
     Grid grid;
@@ -202,7 +203,7 @@ void flights(test::ChiSquareBook& book) {
       MediumCounters counters;
       const double reach = f.sigma.x > 10 ? 2.5 : 14;
       compare(
-          book, fmt::format("{}, hero {}", f.name, hero), even(1, reach),
+          tally, fmt::format("{}, hero {}", f.name, hero), even(1, reach),
           [&](double a, double b) { return std::exp(-depth(a)) - std::exp(-depth(b)); },
           [&](RandomStream& r) {
             const std::uint32_t bits = r.bits();
@@ -212,13 +213,13 @@ void flights(test::ChiSquareBook& book) {
           });
       EXPECT_EQ(counters.majorant_violations, 0u) << f.name;
     }
-  channel_flights(book);
-  proposals_in_grids(book);
+  channel_flights(tally);
+  proposals_in_grids(tally);
   Medium fog;
   fog.sigma_t = C3(.2f, .5f, 2);
   for (const int hero : {0, 1, 2})
     compare(
-        book, fmt::format("homogeneous, hero {}", hero), even(0, 4),
+        tally, fmt::format("homogeneous, hero {}", hero), even(0, 4),
         [&](double a, double b) {
           return std::exp(-fog.sigma_t[hero] * a) - std::exp(-fog.sigma_t[hero] * b);
         },
@@ -232,11 +233,11 @@ void flights(test::ChiSquareBook& book) {
 }
 
 TEST(Distances, FallAsTheirDensitySays) {
-  test::ChiSquareBook book("sampling/distances");
-  exponentials(book);
-  equiangular(book);
-  flights(book);
-  book.close();
+  test::ChiSquareTally tally("sampling/distances");
+  exponentials(tally);
+  equiangular(tally);
+  flights(tally);
+  tally.close();
 }
 
 TEST(Distances, GrowByOneOverTheDensity) {

@@ -5,9 +5,9 @@
 
 #include "tests/support/chi_square.h"
 #include "tests/support/jacobian.h"
-#include "worker/render/camera.h"
-#include "worker/render/hash.h"
-#include "worker/render/pixel_filter.h"
+#include "worker/render/camera/camera.h"
+#include "worker/render/camera/pixel_filter.h"
+#include "worker/render/math/random.h"
 
 namespace ls::render {
 namespace {
@@ -59,7 +59,7 @@ V3d lens_point(const Camera& c, const V2& u) {
 }
 
 TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
-  test::ChiSquareBook book("sampling/film");
+  test::ChiSquareTally tally("sampling/film");
   for (const Filter& f : filters()) {
     constexpr int kCells = 80;
     std::vector<double> expected, got(kCells, 0);
@@ -73,7 +73,7 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
       const double x = sampled.offset(r.uniform());
       ++got[static_cast<std::size_t>(std::clamp(static_cast<int>((x + f.radius) / width), 0, kCells - 1))];
     }
-    book.expect(f.name, expected, got);
+    tally.expect(f.name, expected, got);
   }
   // Cells of equal area: rings by the square of the radius, and sectors.
   constexpr int kRings = 10, kSectors = 16;
@@ -89,8 +89,8 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
               sector = std::min(kSectors - 1, static_cast<int>((turn < 0 ? turn + 1 : turn) * kSectors));
     ++got[static_cast<std::size_t>(ring * kSectors + sector)];
   }
-  book.expect("thin lens", expected, got);
-  book.close();
+  tally.expect("thin lens", expected, got);
+  tally.close();
 }
 
 TEST(Film, MapsStretchByOneOverTheDensity) {

@@ -8,12 +8,12 @@
 #include "tests/support/jacobian.h"
 #include "tests/support/sphere_cells.h"
 #include "tests/unit/render/light_bench.h"
-#include "worker/render/transform.h"
+#include "worker/render/math/transform.h"
 
 namespace ls::render {
 namespace {
 
-using test::SceneKit;
+using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
@@ -21,7 +21,7 @@ constexpr int kLightSamples = 100000;
 
 struct Case {
   std::string name;
-  SceneKit kit;
+  SceneBuilder builder;
   V3d from;      // in the scene
   V3d towards;   // the cells' axis
   double reach;  // of the cells: 1 - cos
@@ -33,8 +33,8 @@ struct Case {
 
 std::vector<Case> cases() {
   std::vector<Case> all;
-  const auto add = [&](std::string name, SceneKit kit, V3d from, V3d to, double reach) {
-    all.push_back({std::move(name), std::move(kit), from, to - from, reach, {}, 0});
+  const auto add = [&](std::string name, SceneBuilder builder, V3d from, V3d to, double reach) {
+    all.push_back({std::move(name), std::move(builder), from, to - from, reach, {}, 0});
   };
   add("rectangle", area(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1},
       {0, 0, 2}, .2);
@@ -68,12 +68,12 @@ std::vector<Case> cases() {
     return tube.point({std::cos(2 * M_PI * u), std::sin(2 * M_PI * u), v});
   });
   for (const double angle : {.3, 5., 60., 89.}) {
-    SceneKit kit;
-    kit.shape(RectangleShape{}, translate({0, 0, -5}), kit.diffuse(.5));
+    SceneBuilder builder;
+    builder.shape(RectangleShape{}, translate({0, 0, -5}), builder.diffuse(.5));
     DirectionalEmitter sun{{.3, .2, -1}, {1, 1, 1}};
     sun.angular_radius = angle;
-    kit.scene.emitters.push_back(sun);
-    add(fmt::format("sun of {} degrees", angle), kit, {0, 0, 0}, {-.3, -.2, 1},
+    builder.scene.emitters.push_back(sun);
+    add(fmt::format("sun of {} degrees", angle), builder, {0, 0, 0}, {-.3, -.2, 1},
         1.2 * (1 - std::cos(angle * M_PI / 180)));
   }
   return all;
@@ -117,9 +117,9 @@ std::vector<double> masses_by_surface(const LightBench& b, const Case& c, const 
 }
 
 TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
-  test::ChiSquareBook book("sampling/lights");
+  test::ChiSquareTally tally("sampling/lights");
   for (const Case& c : cases()) {
-    const LightBench b(c.kit);
+    const LightBench b(c.builder);
     const V3 x = b.at(c.from);
     const test::SphereCells cells(V3(c.towards), c.reach, 12, 24);
     const auto p = c.surface ? masses_by_surface(b, c, cells)
@@ -133,14 +133,14 @@ TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
       const auto s = b.world->lights.sample(b.world->lights.choose(numbers(l, u, v)), x);
       ++got[s ? cells.of(s->direction) : cells.size() - 1];
     }
-    book.expect(c.name, test::counts(p, kLightSamples), got);
+    tally.expect(c.name, test::counts(p, kLightSamples), got);
   }
-  book.close();
+  tally.close();
 }
 
 TEST(LightSampling, StretchesTheSquareByOneOverTheDensity) {
   for (const Case& c : cases()) {
-    const LightBench b(c.kit);
+    const LightBench b(c.builder);
     const V3 x = b.at(c.from);
     if (c.name == "distant sphere" || c.name.starts_with("sun of 0.3"))
       continue;  // smaller than float32's steps

@@ -5,8 +5,8 @@
 
 #include "tests/support/chi_square.h"
 #include "tests/support/jacobian.h"
-#include "worker/render/hash.h"
-#include "worker/render/phase.h"
+#include "worker/render/math/random.h"
+#include "worker/render/media/phase.h"
 
 namespace ls::render {
 namespace {
@@ -24,7 +24,7 @@ double distribution(double g, double x) {
 
 // In cells of equal probability, by the closed form of the polar angle's distribution and by azimuth.
 TEST(Phases, SamplesFallAsTheDensitySays) {
-  test::ChiSquareBook book("sampling/phases");
+  test::ChiSquareTally tally("sampling/phases");
   constexpr int kRows = 16, kColumns = 12, kSamples = 100000;
   for (const V3& w : kWays)
     for (const float g : kAnisotropies) {
@@ -43,9 +43,9 @@ TEST(Phases, SamplesFallAsTheDensitySays) {
         const int column = std::min(kColumns - 1, static_cast<int>((turn < 0 ? turn + 1 : turn) * kColumns));
         ++got[static_cast<std::size_t>(row * kColumns + column)];
       }
-      book.expect(fmt::format("g {} about ({}, {}, {})", g, w.x, w.y, w.z), expected, got);
+      tally.expect(fmt::format("g {} about ({}, {}, {})", g, w.x, w.y, w.z), expected, got);
     }
-  book.close();
+  tally.close();
 }
 
 TEST(Phases, StretchTheSquareByOneOverTheDensity) {

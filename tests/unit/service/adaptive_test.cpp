@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <random>
 
-#include "common/image/final_image.h"
-#include "coordinator/views.h"
+#include "common/image/exr/final_image.h"
+#include "coordinator/views/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <thread>
 
-#include "coordinator/store/disk_blobs.h"
+#include "coordinator/store/blobs/disk_blobs.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -49,7 +49,7 @@ struct Awaited : ::testing::Test {
   void damage() const { std::ofstream(blobs->path(wood)) << "other bytes"; }
   // As a worker's FetchBlob does.
   void fetch() const {
-    if (const auto right = blobs->prove(wood); !right) coordinator->blob_lacking(wood, right.error());
+    if (const auto right = blobs->prove(wood); !right) coordinator->blob_missing(wood, right.error());
   }
   JobState state() const { return coordinator->job(job)->state; }
   bool goes_on() const {
@@ -127,7 +127,7 @@ TEST_F(Awaited, AJobThatItsUserPausedMeanwhileStaysPaused) {
   fetch();
   ASSERT_TRUE(coordinator->pause(paused));
   job = submit_wood();  // brings the file
-  coordinator->blob_lacking(wood, {Errc::not_found, "there is no such blob"});
+  coordinator->blob_missing(wood, {Errc::not_found, "there is no such blob"});
   ASSERT_EQ(state(), JobState::paused);
 
   ASSERT_TRUE(goes_on());

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <thread>
 
-#include "coordinator/work_queue.h"
+#include "coordinator/base/work_queue.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "common/image/render_limits.h"
+#include "common/image/frame/render_limits.h"
 #include "common/protocol/limits.h"
-#include "common/scene/integrators.h"
-#include "coordinator/intake.h"
+#include "common/scene/schema/integrators.h"
+#include "coordinator/admission/admission.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -156,7 +156,7 @@ TEST(Service, TakesEveryIntegratorThatASceneMaySay) {
   for (const auto& row : scene::integrators()) {
     JobSpec spec;
     spec.integrator = std::string(row.name);
-    const auto taken = take_in({"t.xml", kSceneText, {}, spec}, coordinator->blobs());
+    const auto taken = admit({"t.xml", kSceneText, {}, spec}, coordinator->blobs());
     ASSERT_TRUE(taken) << row.name << ": " << taken.error().error.message;
     EXPECT_EQ(taken->job.settings.integrator, row.ours);
     EXPECT_EQ(taken->job.settings.max_depth, row.max_depth.value_or(-1)) << row.name;
@@ -169,7 +169,7 @@ TEST(Service, TakesTheLargestFramesAndSampleCountsThatASceneMayHave) {
   const auto with = [&](std::string from, const std::string& to) {
     std::string text = kSceneText;
     text.replace(text.find(from), from.size(), to);
-    return take_in({"t.xml", text, {}, {}}, coordinator->blobs());
+    return admit({"t.xml", text, {}, {}}, coordinator->blobs());
   };
   const auto side = [](int n) { return std::to_string(n) + "\""; };
   EXPECT_TRUE(with("40\"", side(kMaxFrameSide)));

@@ -4,9 +4,9 @@
 #include <mutex>
 #include <set>
 
-#include "coordinator/event_hub.h"
-#include "coordinator/limits.h"
-#include "coordinator/views.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/service/event_hub.h"
+#include "coordinator/views/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -146,7 +146,7 @@ TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
   JobView v;
   v.spp = 65536, v.spp_asked = false;
   v.error_now = ErrorFigures{.5, .25, .125, .375, .4, .6};
-  v.judgement = Judgement{Judgement::Kind::early, "don't trust yet", false};
+  v.convergence_status = ConvergenceStatus{ConvergenceStatus::Kind::early, "don't trust yet", false};
   v.trend = Trend{3, 1, .5, 1.5, "as expected"};
   v.efficiency = 2;
 
@@ -166,10 +166,10 @@ TEST(Views, CsvHasOneLineForEachPoint) {
             "seconds,core_seconds,spp,rmse,relmse,relmse_lo,relmse_hi,true_rmse,true_relmse,true_flip,"
             "rmse_lo,rmse_hi\n"
             "1.5,3,4,0.5,0.25,0.125,0.375,,,,0.375,0.625\n");
-  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, .5}}})
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, ReferenceError{2, 4, .5}}})
                   .ends_with(",2,4,0.5,0,0\n"));
-  EXPECT_TRUE(
-      convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, TrueFigures{2, 4, {}}}}).ends_with(",2,4,,0,0\n"));
+  EXPECT_TRUE(convergence_csv({{1.5, 3, 4, {.5, .25, .125, .375}, ReferenceError{2, 4, {}}}})
+                  .ends_with(",2,4,,0,0\n"));
 }
 
 }  // namespace

@@ -12,8 +12,8 @@
 #include <random>
 #include <set>
 
-#include "common/image/fake_pixels.h"
-#include "coordinator/service.h"
+#include "common/image/film/fake_pixels.h"
+#include "coordinator/service/coordinator.h"
 
 namespace ls::coordinator {
 

@@ -77,11 +77,11 @@ TEST_P(FoundOutLate, NothingIsSaidOfItsPixelsAfterwards) {
   Slow lying(*coordinator, [](const UnitKey& unit) { return unit.round < 4; });
   lying.farm.lies = [](int, const UnitResult&) { return true; };
   ASSERT_TRUE(lying.farm.run([&] { return coordinator->convergence(job)->size() >= 3; }));
-  WorkerId liar;
+  WorkerId faulty;
   for (const WorkerView& worker : coordinator->workers())
-    if (worker.state == "connected") liar = worker.id;
+    if (worker.state == "connected") faulty = worker.id;
 
-  store->will_tell({.barred = {{liar, "it lied elsewhere"}}});
+  store->will_tell({.quarantined = {{faulty, "it lied elsewhere"}}});
   coordinator->tick();
 
   EXPECT_TRUE(coordinator->convergence(job)->empty());

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/image/exr_file.h"
+#include "common/image/exr/exr_file.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <utility>
 
-#include "coordinator/store/job_store.h"
+#include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
 
@@ -27,8 +27,9 @@ class MovingStore final : public JobStore {
   Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
     return inner_->add_point(job, point);
   }
-  Result<void> set_truth(const JobId& job, double spp, const TrueFigures& truth) override {
-    return inner_->set_truth(job, spp, truth);
+  Result<void> set_reference_error(const JobId& job, double spp,
+                                   const ReferenceError& reference_error) override {
+    return inner_->set_reference_error(job, spp, reference_error);
   }
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     return inner_->points(job);
@@ -36,18 +37,18 @@ class MovingStore final : public JobStore {
   Result<void> remove_points(const JobId& job) override { return inner_->remove_points(job); }
   Result<void> add_log(const JobId& job, const LogLine& line) override { return inner_->add_log(job, line); }
   Result<std::vector<LogLine>> log(const JobId& job) const override { return inner_->log(job); }
-  Result<void> bar(const BarredWorker& worker) override {
+  Result<void> quarantine(const QuarantinedWorker& worker) override {
     if (refuses_to_bar) return fail(Errc::resource_exhausted, "the disk is full");
-    return inner_->bar(worker);
+    return inner_->quarantine(worker);
   }
-  Result<std::vector<BarredWorker>> barred() const override { return inner_->barred(); }
+  Result<std::vector<QuarantinedWorker>> quarantined() const override { return inner_->quarantined(); }
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
     return inner_->reserve(counter, amount);
   }
   Moved moved() override {
     const std::lock_guard lock(mutex_);
-    for (const BarredWorker& worker : next_.barred)
-      (void)inner_->bar(worker);  // as a real one does before it tells
+    for (const QuarantinedWorker& worker : next_.quarantined)
+      (void)inner_->quarantine(worker);  // as a real one does before it tells
     return std::exchange(next_, {});
   }
 

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/needs.h"
-#include "common/scene/serialize.h"
-#include "coordinator/intake.h"
+#include "common/scene/analysis/needs.h"
+#include "common/scene/json/serialize.h"
+#include "coordinator/admission/admission.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace ls::coordinator {
@@ -38,7 +38,7 @@ SubmitRequest request(const char* weight) {
 TEST(Needs, AFileThatNothingNeededNamesNeedNotBeUploaded) {
   auto coordinator = open_at({});
 
-  const auto taken = take_in(request("0"), coordinator->blobs());
+  const auto taken = admit(request("0"), coordinator->blobs());
 
   ASSERT_TRUE(taken) << taken.error().error.message;
   EXPECT_TRUE(taken->job.assets.empty());
@@ -49,7 +49,7 @@ TEST(Needs, AFileThatNothingNeededNamesNeedNotBeUploaded) {
 TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
   auto coordinator = open_at({});
 
-  const auto refused = take_in(request("0.5"), coordinator->blobs());
+  const auto refused = admit(request("0.5"), coordinator->blobs());
 
   ASSERT_FALSE(refused);
   ASSERT_FALSE(refused.error().diagnostics.empty());
@@ -57,7 +57,7 @@ TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
   EXPECT_THAT(refused.error().diagnostics[0].text, HasSubstr("wood.png"));
 
   ASSERT_TRUE(coordinator->blobs().put(kWoodDigest, std::as_bytes(std::span(std::string_view("wood")))));
-  const auto taken = take_in(request("0.5"), coordinator->blobs());
+  const auto taken = admit(request("0.5"), coordinator->blobs());
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->job.assets.size(), 1u);
   EXPECT_EQ(taken->job.assets[0].bytes, 4u);
@@ -65,7 +65,7 @@ TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
 
 TEST(Needs, AreKeptWithTheJobAndSentWithIt) {
   auto coordinator = open_at({});
-  const auto taken = take_in(request("0"), coordinator->blobs());
+  const auto taken = admit(request("0"), coordinator->blobs());
   ASSERT_TRUE(taken);
 
   const auto scene = deserialize_scene(taken->scene_json);

@@ -1,9 +1,9 @@
 // Scenes of Nori are taken as any other.
 #include <gtest/gtest.h>
 
-#include "common/scene/integrators.h"
-#include "common/scene/nori_words.h"
-#include "coordinator/intake.h"
+#include "common/scene/schema/integrators.h"
+#include "common/scene/schema/nori_words.h"
+#include "coordinator/admission/admission.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace ls::coordinator {
@@ -32,8 +32,8 @@ const std::string kMitsuba = R"(<scene version="3.0.0">
 
 TEST(Service, TakesASceneOfNoriAsTheSameSceneOfMitsuba) {
   auto coordinator = open_at({});
-  const auto nori = take_in({"a.xml", kNori, {}, {}}, coordinator->blobs());
-  const auto mitsuba = take_in({"b.xml", kMitsuba, {}, {}}, coordinator->blobs());
+  const auto nori = admit({"a.xml", kNori, {}, {}}, coordinator->blobs());
+  const auto mitsuba = admit({"b.xml", kMitsuba, {}, {}}, coordinator->blobs());
 
   ASSERT_TRUE(nori) << format_diagnostics(nori.error().diagnostics);
   ASSERT_TRUE(mitsuba);
@@ -48,7 +48,7 @@ TEST(Service, TakesTheNamesOfNorisIntegrators) {
     if (scene::integrator_row(row.name)) continue;  // of both languages: Mitsuba's meaning
     JobSpec spec;
     spec.integrator = std::string(row.name);
-    const auto taken = take_in({"t.xml", kMitsuba, {}, spec}, coordinator->blobs());
+    const auto taken = admit({"t.xml", kMitsuba, {}, spec}, coordinator->blobs());
     ASSERT_TRUE(taken) << row.name << ": " << taken.error().error.message;
     EXPECT_EQ(taken->job.settings.integrator, row.ours) << row.name;
     EXPECT_EQ(taken->job.settings.max_depth, row.max_depth.value_or(-1)) << row.name;

@@ -5,8 +5,8 @@
 #include <mutex>
 #include <thread>
 
+#include "coordinator/base/limits.h"
 #include "coordinator/domain/limits.h"
-#include "coordinator/limits.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "common/image/exr_file.h"
+#include "common/image/exr/exr_file.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -31,15 +31,15 @@ JobSpec against(Coordinator& coordinator, FrameSize size = {40, 24}) {
   return spec;
 }
 
-std::vector<std::optional<TrueFigures>> truths(Coordinator& coordinator, const JobId& job) {
-  std::vector<std::optional<TrueFigures>> out;
+std::vector<std::optional<ReferenceError>> truths(Coordinator& coordinator, const JobId& job) {
+  std::vector<std::optional<ReferenceError>> out;
   const auto points = coordinator.convergence(job);
   if (!points) return out;
-  for (const ConvergencePoint& p : *points) out.push_back(p.truth);
+  for (const ConvergencePoint& p : *points) out.push_back(p.reference_error);
   return out;
 }
 
-std::vector<std::optional<TrueFigures>> rendered(const std::filesystem::path& data, unsigned seed) {
+std::vector<std::optional<ReferenceError>> rendered(const std::filesystem::path& data, unsigned seed) {
   auto coordinator = open_at(data);
   const JobId job = submit(*coordinator, against(*coordinator));
   FakeFarm farm(*coordinator, 2);
@@ -56,11 +56,11 @@ TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
   TempFolder dir;
   const auto first = rendered(dir.path() / "a", 1);
   ASSERT_EQ(first.size(), 4u);  // 2, 4, 8, 16 samples
-  for (const auto& truth : first) {
-    ASSERT_TRUE(truth);
-    EXPECT_GT(truth->rmse, 0);
-    ASSERT_TRUE(truth->flip);
-    EXPECT_GT(*truth->flip, 0);
+  for (const auto& reference_error : first) {
+    ASSERT_TRUE(reference_error);
+    EXPECT_GT(reference_error->rmse, 0);
+    ASSERT_TRUE(reference_error->flip);
+    EXPECT_GT(*reference_error->flip, 0);
   }
   EXPECT_EQ(rendered(dir.path() / "b", 2), first);
   EXPECT_EQ(rendered({}, 3), first);  // in memory
@@ -92,12 +92,13 @@ TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
     EXPECT_EQ(points.back().spp, told["spp"]);
     EXPECT_EQ(points.back().error.relmse, told["relmse"]);
     EXPECT_EQ(coordinator->job(job)->error_now->relmse, told["relmse"]);
-    if (const auto truth = points.back().truth) {  // what is not stored yet goes with a coordinator
-      EXPECT_EQ(truth->relmse, told["true_relmse"]);
-      EXPECT_NE(truth->relmse, points[1].truth->relmse);
+    if (const auto reference_error =
+            points.back().reference_error) {  // what is not stored yet goes with a coordinator
+      EXPECT_EQ(reference_error->relmse, told["true_relmse"]);
+      EXPECT_NE(reference_error->relmse, points[1].reference_error->relmse);
     }
   };
-  while (!coordinator->convergence(job)->back().truth) std::this_thread::yield();
+  while (!coordinator->convergence(job)->back().reference_error) std::this_thread::yield();
   told_alike();
   while (!std::filesystem::exists(dir.path() / "jobs" / job.value / "film.snap")) std::this_thread::yield();
   coordinator.reset();
@@ -164,7 +165,7 @@ TEST(ServiceReference, OfTheJobsOwnSeedIsToldAndGivesNoVerdict) {
   EXPECT_EQ(apart["reference"]["same_seed"], false);
   EXPECT_EQ(told["true_relmse"], apart["true_relmse"]);  // it is told as before
   EXPECT_NE(told["verdict_kind"], "bias_floor");
-  EXPECT_EQ(coordinator->job(same)->judgement->words, told["verdict"]);
+  EXPECT_EQ(coordinator->job(same)->convergence_status->words, told["verdict"]);
 }
 
 TEST(ServiceReference, IsNotNeededForMaps) {

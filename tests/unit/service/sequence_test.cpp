@@ -5,8 +5,8 @@
 #include <mutex>
 #include <set>
 
-#include "coordinator/intake.h"
-#include "coordinator/views.h"
+#include "coordinator/admission/admission.h"
+#include "coordinator/views/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -222,15 +222,15 @@ TEST(Sequence, WhatBelongsToOneImageAsksForTheFrame) {
 
 TEST(Sequence, EveryFrameReadsItsOwnFilesAndTheSharedOnesOnce) {
   auto coordinator = open_at({});
-  const auto taken = take_in_sequence(meshes(*coordinator, {1, 2, 3}, frames(1, 3)), coordinator->blobs());
+  const auto taken = admit_sequence(meshes(*coordinator, {1, 2, 3}, frames(1, 3)), coordinator->blobs());
   ASSERT_TRUE(taken);
   ASSERT_EQ(taken->size(), 3u);
   EXPECT_EQ((*taken)[1].job.assets.at(0).name, "mesh.002.ply");
   EXPECT_EQ((*taken)[1].job.settings.seed, 2u);
   EXPECT_NE((*taken)[0].job.scene, (*taken)[1].job.scene);
-  const auto alone = take_in(
-      {"mesh.xml", with_mesh("mesh.002.ply"), {{"mesh.002.ply", (*taken)[1].job.assets[0].digest}}, {}},
-      coordinator->blobs());
+  const auto alone =
+      admit({"mesh.xml", with_mesh("mesh.002.ply"), {{"mesh.002.ply", (*taken)[1].job.assets[0].digest}}, {}},
+            coordinator->blobs());
   ASSERT_TRUE(alone);
   EXPECT_EQ(alone->job.scene, (*taken)[1].job.scene) << "a frame is the scene that names its file";
 }
@@ -241,13 +241,13 @@ TEST(Sequence, FramesMayMoveWithTheirNumber) {
   text.replace(text.find("<shape type=\"sphere\"/>"), 22,
                "<shape type=\"sphere\"><float name=\"radius\" value=\"$frame\"/></shape>");
   SubmitRequest request{"s.xml", text, {}, frames(1, 2)};
-  const auto taken = take_in_sequence(request, coordinator->blobs());
+  const auto taken = admit_sequence(request, coordinator->blobs());
   ASSERT_TRUE(taken) << taken.error().error.message;
   EXPECT_NE((*taken)[0].job.scene, (*taken)[1].job.scene);
   EXPECT_TRUE((*taken)[0].job.warnings.empty());
 
   request.scene_text = kSceneText;
-  const auto still = take_in_sequence(request, coordinator->blobs());
+  const auto still = admit_sequence(request, coordinator->blobs());
   ASSERT_TRUE(still);
   ASSERT_EQ((*still)[0].job.warnings.size(), 1u);
   EXPECT_NE((*still)[0].job.warnings[0].find("the same scene"), std::string::npos);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "coordinator/sequence.h"
+#include "coordinator/service/sequence.h"
 
 namespace ls::coordinator {
 namespace {
@@ -92,16 +92,17 @@ TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
 
 TEST(SequenceView, IsTrustedNoMoreThanItsWorstFrame) {
   auto frames = with({JobState::done, JobState::done, JobState::queued});
-  frames[0].judgement = Judgement{Judgement::Kind::converging, "as expected", true};
-  EXPECT_TRUE(whole(frames).judgement->trusted);
+  frames[0].convergence_status = ConvergenceStatus{ConvergenceStatus::Kind::converging, "as expected", true};
+  EXPECT_TRUE(whole(frames).convergence_status->trusted);
   frames[0].few_hits = 2, frames[1].few_hits = 3;
-  frames[1].judgement = Judgement{Judgement::Kind::heavy_tail, "don't trust yet", false};
+  frames[1].convergence_status =
+      ConvergenceStatus{ConvergenceStatus::Kind::heavy_tail, "don't trust yet", false};
 
   const JobView v = whole(frames);
 
-  EXPECT_FALSE(v.judgement->trusted);
-  EXPECT_EQ(v.judgement->kind, Judgement::Kind::heavy_tail);
-  EXPECT_TRUE(v.judgement->words.ends_with(": don't trust yet")) << v.judgement->words;
+  EXPECT_FALSE(v.convergence_status->trusted);
+  EXPECT_EQ(v.convergence_status->kind, ConvergenceStatus::Kind::heavy_tail);
+  EXPECT_TRUE(v.convergence_status->words.ends_with(": don't trust yet")) << v.convergence_status->words;
   EXPECT_EQ(v.few_hits, 5u);
 }
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <thread>
 
-#include "coordinator/store/memory_blobs.h"
+#include "coordinator/store/blobs/memory_blobs.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <thread>
 
-#include "coordinator/store/audit_file.h"
+#include "coordinator/store/log/audit_file.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"
@@ -33,7 +33,7 @@ JobSpec samples(std::uint64_t spp) {
 WorkerId bar_fake_2(Coordinator& coordinator) {
   FakeFarm farm(coordinator, 4);
   farm.lies = [](int worker, const UnitResult&) { return worker == 2; };
-  EXPECT_TRUE(farm.run([&] { return coordinator.audits().workers_barred > 0; }));
+  EXPECT_TRUE(farm.run([&] { return coordinator.audits().workers_quarantined > 0; }));
   for (const WorkerView& worker : coordinator.workers())
     if (worker.name == "fake-2") return worker.id;
   ADD_FAILURE() << "fake-2 is not known";
@@ -59,7 +59,7 @@ TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
 
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
   EXPECT_GT(lies, 3);
-  EXPECT_EQ(coordinator->audits().workers_barred, 1u);
+  EXPECT_EQ(coordinator->audits().workers_quarantined, 1u);
   EXPECT_GT(coordinator->audits().tiles_discarded, 0u);
   EXPECT_THAT(coordinator->job_log(job).value(), testing::HasSubstr("both rendered it to"));
   for (const WorkerView& worker : coordinator->workers()) {
@@ -78,7 +78,7 @@ TEST(Trust, WhatALiarLeftInTheLogIsNotTakenUpAfterARestart) {
     job = submit(*coordinator, samples(512));
     FakeFarm farm(*coordinator, 4);
     farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
-    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+    ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_quarantined > 0; }));
     farm.stop_after = farm.results_sent + 20;
     farm.finish(job);
     ASSERT_EQ(coordinator->job(job)->state, JobState::running);
@@ -126,7 +126,7 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
       return seen.insert(r.unit).second ? std::vector{r} : std::vector<UnitResult>{};
     };
     ASSERT_TRUE(farm.run([&] { return lie && coordinator->audits().asked >= 3; }));
-    ASSERT_EQ(coordinator->audits().workers_barred, 0u);
+    ASSERT_EQ(coordinator->audits().workers_quarantined, 0u);
     ASSERT_TRUE(come_to_be_audited(folder.path() / "jobs" / job.value, *lie));
   }
 
@@ -135,46 +135,46 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
   ASSERT_TRUE(farm.finish(job));
 
   EXPECT_GE(coordinator->audits().equal, 1u);
-  EXPECT_EQ(coordinator->audits().workers_barred, 1u) << "one result was wrong";
+  EXPECT_EQ(coordinator->audits().workers_quarantined, 1u) << "one result was wrong";
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
 }
 
-TEST(Trust, ABarredWorkerStaysBarredOverARestart) {
+TEST(Trust, AQuarantinedWorkerStaysQuarantinedOverARestart) {
   const TempFolder folder;
-  WorkerId liar;
+  WorkerId faulty;
   {
     auto coordinator = open_audited(folder.path(), 1);
     submit(*coordinator, samples(512));
-    liar = bar_fake_2(*coordinator);
+    faulty = bar_fake_2(*coordinator);
   }
 
   auto coordinator = open_audited(folder.path(), 1);
-  const auto session = come_back(*coordinator, liar);
+  const auto session = come_back(*coordinator, faulty);
 
   ASSERT_TRUE(session);
   ASSERT_EQ(coordinator->workers().size(), 1u);
-  EXPECT_EQ(coordinator->workers()[0].id, liar);
+  EXPECT_EQ(coordinator->workers()[0].id, faulty);
   EXPECT_EQ(coordinator->workers()[0].state, "sick");
   EXPECT_THAT(coordinator->workers()[0].activity, testing::StartsWith("barred: it rendered tile"));
 }
 
-TEST(Trust, ABarredWorkerStaysBarredWhenTheJobThatItWasFoundByIsGone) {
+TEST(Trust, AQuarantinedWorkerStaysQuarantinedWhenTheJobThatItWasFoundByIsGone) {
   const TempFolder folder;
-  WorkerId liar;
+  WorkerId faulty;
   {
     auto coordinator = open_audited(folder.path(), 1);
     const JobId job = submit(*coordinator, samples(512));
-    liar = bar_fake_2(*coordinator);
+    faulty = bar_fake_2(*coordinator);
     ASSERT_TRUE(coordinator->remove(job)) << "cancelled";
     ASSERT_TRUE(coordinator->remove(job)) << "gone";
   }
 
   auto coordinator = open_audited(folder.path(), 1);
   ASSERT_TRUE(coordinator->jobs().empty());
-  const auto session = come_back(*coordinator, liar);
+  const auto session = come_back(*coordinator, faulty);
 
   ASSERT_TRUE(session);
-  EXPECT_EQ(coordinator->workers()[0].id, liar);
+  EXPECT_EQ(coordinator->workers()[0].id, faulty);
   EXPECT_EQ(coordinator->workers()[0].state, "sick");
 }
 
@@ -195,14 +195,14 @@ struct FoundElsewhere : ::testing::Test {
   }
 };
 
-TEST_F(FoundElsewhere, AWorkerHereIsBarredAtOnceAndItsTilesAreRenderedAgain) {
+TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain) {
   auto coordinator = open();
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 2);
   farm.lies = [&](int worker, const UnitResult&) { return worker == 1; };
   ASSERT_TRUE(farm.run([&] { return farm.results_sent >= 6; }));
-  const WorkerId liar = coordinator->workers()[1].id;
-  store->will_tell({.barred = {{liar, "it lied to the coordinator next door"}}});
+  const WorkerId faulty = coordinator->workers()[1].id;
+  store->will_tell({.quarantined = {{faulty, "it lied to the coordinator next door"}}});
 
   coordinator->tick();
 
@@ -238,7 +238,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
       lying.lies = [](int, const UnitResult&) { return true; };
       ASSERT_TRUE(lying.finish(job));
       ASSERT_NE(pixels(*coordinator, job), reference_pixels(16));
-      store->will_tell({.barred = {{coordinator->workers()[0].id, "it lied elsewhere"}}});
+      store->will_tell({.quarantined = {{coordinator->workers()[0].id, "it lied elsewhere"}}});
       coordinator->tick();
     }
     ASSERT_TRUE(coordinator->extend(job, 64));
@@ -257,7 +257,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
   }
 }
 
-TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsBarredTheJobsWait) {
+TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
   store = std::make_shared<MovingStore>();
   Coordinator::Options options;
   options.jobs = store;
@@ -268,7 +268,7 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsBarredTheJobsWait) {
   farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
   store->refuses_to_bar = true;
 
-  ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_barred > 0; }));
+  ASSERT_TRUE(farm.run([&] { return coordinator->audits().workers_quarantined > 0; }));
 
   EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
   EXPECT_THAT(coordinator->job(job)->error, testing::HasSubstr("the disk is full"));
@@ -277,7 +277,7 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsBarredTheJobsWait) {
   ASSERT_TRUE(coordinator->resume(job));
   ASSERT_TRUE(farm.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
-  EXPECT_EQ(store->barred().value().size(), 1u);
+  EXPECT_EQ(store->quarantined().value().size(), 1u);
 }
 
 TEST(Trust, AbsurdTimesOfAWorkerCountForNothingAndTheRecordStaysReadable) {

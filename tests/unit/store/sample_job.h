@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "coordinator/store/job_store.h"
+#include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
 
@@ -26,7 +26,7 @@ inline StoredJob sample_job(std::string id) {
   job.stopped = StopReason::error;
   job.numeric_class = sha256("class");
   job.fake = true;
-  job.awaited = {sha256("gone")};
+  job.missing_blobs = {sha256("gone")};
   job.totals.core_seconds = 12.125;
   job.totals.health.add(HealthCause::infinite, 3, {4, 5, 6});
   return job;

@@ -13,10 +13,10 @@
 #include <functional>
 #include <limits>
 
-#include "tests/unit/nvdb/nvdb_kit.h"
+#include "tests/unit/nvdb/nvdb_builder.h"
+#include "worker/render/media/vdb_process.h"
+#include "worker/render/media/vdb_reply.h"
 #include "worker/render/vdb/nvdb.h"
-#include "worker/render/vdb_process.h"
-#include "worker/render/vdb_reply.h"
 
 namespace ls::render {
 namespace {
@@ -70,7 +70,7 @@ VdbReply reply_of(int x, int y, int z) {
 }
 
 TEST_F(VdbProcess, AGridOfAnotherProcessIsTheGridOfThisOne) {
-  const std::string bytes = test::NvdbKit().file();
+  const std::string bytes = test::NvdbBuilder().file();
   LsVdbGrid here{};
   decode_nvdb(std::as_bytes(std::span(bytes)), "", 1 << 20, here);
 
@@ -86,7 +86,7 @@ TEST_F(VdbProcess, AGridOfAnotherProcessIsTheGridOfThisOne) {
 
 TEST_F(VdbProcess, WhatIsRefusedIsToldWhy) {
   const auto garbage = VdbFile::read(file("a.vdb", "no grid at all"), "", 1 << 20);
-  const auto large = VdbFile::read(file("a.nvdb", test::NvdbKit().file()), "", 100);
+  const auto large = VdbFile::read(file("a.nvdb", test::NvdbBuilder().file()), "", 100);
 
   ASSERT_FALSE(garbage);
   EXPECT_EQ(garbage.error().code, Errc::invalid_argument);
@@ -178,9 +178,9 @@ int with_limit(std::uint64_t more, const std::function<int()>& run) {
 
 // 258^3 values, 66 MiB: read they fit into any of these limits, but the reply takes as much again.
 TEST_F(VdbProcess, AGridAndItsReplyFitIntoWhatTheRendererHasLeft) {
-  test::NvdbKit kit;
-  kit.hi = {255, 255, 255};
-  const auto path = file("large.nvdb", kit.file());
+  test::NvdbBuilder builder;
+  builder.hi = {255, 255, 255};
+  const auto path = file("large.nvdb", builder.file());
   const auto read_with = [&](std::uint64_t more) {
     return with_limit(more, [&] {
       const auto read = VdbFile::read(path, "", 1 << 25);
@@ -195,7 +195,7 @@ TEST_F(VdbProcess, AGridAndItsReplyFitIntoWhatTheRendererHasLeft) {
 }
 
 TEST_F(VdbProcess, AReplyThatIsMappedCountsTowardsTheLimit) {
-  const auto path = file("a.nvdb", test::NvdbKit().file());
+  const auto path = file("a.nvdb", test::NvdbBuilder().file());
   const int failed = with_limit(512 * kMiB, [&] {
     const std::uint64_t before = limit();
     {

@@ -62,7 +62,7 @@ export async function plan(files, main) {
   };
 }
 
-/** What a scene names, found as the coordinator's reader finds it (common/scene/document.cpp, reader.cpp). */
+/** What a scene names, found as the coordinator's reader finds it (common/scene/reader/load_document.cpp, reader.cpp). */
 class Survey {
   found = new Map(); // name -> {path, file}
   missing = new Set();

@@ -4,8 +4,8 @@
 #include <tuple>
 
 #include "common/base/overloaded.h"
-#include "common/scene/bsdf_traits.h"
 #include "common/scene/limits.h"
+#include "common/scene/schema/bsdf_traits.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
 #include "worker/render/bsdf/principled.h"
@@ -21,7 +21,7 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Collects the first error, so that the conversions below read as tables.
+// Records the first error, so that the conversions below read as tables.
 class Builder {
  public:
   Builder(const Scene& scene, const TextureTable& textures, const std::vector<scene::BsdfTraits>& traits)
@@ -72,7 +72,7 @@ class Builder {
     m.alpha_v = roughness(b.alpha_v);
     m.specular_slot = reflectance(b.specular_reflectance);
     m.second_slot = reflectance(b.specular_transmittance);
-    // Facets of slope t bend light by about (ior - 1) t: nothing to be seen, but a lobe too narrow for
+    // With facets of slope t refraction deviates by about (ior - 1) t: invisible, but a lobe too narrow for
     // float32.
     if (mirror(m) || std::abs(m.ior - 1) < kSpecularAlpha)
       m.kind = MaterialKind::dielectric;
@@ -82,7 +82,7 @@ class Builder {
   }
   Material operator()(const ThinDielectricBsdf& b) {
     Material m = make(MaterialKind::thin_dielectric);
-    m.veil = true;
+    m.null_transmission = true;
     m.ior = static_cast<float>(index(b.int_ior, b.ext_ior));
     m.specular_slot = reflectance(b.specular_reflectance);
     m.second_slot = reflectance(b.specular_transmittance);
@@ -113,7 +113,7 @@ class Builder {
     if (error) return m;
     if (b.multiple_scattering) {
       m.energy = energy(EnergyOf::coat, m, b.alpha, eta);
-      // What does not get out again: by reciprocity 1 / eta^2 of what gets in leaves.
+      // Reflected back inside: by reciprocity 1 / eta^2 of the transmitted light leaves.
       if (m.energy)
         m.coat.internal_reflectance = static_cast<float>(1 - m.energy->through.mean() / (eta * eta));
     } else {
@@ -130,14 +130,14 @@ class Builder {
   }
   Material operator()(const MaskBsdf& b) {
     Material m = make(MaterialKind::mask);
-    m.veil = true;
+    m.null_transmission = true;
     m.specular_slot = reflectance(b.opacity);
     m.front = b.bsdf.value;
     return m;
   }
   Material operator()(const BlendBsdf& b) {
     Material m = make(MaterialKind::blend);
-    m.veil = traits_[b.first.value].passes || traits_[b.second.value].passes;
+    m.null_transmission = traits_[b.first.value].passes || traits_[b.second.value].passes;
     m.specular_slot = reflectance(b.weight);
     m.front = b.first.value;
     m.back = b.second.value;
@@ -145,7 +145,7 @@ class Builder {
   }
   Material operator()(const NormalMapBsdf& b) {
     Material m = make(MaterialKind::normal_map);
-    m.veil = traits_[b.bsdf.value].passes;
+    m.null_transmission = traits_[b.bsdf.value].passes;
     m.specular_slot = slot(b.normalmap);
     m.flips = b.flip_invalid_normals;
     m.shadows = b.use_shadowing_function;
@@ -154,7 +154,7 @@ class Builder {
   }
   Material operator()(const BumpMapBsdf& b) {
     Material m = make(MaterialKind::bump_map);
-    m.veil = traits_[b.bsdf.value].passes;
+    m.null_transmission = traits_[b.bsdf.value].passes;
     m.specular_slot = slot(b.texture);
     m.flips = b.flip_invalid_normals;
     m.shadows = b.use_shadowing_function;
@@ -180,7 +180,7 @@ class Builder {
     p.transmits = b.spec_trans.has_value();
     p.spec_trans = b.spec_trans ? reflectance(*b.spec_trans) : Slot{C3(0), {}, true};
     p.eta = static_cast<float>(index(b.eta, 1));
-    // As Mitsuba: a boundary without contrast has no facets to be seen.
+    // As in Mitsuba: keeps some contrast of indices, without which facets vanish.
     if (p.transmits && std::abs(p.eta - 1) < 1e-3f) p.eta = 1.001f;
     principled.push_back(p);
     return m;
@@ -202,14 +202,14 @@ class Builder {
     const float d = mean(m.second_slot), s = mean(m.specular_slot);
     m.specular_weight = d + s > 0 ? s / (d + s) : 1;
   }
-  // Integrated once for all materials alike: a table takes 30 ms, and scenes colour many objects the same
-  // way.
+  // Integrated once for all materials with equal parameters: a table takes 30 ms, and scenes give many
+  // objects the same coat.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta) {
     const auto [it, fresh] = coats_.try_emplace({type, alpha, eta});
     if (fresh) it->second = make_rough_plastic_table(type, alpha, eta);
     return it->second;
   }
-  // Integrated once for all materials alike, too.
+  // Likewise integrated once for all materials with equal parameters.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Material& m, double alpha, double eta) {
     if (error) return nullptr;
@@ -236,7 +236,7 @@ class Builder {
     }
     return {textures_.constant(t), t, textures_.is_constant(t)};
   }
-  // Surfaces never reflect more than they get: what lies outside [0, 1] is brought in, and counted.
+  // Reflectances outside [0, 1] are clamped, so that surfaces conserve energy, and counted.
   Slot reflectance(TextureIndex t) {
     Slot s = slot(t);
     if (!s.constant) return s;
@@ -258,8 +258,8 @@ class Builder {
            m.alpha_v.value.x < kSpecularAlpha;
   }
   void metal(Material& m, const Rgb& eta, const Rgb& k, TextureIndex specular) {
-    // A metal of this index reflects all but 4e-9 of the light, which is everything in float32; the fourth
-    // powers in fresnel_conductor must remain numbers.
+    // A metal of this index reflects all but 4e-9 of the light, which is everything in float32; larger
+    // indices would overflow the fourth powers in fresnel_conductor.
     constexpr double kLargestIndex = 1e9;
     for (int c = 0; c < 3; ++c) {
       m.eta[c] = static_cast<float>(std::min(eta[c], kLargestIndex));
@@ -280,7 +280,8 @@ class Builder {
     }
     return eta;
   }
-  // What a side of a two-sided material really is. A two-sided one there shows its front, from both sides.
+  // Resolves the material of one side of a two-sided one. A two-sided material nested there shows its front
+  // on both sides.
   std::uint32_t side(BsdfIndex b) {
     if (traits_[b.value].transmits) refuse("a two-sided material cannot hold one that lets light through");
     while (const auto* nested = std::get_if<TwoSidedBsdf>(&scene_.bsdfs[b.value])) b = nested->front;
@@ -294,7 +295,7 @@ class Builder {
   std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> energies_;
 };
 
-// Whether it holds for a part that the material consists of.
+// True if `holds` for a part that the material consists of.
 template <class F>
 bool any_part(const Material& m, F holds) {
   switch (m.kind) {
@@ -345,7 +346,7 @@ std::uint64_t BsdfTable::bytes() const {
 std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 
 bool BsdfTable::is_null(BsdfIndex i) const { return materials_[i.value].kind == MaterialKind::null; }
-bool BsdfTable::has_veil(BsdfIndex i) const { return materials_[i.value].veil; }
+bool BsdfTable::has_null_transmission(BsdfIndex i) const { return materials_[i.value].null_transmission; }
 bool BsdfTable::has_smooth(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   switch (m.kind) {

@@ -1,19 +1,19 @@
 // Fresnel reflectances for unpolarised light.
 #pragma once
 
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
 struct DielectricFresnel {
   double reflectance = 0;
   double cos_t =
-      0;  // of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection
+      0;  // of the refracted direction, with sign opposite to cos_i; 0 under total internal reflection
   double eta_it = 1;  // index on the transmitted side over the index on the incident side
   double eta_ti = 1;  // its inverse
 };
 
-// cos_i > 0: from the outside, whose index is 1/eta of the inside's. In double: near eta = 1 the amplitudes
+// cos_i > 0: from the outside; eta: index inside over outside. In double, because near eta = 1 the amplitudes
 // cancel.
 inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   const bool outside = cos_i >= 0;
@@ -34,9 +34,9 @@ inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   return f;
 }
 
-// What a smooth boundary sends back of diffuse light from inside, whose index is eta times the outside's.
-// Outside light by Simpson's rule (the integrand 2 F mu is smooth for an index above 1: relative error below
-// 1e-7), light from the denser side by reciprocity.
+// Diffuse reflectance of a smooth boundary for light from inside, whose index is eta times the outside's.
+// Light from the less dense side by Simpson's rule (the integrand 2 F mu is smooth for an index above 1:
+// relative error below 1e-7), from the denser side by reciprocity.
 inline double internal_diffuse_reflectance(double eta) {
   const double n = std::max(eta, 1 / eta);
   constexpr int kSteps = 256;
@@ -52,12 +52,13 @@ inline double internal_diffuse_reflectance(double eta) {
 // Complex index eta + i k relative to the outside; cos_i in [0, 1]. (0, k) reflects everything.
 inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
-  const float t1 = (eta - 1) * (eta + 1) - k * k + c2;  // eta^2 - k^2 - s2, where it is all but 0 as well
+  // eta^2 - k^2 - s2, accurate where it nearly vanishes too
+  const float t1 = (eta - 1) * (eta + 1) - k * k + c2;
   const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
   const float a = safe_sqrt(.5f * (a2b2 + t1));
   const float p = a2b2 + c2, q = 2 * cos_i * a;
   if (!(p + q > 0)) return 1;
-  const float rs = std::max(0.f, p - q) / (p + q);  // an index of 1 leaves a rounding of either sign
+  const float rs = std::max(0.f, p - q) / (p + q);  // for an index of 1, rounding leaves either sign
   const float u = a2b2 * c2 + s2 * s2, v = q * s2;
   if (!(u + v > 0)) return rs;  // eta = k = 0 at normal incidence
   return .5f * (rs + rs * (u - v) / (u + v));

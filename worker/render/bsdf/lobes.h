@@ -1,11 +1,11 @@
-// What the lobes of several kinds of material share.
+// Helpers shared by the lobes of several material kinds.
 #pragma once
 
 #include <algorithm>
 
+#include "worker/render/base/built.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/material.h"
-#include "worker/render/built.h"
 
 namespace ls::render {
 

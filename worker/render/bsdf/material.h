@@ -1,4 +1,5 @@
-// One material as the inner loop wants it: a tag, constants computed once, textures where they vary.
+// One material in the form used by the inner loop: a kind, precomputed constants, textures where parameters
+// vary.
 #pragma once
 
 #include "worker/render/bsdf/bsdf.h"
@@ -9,7 +10,7 @@
 namespace ls::render {
 
 enum class MaterialKind : std::uint8_t {
-  diffuse,  // of one reflectance everywhere
+  diffuse,  // with one reflectance everywhere
   textured_diffuse,
   conductor,
   rough_conductor,
@@ -18,7 +19,7 @@ enum class MaterialKind : std::uint8_t {
   plastic,
   null,
   two_sided,
-  // From here on "wide": they scatter to both sides, or consist of others (scatter_wide.cpp).
+  // From here on "wide" kinds: they scatter to both sides, or consist of other materials (scatter_wide.cpp).
   thin_dielectric,
   rough_dielectric,
   mask,
@@ -29,7 +30,7 @@ enum class MaterialKind : std::uint8_t {
 };
 inline constexpr MaterialKind kFirstWide = MaterialKind::thin_dielectric;
 
-// A reflectance or roughness: its value if constant, else where to read it.
+// A reflectance or roughness: its value if constant, else the texture to read.
 struct Slot {
   C3 value{1, 1, 1};
   TextureIndex texture;
@@ -41,21 +42,21 @@ struct BsdfTable::Material {
   Microfacet distribution = Microfacet::beckmann;
   bool nonlinear = false;
   bool specular = false;                // rough plastic with a smooth coat
-  bool veil = false;                    // some light passes straight on, and some does not
+  bool null_transmission = false;       // part of the light passes straight through, part does not
   bool flips = false, shadows = false;  // maps: flip_invalid_normals, use_shadowing_function
-  std::uint32_t front = 0,
-                back = 0;  // two_sided: materials that are not two-sided themselves; parts of others;
-                           // principled: front is its place in the list of those
-  Slot specular_slot;      // specular_reflectance; opacity of mask, weight of blend, colours of normal_map,
-                           // heights of bump_map
-  Slot second_slot;        // specular_transmittance; diffuse reflectance of diffuse and plastics
+  // two_sided: materials that are not two-sided themselves; mask, blend, maps: the parts; principled: front
+  // is the index into the list of those.
+  std::uint32_t front = 0, back = 0;
+  // specular_reflectance; opacity of mask, weight of blend, colours of normal_map, heights of bump_map
+  Slot specular_slot;
+  Slot second_slot;  // specular_transmittance; diffuse reflectance of diffuse and plastics
   Slot alpha_u, alpha_v;
   C3 eta{0, 0, 0}, k{1, 1, 1};  // conductors
   float ior = 1;                // inside over outside
-  float specular_weight = 1;    // plastics: how often the coat is sampled, before Fresnel; bump_map: scale
-  RoughPlasticTable coat;       // of plastic only its internal reflectance
-  const MicrofacetEnergy* energy = nullptr;  // rough kinds, if they have multiple_scattering
-  C3 mean_fresnel{1, 1, 1};                  // of a conductor with that
+  float specular_weight = 1;    // plastics: probability of sampling the coat, before Fresnel; bump_map: scale
+  RoughPlasticTable coat;       // for smooth plastic only its internal reflectance is set
+  const MicrofacetEnergy* energy = nullptr;  // rough kinds with multiple_scattering
+  C3 mean_fresnel{1, 1, 1};                  // of a conductor with multiple_scattering
 };
 
 }  // namespace ls::render

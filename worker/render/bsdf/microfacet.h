@@ -1,45 +1,44 @@
 // Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba.
-// All directions are in the local frame, above the surface (z > 0), unit length. Nothing here divides by a
-// cosine.
+// All directions are in the local frame, above the surface (z > 0), of unit length. No division by a cosine.
 //
-// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because that is the
-// dialect's definition of the material; in the *density* of sampling it is the exact one, so that sampling is
-// exact.
+// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because the dialect
+// defines the material by it; in the sampling *density* it is the exact one, so that the density is exact.
 #pragma once
 
 #include "common/scene/scene.h"
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
-// Below this both roughnesses mean a perfect mirror; a lone smaller one is raised to kMinAlpha.
+// If both roughnesses are below this, the surface is a perfect mirror; otherwise a smaller one is raised to
+// kMinAlpha.
 inline constexpr float kSpecularAlpha = 1e-3f;
 inline constexpr float kMinAlpha = 1e-4f;
 
-// w as seen by a surface of roughness 1: (ax x, ay y, z), and the length of its tangential part.
+// Length of the tangential part of w scaled to a surface of roughness 1: (ax x, ay y, z).
 inline float stretched_sine(const V3& w, float ax, float ay) {
   return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y));
 }
 
 namespace ggx {
-// Written with the tangential part of m, so that nothing cancels near the normal.
+// Written with the tangential part of m, to avoid cancellation near the normal.
 inline float D(const V3& m, float ax, float ay) {
   return 1 / (kPi * ax * ay * sqr(sqr(m.x / ax) + sqr(m.y / ay) + m.z * m.z));
 }
 inline float G1_over_cos(const V3& w, float ax, float ay) {
   return 2 / (w.z + std::sqrt(sqr(ax * w.x) + sqr(ay * w.y) + w.z * w.z));
 }
-// Of the bounded visible normals (Tokuyoshi and Eto 2024): how much of the cap below the horizon is left out.
+// For bounded visible normals (Tokuyoshi and Eto 2024): how much of the cap below the horizon is excluded.
 inline float bound_k(const V3& wo, float ax, float ay) {
   const float a = std::min(std::min(ax, ay), 1.f), s = 1 + std::sqrt(wo.x * wo.x + wo.y * wo.y);
   return (1 - a * a) * s * s / (s * s + a * a * wo.z * wo.z);
 }
-// Density of the reflected direction over D(m).
+// Density of the reflected direction, divided by D(m).
 inline float pdf_over_D(const V3& wo, float ax, float ay) {
   const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
   return .5f / (bound_k(wo, ax, ay) * wo.z + t);
 }
-// k: 1 for all visible normals, bound_k for those that reflect upwards.
+// k: 1 for all visible normals, bound_k() for those that reflect upwards.
 inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
   const float b = k * i.z;
@@ -61,10 +60,10 @@ inline float G1_over_cos(const V3& w, float ax, float ay) {
   const float a = w.z / s;
   return (3.535f + 2.181f * a) / ((1 + a * (2.276f + 2.577f * a)) * s);
 }
-// The exact G1 / cos: one over the projected area of the visible microfacets.
+// The exact G1 / cos: 1 / (projected area of the visible microfacets).
 inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
   const float s = stretched_sine(w, ax, ay);
-  if (w.z > 6 * s) return 1 / w.z;  // erf(6) is 1 and exp(-36) nothing, in float32
+  if (w.z > 6 * s) return 1 / w.z;  // in float32 erf(6) is 1 and exp(-36) negligible
   const float a = w.z / s;
   return 1 /
          (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
@@ -72,8 +71,8 @@ inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
 inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_G1_over_cos(wo, ax, ay); }
 // By inversion, in double; u in [0, 1)^2.
 V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
-// The slope along the viewer, of roughness 1, for a viewer at this angle: where the share u of visible slopes
-// ends.
+// The inverse cdf, at u, of visible slopes along the viewing direction, for roughness 1 and a viewer at this
+// angle.
 double visible_slope(double cos_theta, double sin_theta, double u);
 double erf_inverse(double x);
 }  // namespace beckmann
@@ -93,8 +92,8 @@ struct Microfacets {
     return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, ggx::bound_k(wo, ax, ay))
                                    : beckmann::sample_normal(wo, ax, ay, u);
   }
-  // For refraction, which sends light down from normals that would reflect it down: all visible normals m,
-  // with the density D(m) visible_over_D(wo) dot(wo, m).
+  // All visible normals m, with the density D(m) visible_over_D(wo) dot(wo, m). For refraction, which also
+  // uses normals that would reflect downwards.
   V3 sample_visible(const V3& wo, const V2& u) const {
     return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, 1)
                                    : beckmann::sample_normal(wo, ax, ay, u);

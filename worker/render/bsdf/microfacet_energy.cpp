@@ -10,16 +10,16 @@
 namespace ls::render {
 namespace {
 
-// Intervals start at powers of two, as what happens near grazing angles does so on the scale of alpha, which
-// is 1/1024 at least; 2^12 parts of each is where float32 ends.
+// Intervals start at powers of two, because the functions vary near grazing angles on the scale of alpha,
+// which is at least 1/1024; 2^12 parts of each reach the resolution of float32.
 constexpr int kOctaves = 16, kDeepest = 12;
 
 const Quadrature& quadrature(double eta) {
   static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
-  return eta >= 1 ? kSmooth : kKinked;  // below 1 total reflection has a kink
+  return eta >= 1 ? kSmooth : kKinked;  // below 1, total reflection has a kink
 }
 
-// The masking of the viewer in the value over that in the density of the visible normals: not 1 for Beckmann,
+// The viewer's masking in the value divided by that in the density of visible normals: not 1 for Beckmann,
 // whose value is a fit (microfacet.h).
 double fit(Microfacet type, double alpha, double mu) {
   if (type == Microfacet::ggx || alpha < kSpecularAlpha) return 1;
@@ -54,7 +54,7 @@ CosineTable::CosineTable(const std::function<double(double)>& f, double toleranc
 void CosineTable::refine(const std::function<double(double)>& f, double x0, double y0, double x1, double y1,
                          double tolerance, int depth) {
   double y[3];
-  bool fine = depth > 0;  // no interval is taken for straight by its three points alone
+  bool fine = depth > 0;  // never accept a whole octave as straight by its three points alone
   for (int i = 0; i < 3; ++i) {
     const double t = .25 * (i + 1);
     y[i] = f(x0 + (x1 - x0) * t);
@@ -74,7 +74,7 @@ double CosineTable::mean() const {
   double sum = 0;
   for (std::size_t i = 1; i < x_.size(); ++i) {
     const double a = double{x_[i - 1]}, b = double{x_[i]}, p = double{y_[i - 1]}, q = double{y_[i]};
-    // Of the product of two lines: Simpson's rule is exact.
+    // Simpson's rule is exact for the product of two linear functions.
     sum += (b - a) / 6 * (a * p + 4 * (.5 * (a + b)) * (.5 * (p + q)) + b * q);
   }
   return 2 * sum;

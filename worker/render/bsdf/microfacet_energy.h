@@ -1,28 +1,28 @@
-// The light that microfacets throw onto each other, which a model of single scattering loses, brought back
-// by a factor on what it has (Turquin 2019, "Practical multiple scattering compensation for microfacet
-// models"): with E(mu) the share that leaves after one bounce, seen at the cosine mu, where nothing absorbs,
+// Multiple scattering between microfacets, which single-scattering models lose, restored by a factor (Turquin
+// 2019, "Practical multiple scattering compensation for microfacet models"). With E(mu) the share of light
+// that leaves after one bounce, seen at the cosine mu, without absorption,
 //
 //   f' = f (1 + F' (1 - E) / E),   F' = F E_mean / (1 - F (1 - E_mean)),   E_mean = 2 int E mu dmu,
 //
-// F the mean Fresnel reflectance (times the tint): what is not masked at last has met the surface once more
-// for each factor F (1 - E_mean) (Kulla and Conty 2017). What absorbs nothing, F = 1, gets exactly what it
-// lacks. At a dielectric E counts both ways, reflected and refracted, and nothing absorbs. The factor depends
-// on the viewer alone: sampling does not change, and light does not go both ways alike.
+// where F is the mean Fresnel reflectance (times the tint): light that is masked meets the surface again,
+// once for each factor F (1 - E_mean) (Kulla and Conty 2017). Without absorption, F = 1, exactly the missing
+// energy is restored. For a dielectric E includes reflection and refraction, and nothing is absorbed. The
+// factor depends only on the viewer, so sampling does not change, and the BSDF is not reciprocal.
 #pragma once
 
 #include <functional>
 #include <vector>
 
 #include "common/scene/scene.h"
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
-// A function on [0, 1], linear between nodes as dense as its shape asks for.
+// A function on [0, 1], piecewise linear with adaptively placed nodes.
 class CosineTable {
  public:
   CosineTable() = default;
-  // Off by `tolerance` at most, at the middles and quarters of each interval.
+  // The error is at most `tolerance`, checked at the middle and the quarter points of each interval.
   CosineTable(const std::function<double(double)>& f, double tolerance);
 
   float at(float x) const {
@@ -31,7 +31,7 @@ class CosineTable {
     const float t = (x - x_[i - 1]) / (x_[i] - x_[i - 1]);
     return y_[i - 1] * (1 - t) + y_[i] * t;
   }
-  double mean() const;  // 2 int f x dx, of the lines
+  double mean() const;  // 2 int f x dx of the piecewise linear function
   std::size_t bytes() const { return (x_.size() + y_.size()) * sizeof(float); }
 
  private:
@@ -40,15 +40,15 @@ class CosineTable {
   std::vector<float> x_, y_;
 };
 
-// How far a white furnace may be from 1: the tables' tolerance, and that of the quadrature behind them.
+// How far a white furnace may deviate from 1: the error of the tables and of the quadrature behind them.
 inline constexpr double kEnergyTolerance = 5e-4;
 
 struct MicrofacetEnergy {
-  CosineTable missing, missing_behind;  // (1 - E) / E seen from outside and, of dielectrics, from inside
-  CosineTable through;                  // plastics: what the coat lets in, brought up likewise
+  CosineTable missing, missing_behind;  // (1 - E) / E seen from outside and, for dielectrics, from inside
+  CosineTable through;                  // plastics: light that the coat lets in, compensated likewise
   float mean = 1;                       // conductors: E_mean
 
-  // Of a metal with this mean reflectance.
+  // For a conductor with mean reflectance F.
   C3 factor(float cos, const C3& F) const {
     const float lacking = missing.at(cos), lost = 1 - mean;
     const auto again = [&](float f) { return f * mean / (1 - f * lost); };
@@ -61,7 +61,7 @@ struct MicrofacetEnergy {
 MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
 // eta: inside over outside.
 MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);
-// With `through` and without what is seen from inside.
+// Sets `through`, and leaves missing_behind empty.
 MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta);
 
 // 2 int F mu dmu of a conductor.

@@ -1,13 +1,13 @@
 // Burley's principled material ("Physically Based Shading at Disney", 2012; "Extending the Disney BRDF to a
 // BSDF with Integrated Subsurface Scattering", 2015) with the parameters and formulas of Mitsuba 3's plugin
-// `principled`. It has four lobes: diffuse (with retro-reflection, sheen and an imitation of scattering
-// below), a clear coat (GTR1), and GGX facets that reflect and, with spec_trans, refract.
+// `principled`. It has four lobes: diffuse (with retro-reflection, sheen and an approximation of subsurface
+// scattering), a clear coat (GTR1), and GGX facets that reflect and, with spec_trans, refract.
 //
-// Sampling: a lobe is chosen from what is known at wo alone; of the facets, a visible normal first and then,
-// by its Fresnel reflectance F, whether it reflects. With m metallic, t spec_trans and b = (1 - m) t the
-// chances are, from the front and up to their sum, 1 for the facets (of which 1 - b (1 - F) reflect), 1/4 of
-// the coat for the coat, (1 - m) (1 - t) for the diffuse lobe; from behind there are the facets alone, of
-// which F reflect.
+// Sampling: a lobe is chosen from the parameters at wo; for the facets, first a visible normal and then, by
+// its Fresnel reflectance F, reflection or refraction. With m metallic, t spec_trans and b = (1 - m) t the
+// unnormalised probabilities are, from the front, 1 for the facets (of which 1 - b (1 - F) reflect), 1/4 of
+// the parameter clearcoat for the coat, and (1 - m) (1 - t) for the diffuse lobe; from behind there are only
+// the facets, of which F reflect.
 #pragma once
 
 #include "worker/render/bsdf/lobes.h"

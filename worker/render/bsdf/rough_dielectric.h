@@ -1,9 +1,9 @@
 // A rough boundary between two dielectrics: microfacets that reflect and refract (Walter et al. 2007),
-// sampled by their visible normals (Heitz and d'Eon 2014). A sampled reflection below the surface, or
-// refraction above it, is light that other microfacets would take up: absorbed, as in all of this model.
+// sampled by their visible normals (Heitz and d'Eon 2014). A sampled reflection below the surface, or a
+// refraction above it, is absorbed: it would meet other microfacets, which this model leaves out.
 //
-// Seen from wo's side, whatever it is: eta is the index beyond over the index here. With m the microfacet's
-// normal, V = visible_over_D(wo) and q = dot(wo, m) + eta dot(wi, m) = +-|wo + eta wi|:
+// Seen from wo's side, whichever it is: eta is the index beyond over the index on this side. With m the
+// microfacet's normal, V = visible_over_D(wo) and q = dot(wo, m) + eta dot(wi, m) = +-|wo + eta wi|:
 //   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
 //   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
 // where 1 / eta^2, for radiance, cancels the eta^2 of the value.
@@ -32,7 +32,7 @@ struct RoughDielectric {
     const float q2 = dot(h, h);
     const V3 m = normalize(h);
     const float om = dot(wo, m), im = dot(wi, m);
-    // Facets seen from behind, by either; wi in the plane sends nothing.
+    // The facet is seen from behind by wo or wi, or wi lies in the surface plane.
     if (!(om > 0) || !(reflected ? im > 0 : im < 0) || wi.z == 0) return {};
     const auto F = static_cast<float>(fresnel_dielectric(om, eta).reflectance);
     const float D = facets.D(m), V = facets.visible_over_D(wo);

@@ -1,4 +1,4 @@
-// What the dielectric coat of a rough plastic lets through, on average over its microfacets.
+// Transmittance of the dielectric coat of rough plastic, averaged over its microfacets.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@ namespace ls::render {
 inline constexpr int kPlasticNodes = 64;
 
 struct RoughPlasticTable {
-  std::array<float, kPlasticNodes>
-      transmittance{};             // from outside, at cos = i / (kPlasticNodes - 1); linear between
-  float internal_reflectance = 0;  // of diffuse light from inside
+  // from outside, at cos = i / (kPlasticNodes - 1); linear between nodes
+  std::array<float, kPlasticNodes> transmittance{};
+  float internal_reflectance = 0;  // for diffuse light from inside
 
   float at(float cos_theta) const {
     const float x = cos_theta * (kPlasticNodes - 1);
@@ -23,7 +23,7 @@ struct RoughPlasticTable {
 };
 
 // The nodes, the linear interpolation between them and the internal reflectance 2 mean(R(mu_i) mu_i) over the
-// nodes (a plain mean, not a quadrature: it lies about 0.009 below the integral) are the dialect's definition
+// nodes (a plain mean, not a quadrature: about 0.009 below the integral) are part of the dialect's definition
 // of the material. At the nodes: integrals over visible normals of (1 - F) G1(refracted) and F G1(reflected),
 // by Gauss-Legendre in double. alpha < kSpecularAlpha: a smooth coat. eta: inside over outside.
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);

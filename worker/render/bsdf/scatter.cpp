@@ -1,4 +1,4 @@
-// eval() and sample(): the lobes of one-sided kinds of material, and the way to the others.
+// eval() and sample(): the lobes of one-sided material kinds, and the dispatch to the others.
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/lobes.h"
 
@@ -8,13 +8,13 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// ---- diffuse
+// Diffuse.
 BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
   const float p = wi.z * kInvPi;
   return {reflectance * p, p};
 }
 
-// ---- conductors
+// Conductors.
 struct Metal {
   C3 eta, k, tint;
   C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
@@ -26,7 +26,7 @@ BsdfEval eval_rough_metal(const Metal& metal, const Microfacets& facets, const V
   return {metal.reflectance(dot(wo, h)) * (.25f * D * G), D * facets.pdf_over_D(wo)};
 }
 
-// The weight is F G1(wi) times a ratio near 1: D, which may be huge or lose digits, stays out of it.
+// The weight is F G1(wi) times a ratio near 1: D, which may be huge or lose digits, cancels out.
 std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo,
                                              const V2& u) {
   const V3 h = facets.sample_normal(wo, u);
@@ -41,12 +41,12 @@ std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microface
   return s;
 }
 
-// ---- plastics
+// Plastics.
 float coat_reflectance(float cos, float ior) {
   return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
 }
 
-// kSmooth: the coat is a plane boundary, by Fresnel's formulas; else a rough one, by tables.
+// kSmooth: the coat is a plane boundary, by Fresnel's formulas; otherwise a rough one, by tables.
 template <bool kSmooth>
 struct Plastic {
   const Material& m;
@@ -69,7 +69,7 @@ struct Plastic {
     if (kSmooth) return 1 - coat_reflectance(cos, m.ior);
     return m.energy ? m.energy->through.at(cos) : m.coat.at(cos);
   }
-  // Light that entered, was scattered any number of times below the coat, and left.
+  // Light that entered, scattered any number of times below the coat, and left.
   C3 diffuse_f_cos(const V3& wi) const {
     const float r = m.coat.internal_reflectance;
     const C3 inside = m.nonlinear ? C3(1) - diffuse * r : C3(1 - r);
@@ -121,7 +121,7 @@ V3 flipped(const V3& w) { return {w.x, w.y, -w.z}; }
 
 }  // namespace
 
-// What most surfaces are, diffuse and of one reflectance everywhere, needs nothing that the others do.
+// Uniform diffuse, the most common material, is handled here without the overhead of the others.
 BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Material* m = &materials_[i.value];
   V3 o = wo, in = wi;
@@ -130,7 +130,7 @@ BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3&
     if (o.z < 0) o = flipped(o), in = flipped(in);
   }
   if (m->kind >= kFirstWide) return eval_wide(*m, uv, o, in);
-  if (!(o.z > 0) || !(in.z > 0)) return {};  // none of the others has a smooth lobe on the back
+  if (!(o.z > 0) || !(in.z > 0)) return {};  // no other kind has a smooth lobe on the back
   if (m->kind == MaterialKind::diffuse) return eval_diffuse(m->second_slot.value, in);
   return eval_lobes(*m, uv, o, in);
 }

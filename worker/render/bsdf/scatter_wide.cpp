@@ -1,9 +1,9 @@
-// Kinds that scatter to both sides of the surface, let light pass, or consist of others. Materials that
-// consist of others recurse into them, at most scene::kMaxBsdfNesting deep (checked by build()).
+// Kinds that scatter to both sides of the surface, let light pass, or consist of other materials. The latter
+// recurse, at most scene::kMaxBsdfNesting deep (checked by build()).
+#include "worker/render/base/work_counters.h"
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/principled.h"
 #include "worker/render/bsdf/rough_dielectric.h"
-#include "worker/render/counters.h"
 
 namespace ls::render {
 
@@ -11,7 +11,8 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Of a sheet, with all reflections between its two sides: R + T R T + T R^3 T + ... = 2 R / (1 + R).
+// Reflectance of a sheet, with all reflections between its two sides: R + T R T + T R^3 T + ... = 2 R / (1 +
+// R).
 float sheet_reflectance(float cos, float ior) {
   const double r = fresnel_dielectric(std::abs(cos), ior).reflectance;
   return static_cast<float>(2 * r / (1 + r));
@@ -25,33 +26,32 @@ V3 mapped_normal(const Material& m, const Lookup& look, const UvPoint& at) {
   if (m.specular_slot.constant) return {0, 0, 1};
   const V2 slope = look.textures.slope(m.specular_slot.texture, at.uv) * m.specular_weight;
   const V3 n = cross({at.du.x, at.du.y, slope.x}, {at.dv.x, at.dv.y, slope.y});
-  if (n.z == 0) return {0, 0, 1};  // u and v are no directions here
-  return n.z < 0 ? -n : n;         // they may run either way
+  if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are degenerate here
+  return n.z < 0 ? -n : n;         // (u, v) may have either handedness
 }
-// The frame that the material in it sees: s as near to the surface's as the normal allows. A normal that
-// faces away from the viewer is turned by half a circle about the surface's (Schuessler et al. 2017).
+// The frame for the nested material: s as near to the surface's as the normal allows. A normal that faces
+// away from the viewer is rotated by half a turn about the surface's (Schuessler et al. 2017).
 Frame mapped_frame(const Material& m, const Lookup& look, const UvPoint& at, const V3& wo) {
   V3 n = mapped_normal(m, look, at);
   if (m.flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
   const float l2 = dot(n, n);
   return l2 > 0 && std::isfinite(l2) ? Frame::from_tangent(n * (1 / std::sqrt(l2)), V3(1, 0, 0)) : Frame();
 }
-// What the shadow that facets of the map's slope cast on each other leaves of light from wi (Estevez, Lecocq,
-// Stein 2019).
+// Shadowing factor for light from wi, by facets with the map's slope (Estevez, Lecocq, Stein 2019).
 float mapped_shadow(const Material& m, const V3& n, const V3& wi) {
   if (!m.shadows) return 1;
   const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
   return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
 }
-// Both frames must have a direction on the same side: nothing is lit, or seen, through the surface.
+// A direction must be on the same side in both frames: nothing is lit or seen through the surface.
 bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 
 V3 to_side(const V3& w, bool outside) { return {w.x, w.y, outside ? w.z : -w.z}; }
 
 }  // namespace
 
-// A blend seen from wo. `share` is each part's in the mixture, `chance` that of being sampled: parts that
-// only let light pass have nothing to be sampled.
+// A blend seen from wo. `share`: weight of each part in the mixture; `chance`: probability of sampling it
+// (null parts are never sampled).
 struct BsdfTable::Mixture {
   float share[2], chance[2];
 };
@@ -59,17 +59,17 @@ struct BsdfTable::Mixture {
 BsdfTable::Mixture BsdfTable::mixture(const Material& m, const UvPoint& uv, const V3& wo) const {
   const float w = Lookup{*textures_, uv}.share(m.specular_slot);
   Mixture x{{1 - w, w}, {1 - w, w}};
-  if (!m.veil) return x;
-  x.chance[0] *= 1 - veil({m.front}, uv, wo).probability;
-  x.chance[1] *= 1 - veil({m.back}, uv, wo).probability;
+  if (!m.null_transmission) return x;
+  x.chance[0] *= 1 - null_transmission({m.front}, uv, wo).probability;
+  x.chance[1] *= 1 - null_transmission({m.back}, uv, wo).probability;
   const float sum = x.chance[0] + x.chance[1];
   if (sum > 0) x.chance[1] = std::min(1.f, x.chance[1] / sum);
   x.chance[0] = 1 - x.chance[1];
   return x;
 }
 
-Veil BsdfTable::veil(BsdfIndex i, const UvPoint& uv, const V3& w) const {
-  LS_COUNT(veils);
+NullTransmission BsdfTable::null_transmission(BsdfIndex i, const UvPoint& uv, const V3& w) const {
+  LS_COUNT(null_transmission);
   const Material& m = materials_[i.value];
   const Lookup look{*textures_, uv};
   switch (m.kind) {
@@ -81,24 +81,24 @@ Veil BsdfTable::veil(BsdfIndex i, const UvPoint& uv, const V3& w) const {
     }
     case MaterialKind::mask: {
       const float opacity = look.share(m.specular_slot);
-      const Veil inner = veil({m.front}, uv, w);
+      const NullTransmission inner = null_transmission({m.front}, uv, w);
       return {C3(1) - (C3(1) - inner.transmission) * opacity, 1 - (1 - inner.probability) * opacity};
     }
     case MaterialKind::blend: {
-      if (!m.veil) return {};
+      if (!m.null_transmission) return {};
       const float weight = look.share(m.specular_slot);
-      const Veil a = veil({m.front}, uv, w), b = veil({m.back}, uv, w);
+      const NullTransmission a = null_transmission({m.front}, uv, w), b = null_transmission({m.back}, uv, w);
       return {a.transmission * (1 - weight) + b.transmission * weight,
               a.probability * (1 - weight) + b.probability * weight};
     }
     case MaterialKind::normal_map:
     case MaterialKind::bump_map: {
-      if (!m.veil) return {};
+      if (!m.null_transmission) return {};
       const Frame frame = mapped_frame(m, look, uv, w);
       const V3 in = frame.to_local(w);
       if (!same_side(in, w)) return {};
-      Veil v = veil({m.front}, uv.seen_in(frame), in);
-      v.transmission *= mapped_shadow(m, frame.n, w);  // as of all that it scatters
+      NullTransmission v = null_transmission({m.front}, uv.seen_in(frame), in);
+      v.transmission *= mapped_shadow(m, frame.n, w);  // as for all that it scatters
       return v;
     }
     default:
@@ -144,7 +144,7 @@ BsdfEval BsdfTable::eval_wide(const Material& m, const UvPoint& uv, const V3& wo
   }
 }
 
-// Of what a part of a material scatters: a part that is nothing but a veil scatters nothing.
+// Samples a part's scattering; a null part scatters nothing.
 std::optional<BsdfSample> BsdfTable::sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo,
                                                  float u_lobe, V2 u) const {
   if (materials_[part].kind == MaterialKind::null) return std::nullopt;
@@ -178,7 +178,7 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoin
       const float rest = k ? u_lobe / x.chance[1] : (u_lobe - x.chance[1]) / x.chance[0];
       auto s = sample_part(k ? m.back : m.front, uv, wo, std::min(rest, 0x1.fffffep-1f), u);
       if (!s) return s;
-      // Where there is nothing of the other it is as if this one stood alone, bit for bit.
+      // If the other part contributes nothing, the result equals this part's alone, bit for bit.
       if (x.share[1 - k] == 0 && x.chance[1 - k] == 0) return s;
       if (s->delta) {
         s->weight *= x.share[k] / x.chance[k];

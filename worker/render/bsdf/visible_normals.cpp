@@ -38,8 +38,8 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// How much of what comes from i = (sin, 0, cos) a microfacet with normal m sends on one way, times the
-// masking of the new direction.
+// Share of light from i = (sin, 0, cos) that a microfacet with normal m sends this way, times the masking of
+// the new direction.
 double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
                double my, double mz) {
   const double im = sin * mx + cos * mz;
@@ -70,8 +70,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
     for (std::size_t b = 0; b < q.x.size(); ++b) {
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
-      } else {  // visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are
-                // alike
+      } else {
+        // Visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are equal.
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);

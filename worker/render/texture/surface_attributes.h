@@ -1,5 +1,5 @@
-// What meshes carry at their vertices or faces for textures to read (`mesh_attribute`), by surface: filled in
-// where the meshes are loaded, looked up only where such a texture is evaluated.
+// Mesh attributes at vertices or faces, for `mesh_attribute` textures, by surface. Filled when meshes are
+// loaded, read only where such a texture is evaluated.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 #include "worker/render/texture/uv_point.h"
 
 namespace ls::render {
@@ -19,22 +19,23 @@ struct SurfaceAttributes {
 
   struct Channel {  // one attribute of one mesh
     bool per_face = false;
-    std::uint32_t base = 0;  // the mesh's first vertex, or triangle, in the world's lists
+    std::uint32_t base = 0;  // index of the mesh's first vertex, or triangle, in the world's lists
     std::uint32_t count = 0;
-    std::size_t first = 0;                      // in values
-    std::uint32_t name = 0, next = kNoChannel;  // next: of the same surface
+    std::size_t first = 0;                      // index into values
+    std::uint32_t name = 0, next = kNoChannel;  // next: next channel of the same surface
   };
-  std::map<std::string, std::uint32_t, std::less<>> names;  // what the scene's textures read, numbered
-  std::vector<std::uint32_t> first_of;                      // channels, by surface
+  // attributes that the scene's textures read, numbered
+  std::map<std::string, std::uint32_t, std::less<>> names;
+  std::vector<std::uint32_t> first_of;  // first channel of each surface
   std::vector<Channel> channels;
-  std::vector<C3> values;     // a lone number thrice
-  std::vector<C3> means;      // by name, of all values
-  std::uint64_t clamped = 0;  // negative ones, made 0
+  std::vector<C3> values;     // scalars are stored three times
+  std::vector<C3> means;      // by name, over all values
+  std::uint64_t clamped = 0;  // negative values set to 0
 
   bool empty() const { return channels.empty(); }
   std::uint64_t bytes() const { return values.size() * sizeof(C3); }
   void find_means();
-  // `corners`: three vertices a triangle. Black where the surface has nothing of this name.
+  // `corners`: three vertex indices per triangle. Black if the surface has no attribute of this name.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
     std::uint32_t i = first_of[at.surface];
     while (i != kNoChannel && channels[i].name != name) i = channels[i].next;

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "worker/render/counters.h"
+#include "worker/render/base/work_counters.h"
 
 namespace ls::render {
 
@@ -12,7 +12,7 @@ double srgb_to_linear(double v) { return v <= .04045 ? v / 12.92 : std::pow((v +
 
 namespace {
 
-// One coordinate folded into [0, 1]; any finite u, however large.
+// Wraps one coordinate into [0, 1], for any finite u.
 float fold(float u, Wrap wrap) {
   switch (wrap) {
     case Wrap::repeat:
@@ -27,7 +27,8 @@ float fold(float u, Wrap wrap) {
   return std::clamp(u, 0.f, 1.f);
 }
 
-// Its derivative; beyond the edges of a clamped image neighbours() are the same texel, and slopes 0 anyway.
+// Derivative of fold(). Beyond the edges of a clamped image both neighbours() are the same texel, so slopes
+// are 0 anyway.
 float fold_slope(float u, Wrap wrap) {
   return wrap == Wrap::mirror && u - 2 * std::floor(u * .5f) > 1 ? -1.f : 1.f;
 }
@@ -36,8 +37,8 @@ struct Span2 {
   std::uint32_t lo, hi;
   float t;  // weight of hi
 };
-// The two texels around u in [0, 1]. The neighbour over the edge is the opposite edge when repeating, else
-// the edge itself (also when mirroring: texel -1 mirrors to texel 0).
+// The two texels around u in [0, 1]. The neighbour beyond the edge is at the opposite edge when repeating,
+// else the edge itself (also when mirroring: texel -1 mirrors to texel 0).
 Span2 neighbours(float u, std::uint32_t n, Wrap wrap) {
   const float x = u * static_cast<float>(n) - .5f, f = std::floor(x);
   const std::int64_t lo = static_cast<std::int64_t>(f), last = n - 1;
@@ -63,7 +64,7 @@ C3 mean_of(const Texels& t) {
   return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
 }
 
-// Keeps `keep` of `have` interleaved channels, from `first` on.
+// Keeps `keep` of `have` interleaved channels, starting at `first`.
 template <class T>
 void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, std::uint32_t keep) {
   if (have == keep) return;
@@ -74,8 +75,8 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
   v.shrink_to_fit();
 }
 
-// Whether the last channel is an alpha that masks: images whose colour is the mask also come with one that is
-// all but opaque.
+// True if the last channel is an alpha that masks: some images whose colour is the mask also have an alpha
+// that is nearly opaque.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

@@ -1,5 +1,5 @@
-// The texels of one image, ready to look up: 8-bit codes stay 8 bits (a table decodes them before filtering),
-// all else is linear float32. Grey keeps one channel.
+// The texels of one image, ready for lookup: 8-bit codes stay 8 bits (a table decodes them before filtering),
+// everything else is linear float32. Grey images keep one channel.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 #include "common/assets/data.h"
 #include "common/scene/scene.h"
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
@@ -18,11 +18,11 @@ double srgb_to_linear(double v);
 
 struct Texels {
   std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3
-  std::vector<std::uint8_t> u8;                       // one of the two
+  std::vector<std::uint8_t> u8;                       // either u8 or f32 is used
   std::vector<float> f32;
-  std::array<float, 256> decode{};  // of u8
+  std::array<float, 256> decode{};  // decoding table of u8
   C3 mean{0, 0, 0};
-  std::uint64_t clamped = 0;  // negative values made 0
+  std::uint64_t clamped = 0;  // negative values set to 0
 
   C3 texel(std::uint32_t x, std::uint32_t y) const {
     const std::size_t i = (static_cast<std::size_t>(y) * width + x) * channels;
@@ -33,14 +33,15 @@ struct Texels {
     if (channels == 1) return C3(f32[i]);
     return {f32[i], f32[i + 1], f32[i + 2]};
   }
-  // uv finite, (0, 0) the upper left corner of the image.
+  // uv must be finite; (0, 0) is the upper left corner of the image.
   C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
-  // Derivatives of the luminance of the bilinear lookup() by u and v.
+  // Derivatives by u and v of the luminance of the bilinear lookup().
   V2 slope(const V2& uv, Wrap wrap) const;
 };
 
-// Drops alpha, decodes sRGB unless raw, refuses NaN and infinity with the texel's place. With `alpha` it is
-// the colour that is dropped, if the image has an alpha channel that falls below 1/2 somewhere.
+// Drops alpha, decodes sRGB unless `raw`, and rejects NaN and infinity with the texel's position. With
+// `alpha` the alpha channel is kept instead of the colour, if the image has one that falls below 1/2
+// somewhere.
 Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false);
 
 }  // namespace ls::render

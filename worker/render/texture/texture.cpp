@@ -11,7 +11,7 @@
 
 #include "common/base/overloaded.h"
 #include "common/scene/limits.h"
-#include "worker/render/built.h"
+#include "worker/render/base/built.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -20,7 +20,7 @@ namespace {
 
 struct UvAffine {
   float a = 1, b = 0, c = 0, d = 0, e = 1, f = 0;
-  // Not finite becomes 0: a lookup never sees NaN.
+  // Maps non-finite coordinates to 0, so that lookups never see NaN.
   V2 operator()(const V2& uv) const {
     const V2 p(a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f);
     return {std::isfinite(p.x) ? p.x : 0, std::isfinite(p.y) ? p.y : 0};
@@ -41,9 +41,9 @@ struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  std::uint32_t first = 0, second = 0;  // texels, the two textures of a checkerboard, the one of a peak, the
-                                        // name of an attribute
-  C3 value{0, 0, 0};                    // of a constant; else the mean
+  // index of the texels; the two textures of a checkerboard; the texture of a peak; the name of an attribute
+  std::uint32_t first = 0, second = 0;
+  C3 value{0, 0, 0};  // of a constant; otherwise the mean
   UvAffine to_uv;
   float scale = 1;  // of an attribute
 };
@@ -78,7 +78,7 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
 }
 
-// What no mesh has is read nowhere: Geometry::build has refused all else.
+// An attribute that no mesh has is never read: Geometry::build rejects all other uses.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;
@@ -103,8 +103,8 @@ C3 hue_of(const C3& c) {
   return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
 }
 
-// Means of what contains other textures, children first. A chain of n takes n passes; one that never settles
-// is a circle.
+// Means of textures that contain others, children first. A chain of n takes n passes; one that never settles
+// is a cycle.
 Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {
@@ -143,7 +143,7 @@ const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv, 
   return *e;
 }
 
-// Of what is no checkerboard. As deep as textures nest: kMaxReferenceDepth at most.
+// Value of any texture but checkerboards. Recurses as deep as textures nest: kMaxReferenceDepth at most.
 C3 value_of(const TextureTable& table, const Entry& t, const V2& uv, const FacePoint* face) {
   if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv, face));
   if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv, face));

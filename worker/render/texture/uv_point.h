@@ -1,13 +1,13 @@
-// A place on a surface as textures see it, and what moving about in (u, v) does there.
+// A point on a surface as textures see it, with the derivatives of position by (u, v).
 #pragma once
 
 #include <cstdint>
 
-#include "worker/render/math.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
-// Where on which triangle: what attributes of meshes are read by. Its corners weigh 1 - b1 - b2, b1, b2.
+// A point on a triangle, for reading mesh attributes. The corners have the weights 1 - b1 - b2, b1, b2.
 struct FacePoint {
   std::uint32_t surface = 0, triangle = 0;
   float b1 = 0, b2 = 0;
@@ -15,15 +15,15 @@ struct FacePoint {
 
 struct UvPoint {
   V2 uv;
-  // dp/du and dp/dv in scene units, in the local shading frame. Filled in only where something on the surface
-  // asks for them (SurfaceInfo::wants_slopes).
+  // dp/du and dp/dv in scene units, in the local shading frame. Set only where something on the surface needs
+  // them (SurfaceInfo::wants_slopes).
   V3 du{1, 0, 0}, dv{0, 1, 0};
 
-  // Of the surfaces that have attributes (SurfaceInfo::wants_attributes), else nothing; it must outlive this.
+  // Set for surfaces with attributes (SurfaceInfo::wants_attributes), else null; must outlive this.
   const FacePoint* face = nullptr;
 
   UvPoint(float u, float v) : uv(u, v) {}
-  UvPoint(V2 at) : uv(at) {}  // NOLINT: most surfaces are places alone
+  UvPoint(V2 at) : uv(at) {}  // NOLINT: most surfaces need only uv
   UvPoint(V2 at, V3 along_u, V3 along_v, const FacePoint* on = nullptr)
       : uv(at), du(along_u), dv(along_v), face(on) {}
   operator V2() const { return uv; }

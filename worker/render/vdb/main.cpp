@@ -1,5 +1,6 @@
-// lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/vdb_process.h, and ends.
-// The reply goes to the file that it inherits as kVdbReplyFd. MOST_BYTES of memory: its own and the reply's.
+// lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/media/vdb_process.h and
+// exits. Writes the reply to the inherited file kVdbReplyFd. MOST_BYTES limits its own memory plus the
+// reply's.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -10,14 +11,14 @@
 #include <cstdlib>
 #include <limits>
 
-#include "worker/render/vdb_limit.h"
-#include "worker/render/vdb_reply.h"
+#include "worker/render/media/vdb_limit.h"
+#include "worker/render/media/vdb_reply.h"
 
 namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // the largest grids take seconds
 
-// It lives no longer than who asked, and takes no more than a file can be worth and who asked has left.
+// Ends with its parent, and limits resources to what a file can need and the parent has left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -33,7 +34,7 @@ void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
 }
 
-// Of memory at once, so far.
+// Peak memory so far, in bytes.
 std::uint64_t taken() {
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);
@@ -73,7 +74,7 @@ int main(int argc, char** argv) {
   reply.grid = grid;
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
-  // Padded, so that the file always reaches to where values begin.
+  // Padded, so that the file always extends to where values begin.
   written = written && ::ftruncate(ls::render::kVdbReplyFd, ls::render::kVdbValuesAt) == 0;
   if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);

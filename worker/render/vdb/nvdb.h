@@ -1,6 +1,6 @@
-// NanoVDB files (.nvdb) of ABI 32, as NanoVDB of OpenVDB 9 to 11 writes them. Read here, byte by byte with
-// every offset checked: NanoVDB's own reader trusts the file. A grid is a buffer that its nodes point around
-// in, compressed as a whole by nothing, zlib or Blosc; layout by PNanoVDB.h, the library's portable
+// Reader of NanoVDB files (.nvdb) of ABI 32, as written by NanoVDB of OpenVDB 9 to 11. Every offset is
+// checked, because NanoVDB's own reader trusts the file. A grid is a buffer with offsets between its nodes,
+// stored as a whole uncompressed, with zlib or with Blosc; layout by PNanoVDB.h, the library's portable
 // description.
 #pragma once
 
@@ -10,17 +10,17 @@
 #include <span>
 #include <string>
 
-#include "worker/render/vdb_module.h"
+#include "worker/render/media/vdb_module.h"
 
 namespace ls::render {
 
-bool is_nvdb(const std::filesystem::path& path);  // by its first bytes
+bool is_nvdb(const std::filesystem::path& path);  // decided by its first bytes
 
-// As ls_vdb_read, but throws Refused and std::bad_alloc; out.values is then to be freed all the same.
+// Like ls_vdb_read, but throws Refused and std::bad_alloc; out.values must be freed even then.
 void read_nvdb(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
                LsVdbGrid& out);
 
-// Of its parts: the bytes of a file, and a grid's buffer into values. `name` for messages.
+// Its two steps: from the bytes of a file, and from a grid's buffer to values. `name` is for messages.
 void decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std::uint64_t max_values,
                  LsVdbGrid& out);
 void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,

@@ -1,4 +1,4 @@
-// Numbers out of a buffer that nobody vouches for.
+// Bounds-checked access to an untrusted buffer.
 #pragma once
 
 #include <bit>

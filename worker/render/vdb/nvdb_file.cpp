@@ -16,9 +16,9 @@ constexpr std::uint64_t kFileBytes = std::uint64_t{8} << 30;
 constexpr std::size_t kMaxGrids = 4096;
 constexpr std::uint32_t kMaxName = 1 << 16;
 constexpr std::uint32_t kAbi = 32;
-// Neither zlib (1032) nor Blosc's codecs make more out of a byte.
+// Neither zlib (at most 1032) nor Blosc's codecs expand a byte to more.
 constexpr std::uint64_t kMaxExpansion = 1100;
-// Blosc's buffers are cut into pieces of this many bytes.
+// Blosc buffers are split into pieces of this many bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
 
 enum Codec : std::uint16_t { kPlain, kZip, kBlosc };
@@ -40,12 +40,12 @@ std::vector<std::byte> contents(const std::filesystem::path& path) {
 
 struct Entry {
   std::string name;
-  std::uint64_t at = 0, stored = 0, bytes = 0;  // where it lies in the file, its size there, and expanded
+  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset in the file, size there, and size when decompressed
   std::uint16_t codec = kPlain;
 };
 
-// The file is a sequence of segments: 16 bytes of header, of each grid 176 bytes of metadata and its name,
-// then the grids themselves.
+// The file is a sequence of segments: 16 bytes of header, then for each grid 176 bytes of metadata and its
+// name, then the grids themselves.
 std::vector<Entry> table_of(const NvdbBytes& file) {
   std::vector<Entry> all;
   for (std::uint64_t at = 0; at < file.size();) {
@@ -89,7 +89,7 @@ std::string names_of(const std::vector<Entry>& all) {
   return names;
 }
 
-// The grid of this name; without one the only grid there is, or "density".
+// The grid of this name; with an empty name the only grid, or "density".
 const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
   if (all.empty()) throw Refused{1, "the file holds no grid"};
   if (wanted.empty() && all.size() == 1) return all.front();

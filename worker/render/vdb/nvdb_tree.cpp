@@ -13,7 +13,7 @@ namespace {
 
 using Coord = std::array<std::int64_t, 3>;
 
-// ---- layout: of the grid, 672 bytes; of the tree behind it; of nodes, by the type of values
+// Offsets in the grid (672 bytes), in the tree behind it, and in nodes, which depend on the type of values.
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
@@ -40,7 +40,7 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// Of a voxel; the first of them, or all three.
+// The value of a voxel: one component, or all three.
 using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {
@@ -101,7 +101,7 @@ class Tree {
     out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
 
-  // The box of the active voxels and one voxel around it, and where it is.
+  // Finds the box of the active voxels, enlarged by one voxel, and its transform.
   void place() {
     std::uint64_t count = 1;
     for (int k = 0; k < 3; ++k) {
@@ -152,7 +152,7 @@ class Tree {
     return v;
   }
 
-  // Voxel n of a leaf. Quantised ones are codes of 1 to 16 bits, and the leaf's minimum and step.
+  // Voxel n of a leaf. Quantised leaves store codes of 1 to 16 bits, with the leaf's minimum and step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
     if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
@@ -265,7 +265,7 @@ class Tree {
   Type type_ = kFloat;
   Layout layout_{};
   std::uint64_t root_ = 0;
-  Coord lo_{}, end_{};  // of what is read: [lo, end)
+  Coord lo_{}, end_{};  // box that is read: [lo, end)
 };
 
 }  // namespace

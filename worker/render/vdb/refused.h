@@ -1,4 +1,4 @@
-// How the module's readers refuse a file: caught at its door.
+// Exception with which the module's readers reject a file; ls_vdb_read catches it.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 namespace ls::render {
 
 struct Refused {
-  int code;  // what ls_vdb_read returns: 1 the file is at fault, 2 a limit
+  int code;  // the return value of ls_vdb_read: 1 the file is at fault, 2 a limit
   std::string text;
 };
 
-// Room for so many values, whose number is no damaged file's: it has been held against the limit.
+// Allocates this many values; the caller has already checked the number against the limit.
 inline float* room_for(std::uint64_t values) {
   float* room = new (std::nothrow) float[values];
   if (!room)

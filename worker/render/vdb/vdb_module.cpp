@@ -1,4 +1,4 @@
-#include "worker/render/vdb_module.h"
+#include "worker/render/media/vdb_module.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
@@ -33,7 +33,7 @@ std::string names_of(const openvdb::io::File& file) {
   return names.empty() ? "none" : names;
 }
 
-// The grid of this name; without one the only grid there is, or "density".
+// The grid of this name; with an empty name the only grid, or "density".
 std::string choose(const openvdb::io::File& file, const std::string& wanted) {
   std::vector<std::string> names;
   for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
@@ -133,8 +133,8 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
 void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
   initialize_once();
   openvdb::io::File file(path);
-  file.open(false);                                        // no delayed loading: errors must show here
-  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)  // OpenVDB would go on, with a warning
+  file.open(false);                                        // no delayed loading, so that errors occur here
+  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)  // OpenVDB would only warn
     throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
                          " of the OpenVDB format; versions up to " +
                          std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};
@@ -184,7 +184,7 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
   } catch (const Refused& r) {
     return say(r.code, r.text);
   } catch (const std::bad_alloc&) {
-    // A small file that wants all memory is a damaged one: its counts are garbage.
+    // A small file that asks for all memory is damaged: its counts are garbage.
     std::error_code unknown;
     const auto bytes = std::filesystem::file_size(path, unknown);
     if (!unknown && bytes < kSmallFile) return say(1, kDamaged);

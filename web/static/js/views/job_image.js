@@ -6,7 +6,7 @@ import { choice, safeClass } from "./pieces.js";
 
 const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Samples"]];
 const kNames = { picture: "as it is now", error: "error of each pixel", samples: "samples of each pixel" };
-// The ends of the maps' colours (common/image/maps.h), with equal factors between.
+// The ends of the maps' colours (common/image/exr/maps.h), with equal factors between.
 const kLegends = { error: ["0.1 %", "100 % or more", "relative standard error of a pixel"], samples: ["2", "16,384 or more", "samples of a pixel"] };
 const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
 

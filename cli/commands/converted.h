@@ -1,0 +1,34 @@
+// A scene's canonical XML, with the files that must be copied for it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/local/local_scene.h"
+
+namespace ls::cli {
+
+struct FileCopy {
+  std::string name_before;  // the name in the original scene
+  std::filesystem::path from, to;
+  Digest digest;
+  bool renamed = false;
+};
+
+struct Converted {
+  std::string text;
+  Digest digest;                 // of the scene that the text describes
+  std::vector<FileCopy> copies;  // files that are not in place yet
+};
+
+// Converts for a file `out`. In the folder of the original, names are unchanged and nothing is copied. In
+// another folder, files keep their names relative to it; files whose name is absolute or leads out by ".."
+// are put into the folder itself. The text is read back and compared; internal: it is not the same scene.
+// already_exists: the folder has another file of such a name.
+Result<Converted> convert_scene(const LocalScene& scene, const std::filesystem::path& out);
+
+// Copies completely or not at all; creates missing folders.
+Result<void> copy_beside(const FileCopy& copy);
+
+}  // namespace ls::cli

@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "cli/commands/commands.h"
+#include "cli/commands/inspection.h"
+#include "cli/local/local_world.h"
+#include "cli/local/variants.h"
+#include "cli/output/console.h"
+#include "cli/output/job_options.h"
+#include "worker/machine.h"
+#include "worker/render/base/work_counters_list.h"
+
+namespace ls::cli {
+namespace {
+
+struct InspectFlags {
+  std::string scene, frame;
+  std::vector<std::string> defines;
+  bool json = false, strict = false, variants = false, work = false;
+};
+
+// Large enough to reach all parts of a scene, and small enough to be fast.
+constexpr int kSmallSide = 32;
+constexpr SampleRange kSmallSamples{0, 4};
+
+FrameSize small(FrameSize size) {
+  const int longer = std::max(size.width, size.height);
+  const auto scaled = [&](int x) { return longer <= kSmallSide ? x : std::max(1, x * kSmallSide / longer); };
+  return {scaled(size.width), scaled(size.height)};
+}
+
+// The sums of a small image by every variant that covers the scene.
+tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene, JobSpec spec,
+                                                                     FrameSize full) {
+  spec.size = small(full);
+  const auto built = build_local_world(scene, spec, worker::usable_cpus());
+  if (!built) return tl::unexpected(built.error());
+  const PixelRect all{0, 0, spec.size->width, spec.size->height};
+  const double paths =
+      static_cast<double>(all.pixels()) * static_cast<double>(kSmallSamples.s1 - kSmallSamples.s0);
+  return measure_variants(render::covering_variants(*built->world), paths, InstructionCounter::open(),
+                          [&](const std::string& name) {
+                            const auto tile = render::render_tile_as(*built->world, name, all, kSmallSamples);
+                            return sha256(std::as_bytes(std::span(tile.sums)));
+                          });
+}
+
+// The work counters of a small image.
+tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
+    [[maybe_unused]] const LocalScene& scene, [[maybe_unused]] JobSpec spec,
+    [[maybe_unused]] FrameSize full) {
+#ifdef LIGHTSHAFT_COUNT
+  spec.size = small(full);
+  const auto built = build_local_world(scene, spec, worker::usable_cpus());
+  if (!built) return tl::unexpected(built.error());
+  render::work_counters() = {};
+  render::render_tile(*built->world, {0, 0, spec.size->width, spec.size->height}, kSmallSamples, nullptr,
+                      nullptr);
+  nlohmann::ordered_json work;
+  for (const auto& [name, count] : render::listed(render::work_counters())) work[name] = count;
+  return work;
+#else
+  return tl::unexpected(coordinator::Rejected{
+      {Errc::invalid_argument, "this build does not count work: configure one with -DLIGHTSHAFT_COUNT=ON"},
+      {}});
+#endif
+}
+
+int run(const InspectFlags& flags) {
+  JobSpec spec;
+  auto defines = parse_defines(flags.defines);
+  if (!defines) return print_error(defines.error());
+  spec.defines = std::move(*defines);
+  std::optional<std::uint32_t> frame;
+  if (!flags.frame.empty()) {
+    const auto number = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
+    if (!number) return print_error(number.error());
+    frame = static_cast<std::uint32_t>(*number);
+  }
+  const auto scene = read_local_scene(flags.scene, spec.defines, flags.strict, frame);
+  if (!scene) return print_rejected(scene.error());
+  const auto built = build_local_world(*scene, spec, worker::usable_cpus());
+  if (!built) return print_rejected(built.error());
+  for (const std::string& warning : built->job.warnings)
+    fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
+  VariantBitsList variants;
+  if (flags.variants) {
+    auto rendered = render_variants(*scene, spec, built->job.settings.size);
+    if (!rendered) return print_rejected(rendered.error());
+    variants = std::move(*rendered);
+  }
+  auto report = inspection(*scene, *built, variants);
+  if (flags.work) {
+    const auto work = count_work(*scene, spec, built->job.settings.size);
+    if (!work) return print_rejected(work.error());
+    report["work"] = *work;
+  }
+  const auto text = flags.json ? report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                               : inspection_text(report);
+  fmt::print("{}", text);
+  return report.value("variants_agree", true) ? kOk : kFailed;
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<InspectFlags>();
+  CLI::App* inspect =
+      app.add_subcommand("inspect", "read and check a scene without rendering; say what it needs");
+  inspect->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
+  inspect->add_option("-D,--define", flags->defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  inspect->add_flag("--strict", flags->strict, "warnings are errors");
+  inspect->add_flag("--variants", flags->variants,
+                    "renders a small image with every instantiation that covers the scene: their bits must "
+                    "be the same; and "
+                    "counts their instructions, if this machine can");
+  inspect->add_flag("--work", flags->work,
+                    "counts the work of a small image (builds with LIGHTSHAFT_COUNT only)");
+  inspect->add_flag("--json", flags->json, "as JSON");
+  inspect->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,163 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "cli/commands/commands.h"
+#include "cli/local/local_scene.h"
+#include "cli/output/console.h"
+#include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
+#include "common/image/exr/final_image.h"
+#include "common/image/film/merge.h"
+#include "common/protocol/limits.h"
+#include "common/scene/analysis/prune.h"
+#include "common/scene/json/serialize.h"
+#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/store/files.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeFlags {
+  std::vector<std::string> partials, defines;
+  std::string out, report, scene;
+  std::optional<std::uint32_t> frame;
+  bool float_output = false;
+};
+
+// A folder stands for the EXR files in it, sorted by name: there may be more than a command line can hold.
+Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const std::string& argument : arguments) {
+    if (!fs::is_directory(argument, error)) {
+      files.emplace_back(argument);
+      continue;
+    }
+    const auto before = static_cast<std::ptrdiff_t>(files.size());
+    for (fs::directory_iterator entry(argument, error), end; !error && entry != end; entry.increment(error))
+      if (entry->path().extension() == ".exr") files.push_back(entry->path());
+    if (error) return fail(Errc::invalid_argument, fmt::format("{}: {}", argument, error.message()));
+    std::sort(files.begin() + before, files.end());
+  }
+  if (files.empty()) return fail(Errc::invalid_argument, "there is no .exr file in the folders given");
+  return files;
+}
+
+Result<void> write_report(const MergeFlags& flags, const Merged& merged, const std::string& digest,
+                          std::uint64_t clamped) {
+  const FrameSize size = merged.film.grid().frame;
+  const ImageError error = image_error(merged.film.error());
+  const nlohmann::ordered_json j{{"pixels_sha256", digest},
+                                 {"size", {size.width, size.height}},
+                                 {"spp", error.spp},
+                                 {"samples", merged.film.samples()},
+                                 {"rmse", error.rmse},
+                                 {"rmse_ci95", {error.rmse_lo, error.rmse_hi}},
+                                 {"relmse", error.relmse},
+                                 {"relmse_ci95", {error.relmse_lo, error.relmse_hi}},
+                                 {"trusted", error.trusted},
+                                 {"verdict", error.verdict},
+                                 {"few_hits_pixels", error.few_hits},
+                                 {"pixels_without_samples", merged.film.pixels_without_samples()},
+                                 {"scene", merged.scene.hex()},
+                                 {"settings", merged.settings.hex()},
+                                 {"numeric_class", merged.numeric_class.hex()},
+                                 {"duplicates", merged.duplicates},
+                                 {"clamped_values", clamped}};
+  return save_result(flags.report, j.dump(2) + "\n");
+}
+
+// True if some job of the scene has this digest; the integrator, which partials do not name, affects pruning.
+bool is_of(const Scene& scene, const Digest& digest) {
+  const std::string own = scene.integrator.name;
+  return std::ranges::any_of(
+      std::array<std::string, 3>{own, "path", "volpath"}, [&](const std::string& name) {
+        return digest_of(scene::pruned(scene, scene::pruned_for(name, scene.integrator.max_depth)).scene) ==
+               digest;
+      });
+}
+
+// Partials contain only identifiers; the names for the Cryptomatte manifests come from the scene.
+tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags,
+                                                                    const Merged& merged) {
+  const AovSet aovs = merged.film.aovs();
+  const auto defines = parse_defines(flags.defines);
+  if (!defines) return tl::unexpected(coordinator::Rejected{defines.error(), {}});
+  const auto scene =
+      read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
+  if (!scene) return tl::unexpected(scene.error());
+  if (!is_of(scene->scene, merged.scene))
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument,
+         fmt::format("the partials are of scene {}, and {} is another one: give the same scene file, with "
+                     "the same -D and --frame",
+                     merged.scene.hex(), flags.scene)},
+        {}});
+  return coordinator::manifests_of(scene->scene, aovs);
+}
+
+int run(const MergeFlags& flags) {
+  if (const auto ok = check_output("-o", flags.out); !ok) return print_error(ok.error());
+  if (!flags.report.empty())
+    if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
+  const auto files = files_of(flags.partials);
+  if (!files) return print_error(files.error());
+  std::vector<PartialSource> sources;
+  for (const fs::path& file : *files)
+    sources.push_back(
+        {file.string(), [file] { return coordinator::read_file(file, limits::kMessageBytes); }});
+  const auto merged = merge_partials(sources);
+  if (!merged) return print_error(merged.error());
+  Provenance provenance;
+  provenance.scene = merged->scene;
+  // Partials identify the settings by digest only.
+  provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
+  provenance.build = LIGHTSHAFT_VERSION;
+  provenance.numeric_class = merged->numeric_class;
+  if (!flags.scene.empty()) {
+    auto names = manifests(flags, *merged);
+    if (!names) return print_rejected(names.error());
+    provenance.manifests = std::move(*names);
+  }
+  const auto image = final_exr(merged->film, provenance, flags.float_output);
+  if (!image) return print_error(image.error());
+  if (const auto saved = save_result(flags.out, image->exr); !saved) return print_error(saved.error());
+  const std::string digest = pixels_sha256(merged->film).hex();
+  if (!flags.report.empty())
+    if (const auto written = write_report(flags, *merged, digest, image->clamped); !written)
+      return print_error(written.error());
+  print("pixels_sha256 " + digest);
+  return kOk;
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<MergeFlags>();
+  CLI::App* merge =
+      app.add_subcommand("merge", "fold partial images into the final one, exactly as the coordinator does");
+  merge->add_option("partials", flags->partials, "partial images, or folders of them")
+      ->required()
+      ->type_name("PARTIAL.exr...");
+  merge->add_option("-o,--output", flags->out, "the image")->required()->type_name("OUT.exr");
+  merge->add_option("--report", flags->report, "write digest and error as JSON")->type_name("REPORT.json");
+  merge
+      ->add_option("--scene", flags->scene,
+                   "what they were rendered from: gives mattes the names of things, which partials lack")
+      ->type_name("SCENE");
+  merge->add_option("-D,--define", flags->defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
+  merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

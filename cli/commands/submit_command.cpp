@@ -1,0 +1,151 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "cli/commands/commands.h"
+#include "cli/farm/farm_api.h"
+#include "cli/farm/farm_wait.h"
+#include "cli/farm/fetch_results.h"
+#include "cli/farm/upload_bundle.h"
+#include "cli/output/console.h"
+#include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
+#include "cli/output/reply_fields.h"
+#include "common/base/plain_text.h"
+#include "common/image/reference/reference.h"
+
+namespace ls::cli {
+namespace {
+
+struct SubmitFlags {
+  std::string scene, out, report, html, reference;
+  JobOptions job;
+  FarmOptions farm;
+  bool wait = false, quiet = false;
+};
+
+using Job = FarmApi::Answer<FarmApi::Json>;
+
+// Reads the scene here first, so that its errors are reported before anything is sent.
+Job submit_scene(const SubmitFlags& flags, const JobSpec& spec) {
+  auto reader = SceneReader::open(flags.scene, spec.defines, flags.job.strict);
+  if (!reader) return tl::unexpected(reader.error());
+  const auto scene = spec.frames ? reader->read_all(*spec.frames) : reader->read({});
+  if (!scene) return tl::unexpected(scene.error());
+  print_diagnostics(scene->warnings);
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return tl::unexpected(coordinator::Rejected{api.error(), {}});
+  return api->submit(*scene, spec, [&](const std::string& line) {
+    if (!flags.quiet) print_note(line);
+  });
+}
+
+Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::string& type) {
+  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
+  if (flags.job.strict)
+    return refuse(
+        {Errc::invalid_argument, "--strict: a bundle is read by the coordinator, which has no such choice"});
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(flags.scene, error))
+    return refuse({Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return refuse(api.error());
+  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
+  if (!job) return job;
+  if (const auto warnings = job->find("warnings"); warnings != job->end() && warnings->is_array())
+    for (const auto& warning : *warnings)
+      if (warning.is_string()) print_note(warning.get<std::string>());
+  return job;
+}
+
+int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return print_error(api.error());
+  const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
+  if (!end) return print_rejected(end.error());
+  if (const int code = print_end(*end, flags.quiet); code != kOk) return code;
+  return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
+}
+
+// Uploads the reference before the job that refers to it.
+FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
+  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
+  if (spec.frames && spec.frames->count() > 1)
+    return refuse({Errc::invalid_argument,
+                   "--reference is one image, and the job has several frames: submit them one by one"});
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return refuse(api.error());
+  const auto digest = api->upload(flags.reference, [&](const std::string& line) {
+    if (!flags.quiet) print_note(line);
+  });
+  if (!digest) return tl::unexpected(digest.error());
+  spec.reference = *digest;
+  return {};
+}
+
+int run(const SubmitFlags& flags) {
+  auto spec = flags.job.parse();
+  if (!spec) return print_error(spec.error());
+  for (const auto& [option, file] :
+       {std::pair("-o", flags.out), std::pair("--report", flags.report), std::pair("--html", flags.html)})
+    if (!file.empty())
+      if (const auto ok = check_outputs(option, file, spec->frames); !ok) return print_error(ok.error());
+  if (!flags.reference.empty())
+    if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());
+  const auto type = bundle_type(flags.scene);
+  const Job job = type ? submit_bundle(flags, *spec, *type) : submit_scene(flags, *spec);
+  if (!job) return print_rejected(job.error());
+  const std::string id = text_field(*job, "id");
+  if (id.empty()) return print_error({Errc::internal, "the coordinator's answer names no job"});
+  if (flag_field(*job, "reference_same_seed")) print_note(fmt::format("warning: {}", kSameSeed));
+  print(flags.farm.json ? job->dump() : plain_text(id));
+  if (!flags.wait && flags.out.empty() && flags.report.empty() && flags.html.empty()) return kOk;
+  return wait_and_fetch(id, flags);
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<SubmitFlags>();
+  CLI::App* submit =
+      app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
+  submit
+      ->add_option("scene", flags->scene,
+                   "Mitsuba XML, or a .zip, .tar or .tar.gz with one and all its files")
+      ->required()
+      ->type_name("SCENE");
+  flags->farm.add_to(*submit);
+  flags->job.add_to(*submit);
+  submit->add_option("--priority", flags->job.priority, "higher goes first; default 0")->type_name("N");
+  submit->add_option("--tags", flags->job.tags, "only workers with all of these")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("A,B");
+  submit->add_option("--max-workers", flags->job.max_workers, "at most so many workers at once")
+      ->type_name("N");
+  submit->add_option("--max-units", flags->job.max_units, "at most so many units lent to workers at once")
+      ->type_name("N");
+  submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")
+      ->type_name("BYTES");
+  submit
+      ->add_option("--reference", flags->reference,
+                   "the right image: every checkpoint is compared with it. Of another seed than the job's")
+      ->type_name("REF.exr");
+  submit->add_flag("--wait", flags->wait, "until the job is done");
+  submit
+      ->add_option("-o,--output", flags->out,
+                   "wait, then fetch the image; of a sequence every frame's, out_####.exr say")
+      ->type_name("OUT.exr");
+  submit
+      ->add_option("--report", flags->report,
+                   "wait, then fetch the report; with # in its name, every frame's")
+      ->type_name("REPORT.json");
+  submit
+      ->add_option("--html", flags->html,
+                   "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")
+      ->type_name("REPORT.html");
+  submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
+  submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

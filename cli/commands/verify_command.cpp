@@ -1,0 +1,234 @@
+// lightshaft verify: checks that an image is the result of its scene.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "cli/commands/commands.h"
+#include "cli/commands/verify_image.h"
+#include "cli/local/local_scene.h"
+#include "cli/local/local_world.h"
+#include "cli/output/console.h"
+#include "cli/output/interrupt.h"
+#include "cli/output/job_options.h"
+#include "common/base/plain_text.h"
+#include "common/scene/analysis/prune.h"
+#include "common/scene/json/serialize.h"
+#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/store/files.h"
+#include "worker/machine.h"
+#include "worker/render/base/thread_limit.h"
+
+namespace ls::cli {
+namespace {
+
+constexpr std::uint64_t kDefaultTiles = 4;
+
+struct VerifyFlags {
+  std::string image, scene, frame, tiles, seed;
+  std::vector<std::string> defines;
+  int threads = 0;
+  bool json = false;
+};
+
+Result<FinalPicture> open_image(const std::string& path) {
+  const auto bytes = coordinator::read_file(path, kMaxFinalBytes);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return read_final_exr(*bytes, path);
+}
+
+// Preconditions of a comparison: the same scene and the same numeric class.
+Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
+  if (const Digest mine = digest_of(scene.scene); mine != image.scene)
+    return fail(
+        Errc::invalid_argument,
+        fmt::format(
+            "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D "
+            "and --frame",
+            flags.image, image.scene.hex(), flags.scene, mine.hex()));
+  if (render::numeric_class() != image.numeric_class)
+    return fail(
+        Errc::failed_precondition,
+        fmt::format(
+            "{} was rendered in numeric class {} (build \"{}\"), and this machine and build are of class {}: "
+            "bits can only be compared within one class. Run verify with that build, on such a machine",
+            flags.image, image.numeric_class.hex().substr(0, 12), plain_text(image.build),
+            render::numeric_class().hex().substr(0, 12)));
+  return {};
+}
+
+// Tiles that were not rendered count as neither right nor wrong.
+struct Tally {
+  std::size_t right = 0, wrong = 0, stopped = 0;
+};
+Tally tally_of(const std::vector<VerifiedTile>& tiles) {
+  Tally t;
+  for (const VerifiedTile& v : tiles) ++(v.stopped ? t.stopped : v.wrong() ? t.wrong : t.right);
+  return t;
+}
+
+std::string tile_verdict(const VerifiedTile& t) {
+  return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
+}
+
+// Results of checking the seal of the whole file, and of recomputing headers.
+struct Contents {
+  bool sealed = false;
+  std::vector<std::string> changed;  // "layer depth.Z"
+
+  bool as_sealed() const { return sealed && changed.empty(); }
+  std::string verdict() const { return !changed.empty() ? "fail" : sealed ? "pass" : "unsealed"; }
+};
+Contents contents_of(const FinalPicture& picture) {
+  return {picture.changed.has_value(), picture.changed.value_or(std::vector<std::string>{})};
+}
+
+std::string line_of(const Contents& c) {
+  if (!c.changed.empty()) return fmt::format("not as sealed: {}", fmt::join(c.changed, ", "));
+  if (c.sealed) return "all layers and headers are as sealed";
+  return "layers and headers have no seal: what was not rendered again may have been changed";
+}
+
+nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, const Contents& contents,
+                               std::uint64_t seed) {
+  nlohmann::ordered_json j{{"seed", seed}, {"tiles", nlohmann::ordered_json::array()}};
+  for (const VerifiedTile& t : tiles) {
+    j["tiles"].push_back({{"tile", t.tile},
+                          {"rect", {t.rect.x0, t.rect.y0, t.rect.x1, t.rect.y1}},
+                          {"spp", t.spp},
+                          {"verdict", tile_verdict(t)},
+                          {"problem", t.problem}});
+  }
+  j["contents"] = {{"verdict", contents.verdict()}, {"changed", contents.changed}};
+  const Tally tally = tally_of(tiles);
+  j["verdict"] = tally.wrong > 0 ? "fail" : tally.stopped > 0 ? "stopped" : contents.verdict();
+  if (!contents.changed.empty()) j["verdict"] = "fail";
+  return j;
+}
+
+std::string line_of(const VerifiedTile& t) {
+  return fmt::format("tile {} [{},{} to {},{}), {} samples: {}", t.tile, t.rect.x0, t.rect.y0, t.rect.x1,
+                     t.rect.y1, t.spp, t.wrong() ? t.problem : "as sealed");
+}
+
+// Each thread renders one tile at a time.
+std::vector<VerifiedTile> verify_all(const render::World& world, const SealedImage& image,
+                                     const std::vector<TileIndex>& tiles, int threads, bool quiet,
+                                     const std::atomic<bool>& stop) {
+  std::vector<VerifiedTile> out(tiles.size());
+  std::atomic<std::size_t> next{0};
+  std::mutex printing;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < tiles.size(); i = next++) {
+      out[i] = verify_tile(world, image, tiles[i], stop);
+      const std::lock_guard lock(printing);
+      if (!quiet && !out[i].stopped) print(line_of(out[i]));
+    }
+  };
+  std::vector<std::jthread> team;
+  for (int k = 1; k < std::min<int>(threads, static_cast<int>(tiles.size())); ++k) team.emplace_back(work);
+  work();
+  team.clear();
+  return out;
+}
+
+struct Numbers {
+  std::uint64_t tiles = kDefaultTiles, seed = 0;
+  std::optional<std::uint32_t> frame;
+};
+Result<Numbers> numbers_of(const VerifyFlags& flags) {
+  Numbers n;
+  n.seed = std::random_device{}();
+  const auto read = [](const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
+                       std::uint64_t& to) -> Result<void> {
+    if (text.empty()) return {};
+    const auto number = parse_whole(name, text, least, most);
+    if (!number) return tl::unexpected(number.error());
+    to = *number;
+    return {};
+  };
+  std::uint64_t frame = 0;
+  if (const auto ok = read("--tiles", flags.tiles, 1, UINT32_MAX, n.tiles); !ok)
+    return tl::unexpected(ok.error());
+  if (const auto ok = read("--seed", flags.seed, 0, UINT64_MAX, n.seed); !ok)
+    return tl::unexpected(ok.error());
+  if (const auto ok = read("--frame", flags.frame, 0, kMaxFrameNumber, frame); !ok)
+    return tl::unexpected(ok.error());
+  if (!flags.frame.empty()) n.frame = static_cast<std::uint32_t>(frame);
+  return n;
+}
+
+int run(const VerifyFlags& flags) {
+  std::atomic<bool> stop{false};  // outlives the thread that sets it
+  Interrupt interrupt;
+  interrupt.on_signal([&] { stop = true; });
+  const auto numbers = numbers_of(flags);
+  if (!numbers) return print_error(numbers.error());
+  const auto defines = parse_defines(flags.defines);
+  if (!defines) return print_error(defines.error());
+  auto picture = open_image(flags.image);
+  if (!picture) return print_error(picture.error());
+  Contents contents = contents_of(*picture);
+  // Reported first, because later steps may fail because of it.
+  if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
+  const auto image = read_sealed_image(std::move(*picture), flags.image);
+  if (!image) return print_error(image.error());
+  auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
+                                coordinator::wants_labels(image->settings));
+  if (!scene) return print_rejected(scene.error());
+  // The scene as a job renders it.
+  scene->scene =
+      scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
+          .scene;
+  if (const auto same = check_same(*image, *scene, flags); !same) return print_error(same.error());
+  const int threads = flags.threads > 0 ? flags.threads : worker::usable_cpus();
+  const auto limit = render::limit_threads(threads);
+  const auto world = build_world_again(*scene, image->settings, threads);
+  if (!world) return print_rejected(world.error());
+  const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
+  const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
+  for (std::string& header :
+       wrong_headers(*image, coordinator::manifests_of(scene->scene, aovs_of(image->settings)), verified))
+    if (std::find(contents.changed.begin(), contents.changed.end(), header) == contents.changed.end())
+      contents.changed.push_back(std::move(header));
+  if (flags.json) print(to_json(verified, contents, numbers->seed).dump(2));
+  const Tally tally = tally_of(verified);
+  if (!flags.json) {
+    print(line_of(contents));
+    print(fmt::format("{} of {} tiles are as sealed{} ({} in the image; the same choice again: --seed {})",
+                      tally.right, verified.size(),
+                      tally.stopped > 0 ? fmt::format(", {} were not rendered: stopped", tally.stopped) : "",
+                      image->grid().count(), numbers->seed));
+  }
+  return tally.right == verified.size() && contents.as_sealed() ? kOk : kFailed;
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app, Action& action) {
+  auto flags = std::make_shared<VerifyFlags>();
+  CLI::App* verify = app.add_subcommand(
+      "verify",
+      "render random tiles of a finished image again and compare them with the digests sealed in it");
+  verify->add_option("image", flags->image, "a finished EXR")->required()->type_name("OUT.exr");
+  verify->add_option("--scene", flags->scene, "the scene it was rendered from")
+      ->required()
+      ->type_name("SCENE");
+  verify->add_option("--tiles", flags->tiles, fmt::format("how many (default {})", kDefaultTiles))
+      ->type_name("K");
+  verify->add_option("--seed", flags->seed, "chooses the tiles; default: anew each time")->type_name("N");
+  verify->add_option("-D,--define", flags->defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  verify->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  verify->add_option("--threads", flags->threads, "default: all")->type_name("N")->check(CLI::Range(1, 1024));
+  verify->add_flag("--json", flags->json, "as JSON");
+  verify->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace ls::cli

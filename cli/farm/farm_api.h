@@ -1,0 +1,71 @@
+// A coordinator's HTTP API as function calls: addresses and tokens from options and environment, problem
+// details as errors.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/farm/http_client.h"
+#include "cli/farm/retry.h"
+#include "cli/local/local_scene.h"
+#include "coordinator/service/coordinator.h"
+
+namespace ls::cli {
+
+struct FarmOptions {
+  std::string url, token_file, ca;
+  bool json = false;
+  void add_to(CLI::App& app);
+};
+
+class FarmApi {
+ public:
+  template <class T>
+  using Answer = tl::expected<T, coordinator::Rejected>;
+  using Json = nlohmann::json;
+
+  static Result<FarmApi> open(const FarmOptions& options);
+
+  Answer<Json> get(const std::string& path);
+  Answer<Json> post(const std::string& path, const Json& body);
+  Answer<void> remove(const std::string& path);
+  Answer<Json> patch(const std::string& path, const Json& body);
+  Answer<std::string> get_text(const std::string& path);
+  Answer<void> download(const std::string& path, const std::filesystem::path& file);
+
+  // Uploads the scene and files that the coordinator does not have, then creates the job. `on_progress`
+  // receives a message for each upload.
+  Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
+                      const std::function<void(const std::string&)>& on_progress);
+  // Uploads a file unless the coordinator has it; specs refer to it by the digest.
+  Answer<Digest> upload(const std::filesystem::path& file,
+                        const std::function<void(const std::string&)>& on_progress);
+  // Sends an archive unchanged; `query` comes from spec_query().
+  Answer<Json> submit_bundle(const std::filesystem::path& file, const std::string& type,
+                             const std::string& query);
+
+ private:
+  explicit FarmApi(HttpClient client) : client_(std::move(client)) {}
+  Answer<void> upload_missing(const LocalScene& scene, const JobSpec& spec, const Digest& text,
+                              const std::function<void(const std::string&)>& on_progress);
+  // Sends a file, and resumes where the connection broke.
+  Answer<HttpResponse> send_file(const std::string& path, const std::filesystem::path& file);
+  struct Sending {
+    RetryPolicy retry;
+    std::uint64_t reached = 0;  // the most bytes that the coordinator has acknowledged
+    int barren = 0;             // attempts since that last increased
+  };
+  Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file,
+                                 Sending& sending);
+
+  HttpClient client_;
+};
+
+std::string job_path(const std::string& id);  // "/api/v1/jobs/ID", escaped
+
+// Converts a response with an error status to an error, including its diagnostics.
+coordinator::Rejected problem_of(const HttpResponse& response);
+
+}  // namespace ls::cli

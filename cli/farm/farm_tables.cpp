@@ -1,0 +1,207 @@
+#include "cli/farm/farm_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "cli/output/console.h"
+#include "cli/output/convergence_text.h"
+#include "cli/output/health_lines.h"
+#include "cli/output/reply_fields.h"
+#include "common/base/plain_text.h"
+#include "common/image/exr/final_image.h"
+#include "common/report/words.h"
+
+namespace ls::cli {
+namespace {
+
+using nlohmann::json;
+using Row = std::vector<std::string>;
+
+std::string text(const json& object, const char* key) { return plain_text(text_field(object, key)); }
+
+std::string number(const json& object, const char* key, const char* format) {
+  const auto value = number_field(object, key);
+  return value ? fmt::format(fmt::runtime(format), *value) : "-";
+}
+
+std::string time_of(const json& object, const char* key) {
+  const auto value = number_field(object, key);
+  return value ? show_seconds(*value) : "-";
+}
+
+std::string percent(const json& object, const char* key) {
+  const auto value = number_field(object, key);
+  return value ? fmt::format("{:.0f} %", 100 * *value) : "-";
+}
+
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths;
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (widths.size() <= i) widths.push_back(0);
+      widths[i] = std::max(widths[i], row[i].size());
+    }
+  std::string out;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += fmt::format("{:<{}}", row[i], i + 1 < row.size() ? widths[i] + 2 : 0);
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += (out.empty() ? "" : "\n") + line;
+  }
+  return out;
+}
+
+constexpr std::size_t kMostFrames = 100;  // maximum listed; if there are more, only those with remarks
+
+const json* frames_of(const json& job) {
+  const auto frames = job.find("frames");
+  return frames != job.end() && frames->is_object() ? &*frames : nullptr;
+}
+
+std::string frames_done(const json& frames) {
+  std::string out = fmt::format("{} of {} done", int_field(frames, "done", 0), int_field(frames, "total", 0));
+  for (const char* state : {"failed", "cancelled"})
+    if (const int n = int_field(frames, state, 0); n > 0) out += fmt::format(", {} {}", n, state);
+  return out;
+}
+
+std::vector<json> objects(const json& answer, const char* key) {
+  std::vector<json> all;
+  if (const auto list = answer.find(key); list != answer.end() && list->is_array())
+    std::copy_if(list->begin(), list->end(), std::back_inserter(all),
+                 [](const json& j) { return j.is_object(); });
+  return all;
+}
+
+std::string frames_table(const json& frames) {
+  const std::vector<json> all = objects(frames, "list");
+  std::vector<Row> rows{{"FRAME", "STATE", "DONE", "SPP", "RELMSE", "ERROR"}};
+  for (const json& f : all) {
+    const std::string state = text(f, "state");
+    if (all.size() > kMostFrames && (state == "done" || state == "queued")) continue;
+    rows.push_back({number(f, "frame", "{:.0f}"), state, percent(f, "progress"),
+                    number(f, "spp_done", "{:.4g}"), number(f, "relmse", "{:.3g}"), text(f, "error")});
+  }
+  return rows.size() == 1 ? "" : "\n" + table(rows);
+}
+
+bool is_over(const json& job) {
+  const std::string state = text_field(job, "state");
+  return state == "done" || state == "failed" || state == "cancelled";
+}
+
+// For a job that ends by target error or time only, `spp` is a limit that the user did not set.
+std::string samples(const json& job) {
+  const std::string done = number(job, "spp_done", "{:.6g}"), limit = number(job, "spp", "{:.0f}");
+  const auto asked = job.find("spp_asked");
+  if (asked == job.end() || !asked->is_null()) return done + " of " + limit;
+  if (is_over(job)) return done;
+  return fmt::format("{}, until {} (at most {})", done,
+                     number_field(job, "target_error") ? "the target" : "its time is up",
+                     report::count(number_field(job, "spp").value_or(NAN)));
+}
+
+void add_known(std::vector<Row>& rows, const char* name, const json& object, const char* key,
+               const char* format = "{:.4g}") {
+  if (number_field(object, key)) rows.push_back({name, number(object, key, format)});
+}
+
+void add_pixels(std::vector<Row>& rows, const char* name, const json& job, const char* key,
+                const char* meaning) {
+  if (const double n = number_field(job, key).value_or(0); n > 0)
+    rows.push_back({name, fmt::format("{} pixels: {}", report::count(n), meaning)});
+}
+
+void add_error_rows(std::vector<Row>& rows, const json& job) {
+  rows.push_back({"relMSE", estimate_text(job, "relmse", "relmse_ci95")});
+  add_known(rows, "target relMSE", job, "target_error", "{:g}");
+  rows.push_back({"RMSE", estimate_text(job, "rmse", "rmse_ci95")});
+  if (const auto reference = job.find("reference"); reference != job.end() && reference->is_object()) {
+    const auto add_reference_error = [&](const char* name, const char* key, const char* below) {
+      const std::string text =
+          reference_error_text(*reference, key, below, flag_field(job, "reference_same_seed"), 4);
+      if (!text.empty()) rows.push_back({name, text});
+    };
+    add_reference_error("true relMSE", "relmse", "below_noise");
+    add_reference_error("true RMSE", "rmse", "rmse_below_noise");
+    add_known(rows, "FLIP", *reference, "flip");
+  }
+  add_pixels(rows, "few hits", job, "few_hits", "too few for their error to be known");
+  add_pixels(rows, "not reached yet", job, "pixels_without_samples", "the error is of the others");
+  if (const std::string words = verdict_of(job).words; !words.empty()) rows.push_back({"verdict", words});
+  if (const auto slope = number_field(job, "slope")) {
+    const auto ci = verdict_of(job).doubtful ? std::nullopt : pair_field(job, "slope_ci95");
+    rows.push_back({"slope", ci ? fmt::format("{:.3g} ({:.3g} to {:.3g})", *slope, ci->first, ci->second)
+                                : fmt::format("{:.3g}", *slope)});
+  }
+  add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
+}
+
+}  // namespace
+
+std::string jobs_table(const json& answer) {
+  std::vector<Row> rows{{"ID", "STATE", "DONE", "SPP", "RELMSE", "LEFT", "NAME"}};
+  for (const json& job : objects(answer, "jobs"))
+    rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
+                    number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
+                    time_left_text(job, "eta_seconds"),
+                    text(job, "name") + (flag_field(job, "fake") ? " (fake pixels)" : "") +
+                        (unclean(job) ? " (numbers not clean)" : "") +
+                        (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
+                        (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
+  return rows.size() == 1 ? "no jobs" : table(rows);
+}
+
+std::string tokens_table(const json& answer) {
+  std::vector<Row> rows{{"ID", "ROLE", "USER", ""}};
+  for (const json& t : objects(answer, "tokens")) {
+    const bool of_file = t.value("of_file", json()) == json(true);
+    rows.push_back({text(t, "id"), text(t, "role"), text(t, "user"),
+                    of_file ? text(t, "role") == "join" ? "DATA/join-token" : "DATA/token" : ""});
+  }
+  return table(rows);
+}
+
+std::string workers_table(const json& answer) {
+  std::vector<Row> rows{{"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "JOB", "ACTIVITY"}};
+  for (const json& w : objects(answer, "workers")) {
+    const auto rss = w.find("rss_bytes");
+    rows.push_back({text(w, "name"), text(w, "state") + (flag_field(w, "fake") ? " (fake)" : ""),
+                    number(w, "threads", "{:.0f}"), number(w, "units_done", "{:.0f}"),
+                    time_of(w, "cpu_seconds"),
+                    rss != w.end() && rss->is_number_unsigned() ? show_bytes(rss->get<std::uint64_t>()) : "-",
+                    time_of(w, "last_seen_seconds"), text(w, "job"), text(w, "activity")});
+  }
+  return rows.size() == 1 ? "no workers" : table(rows);
+}
+
+std::string job_text(const json& job) {
+  std::vector<Row> rows{{"job", text(job, "id")}, {"name", text(job, "name")}, {"state", text(job, "state")}};
+  if (const std::string stopped = text(job, "stopped"); !stopped.empty())
+    rows.push_back({"stopped by", stopped});
+  rows.push_back({"done", percent(job, "progress")});
+  if (const json* frames = frames_of(job))
+    rows.push_back({"frames", fmt::format("{}: {}", text(*frames, "range"), frames_done(*frames))});
+  rows.push_back({"samples per pixel", samples(job)});
+  add_error_rows(rows, job);
+  rows.push_back({"time", time_of(job, "elapsed_seconds")});
+  rows.push_back({"core time", time_of(job, "core_seconds")});
+  rows.push_back({"left", time_left_text(job, "eta_seconds", "eta_ci95")});
+  if (number_field(job, "eta_with_8_more"))
+    rows.push_back({"with 8 more workers", time_left_text(job, "eta_with_8_more", "eta_with_8_more_ci95")});
+  if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
+  if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
+  if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
+    for (const json& warning : *warnings)
+      if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});
+  if (job.contains("health")) rows.push_back({"numbers", unclean(job) ? "not clean" : "clean"});
+  for (const std::string& line : health_lines(job)) rows.push_back({"", line});
+  const json* frames = frames_of(job);
+  return frames ? table(rows) + frames_table(*frames) : table(rows);
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,25 @@
+// Downloads a job's results from a farm to local files.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "cli/farm/farm_api.h"
+
+namespace ls::cli {
+
+struct Results {
+  std::string image, report, html;  // file names; empty: not wanted. A run of # stands for the frame number
+  bool json = false;                // print each file as a line of JSON on stdout
+  bool patient = false;             // wait for a coordinator that is unreachable for a while
+};
+
+// Checks, before a job is submitted, that files of this name (or one per frame) can be written.
+Result<void> check_outputs(const std::string& option, const std::string& name,
+                           const std::optional<FrameRange>& frames);
+
+// For a sequence, fetches every frame that has data and lists the others; fetches one report for the whole
+// sequence if its name has no #. Returns the exit code.
+int fetch_results(FarmApi& api, const std::string& id, const Results& results);
+
+}  // namespace ls::cli

@@ -1,0 +1,278 @@
+#include "cli/farm/http_client.h"
+
+#include <curl/curl.h>
+#include <fmt/format.h>
+
+#include <strings.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <mutex>
+#include <vector>
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr long kConnectSeconds = 15;
+constexpr long kStallSeconds = 60;  // longest time without a byte
+constexpr long kRedirects = 3;
+constexpr long kWorkSeconds = 3600;  // the same while the server is working
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using FilePtr = std::unique_ptr<std::FILE, CloseFile>;
+struct FreeList {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+using Headers = std::unique_ptr<curl_slist, FreeList>;
+
+void add(Headers& headers, const std::string& line) {
+  headers.reset(curl_slist_append(headers.release(), line.c_str()));
+}
+
+// Receives an answer's body: into a file if one is wanted and the answer is a success.
+struct Receiver {
+  CURL* curl = nullptr;
+  HttpResponse* response = nullptr;
+  std::FILE* file = nullptr;
+  bool too_large = false, write_failed = false;
+
+  static std::size_t receive(char* data, std::size_t size, std::size_t count, void* self_pointer) {
+    auto& self = *static_cast<Receiver*>(self_pointer);
+    const std::size_t bytes = size * count;
+    long status = 0;
+    curl_easy_getinfo(self.curl, CURLINFO_RESPONSE_CODE, &status);
+    if (self.file && status / 100 == 2) {
+      self.write_failed = std::fwrite(data, 1, bytes, self.file) != bytes;
+      return self.write_failed ? 0 : bytes;
+    }
+    self.too_large = self.response->body.size() + bytes > HttpClient::kMaxAnswerBytes;
+    if (self.too_large) return 0;
+    self.response->body.append(data, bytes);
+    return bytes;
+  }
+};
+
+std::size_t take_header(char* data, std::size_t size, std::size_t count, void* response_pointer) {
+  constexpr std::string_view kName = "Upload-Offset:";
+  std::string_view line(data, size * count);
+  if (line.size() < kName.size() || ::strncasecmp(line.data(), kName.data(), kName.size()) != 0)
+    return size * count;
+  line.remove_prefix(kName.size());
+  line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+  std::uint64_t offset = 0;
+  if (std::from_chars(line.data(), line.data() + line.size(), offset).ec == std::errc())
+    static_cast<HttpResponse*>(response_pointer)->upload_offset = offset;
+  return size * count;
+}
+
+std::size_t read_file_chunk(char* data, std::size_t size, std::size_t count, void* file) {
+  return std::fread(data, 1, size * count, static_cast<std::FILE*>(file));
+}
+
+Result<void> check_url(const std::string& url) {
+  const auto wrong = [&](std::string_view why) {
+    return fail(Errc::invalid_argument, fmt::format("the coordinator's address '{}' {}", url, why));
+  };
+  if (!url.starts_with("http://") && !url.starts_with("https://"))
+    return wrong("must begin with http:// or https://");
+  if (std::any_of(url.begin(), url.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; }))
+    return wrong("has spaces or control characters");
+  return {};
+}
+
+}  // namespace
+
+struct HttpClient::State {
+  Options options;
+  std::vector<std::string> urls;
+  std::size_t current = 0;  // index of the one that answered last
+  CURL* curl = nullptr;
+  long stall_seconds = kStallSeconds;
+  ~State() { curl_easy_cleanup(curl); }
+
+  Result<HttpResponse> perform(const std::string& path, const Headers& headers, std::FILE* save);
+  Result<HttpResponse> send(const std::string& path, const fs::path& file, std::string_view content_type,
+                            std::optional<std::uint64_t> offset = std::nullopt);
+  void set_common(const std::string& url, const Headers& headers);
+  Headers headers() const {
+    Headers list;
+    if (!options.token.empty()) add(list, "Authorization: Bearer " + options.token);
+    return list;
+  }
+};
+
+Result<HttpClient> HttpClient::open(Options options) {
+  std::vector<std::string> urls;
+  for (std::size_t at = 0; at <= options.url.size();) {
+    const std::size_t comma = std::min(options.url.find(',', at), options.url.size());
+    std::string url = options.url.substr(at, comma - at);
+    while (url.ends_with('/')) url.pop_back();
+    if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
+    urls.push_back(std::move(url));
+    at = comma + 1;
+  }
+  if (std::any_of(options.token.begin(), options.token.end(),
+                  [](unsigned char c) { return c <= ' ' || c >= 0x7f; }))
+    return fail(Errc::invalid_argument, "the token has characters that a token cannot have");
+  std::error_code error;
+  if (!options.ca.empty() && !fs::exists(options.ca, error))
+    return fail(Errc::invalid_argument, fmt::format("there is no CA file {}", options.ca));
+  static std::once_flag once;
+  std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
+  auto state = std::make_unique<State>();
+  state->options = std::move(options);
+  state->urls = std::move(urls);
+  state->curl = curl_easy_init();
+  if (!state->curl) return fail(Errc::internal, "libcurl cannot be started");
+  return HttpClient(std::move(state));
+}
+
+HttpClient::HttpClient(std::unique_ptr<State> state) : state_(std::move(state)) {}
+HttpClient::HttpClient(HttpClient&&) noexcept = default;
+HttpClient::~HttpClient() = default;
+
+void HttpClient::State::set_common(const std::string& url, const Headers& headers) {
+  curl_easy_setopt(curl, CURLOPT_URL, url.c_str());
+  curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers.get());
+  curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
+  curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+  // A coordinator may redirect to the one that has a job; both belong to the farm that the token is for. But
+  // a request made with TLS is never redirected to one without.
+  curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 1L);
+  curl_easy_setopt(curl, CURLOPT_MAXREDIRS, kRedirects);
+  curl_easy_setopt(curl, CURLOPT_REDIR_PROTOCOLS_STR, url.starts_with("https:") ? "https" : "http,https");
+  curl_easy_setopt(curl, CURLOPT_UNRESTRICTED_AUTH, 1L);
+  curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
+  curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, stall_seconds);
+  curl_easy_setopt(curl, CURLOPT_TCP_KEEPALIVE, 1L);
+  if (!options.ca.empty()) curl_easy_setopt(curl, CURLOPT_CAINFO, options.ca.c_str());
+}
+
+Result<HttpResponse> HttpClient::State::perform(const std::string& path, const Headers& headers,
+                                                std::FILE* save) {
+  HttpResponse response;
+  Receiver receiver{curl, &response, save};
+  char problem[CURL_ERROR_SIZE] = "";
+  curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, &Receiver::receive);
+  curl_easy_setopt(curl, CURLOPT_WRITEDATA, &receiver);
+  curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, &take_header);
+  curl_easy_setopt(curl, CURLOPT_HEADERDATA, &response);
+  curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, problem);
+  CURLcode code = CURLE_OK;
+  for (std::size_t tried = 0; tried < urls.size(); ++tried) {
+    set_common(urls[current] + path, headers);
+    code = curl_easy_perform(curl);
+    if (code != CURLE_COULDNT_CONNECT || urls.size() == 1) break;
+    current = (current + 1) % urls.size();  // nothing was sent yet
+  }
+  long status = 0;
+  char* type = nullptr;
+  curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
+  curl_easy_getinfo(curl, CURLINFO_CONTENT_TYPE, &type);
+  response.status = static_cast<int>(status);
+  if (type) response.content_type = type;
+  curl_easy_reset(curl);  // resets the options; the connection stays open
+  if (code == CURLE_OK) return response;
+  if (receiver.too_large)
+    return fail(Errc::resource_exhausted,
+                fmt::format("the answer to {} is larger than {} bytes", path, kMaxAnswerBytes));
+  if (receiver.write_failed)
+    return fail(Errc::resource_exhausted, "the answer cannot be written: is the disk full?");
+  // An upload was rejected midway: the answer is more informative than the broken connection.
+  if (code == CURLE_SEND_ERROR && status >= 400) return response;
+  const std::string asked = urls[current];
+  if (code == CURLE_UNSUPPORTED_PROTOCOL)
+    return fail(Errc::unavailable,
+                fmt::format("{} sends this on to an address that is not https: no token goes there; let the "
+                            "coordinators name each other by https (--public-http)",
+                            asked));
+  if (code != CURLE_COULDNT_CONNECT) current = (current + 1) % urls.size();
+  return fail(Errc::unavailable,
+              fmt::format("{} cannot be reached: {}",
+                          urls.size() > 1 && code == CURLE_COULDNT_CONNECT ? options.url : asked,
+                          *problem ? problem : curl_easy_strerror(code)));
+}
+
+Result<HttpResponse> HttpClient::request(std::string_view method, const std::string& path,
+                                         std::string_view body, std::string_view content_type) {
+  Headers headers = state_->headers();
+  const std::string verb(method);
+  CURL* curl = state_->curl;
+  if (verb == "HEAD") {
+    curl_easy_setopt(curl, CURLOPT_NOBODY, 1L);
+  } else if (verb != "GET") {
+    add(headers, fmt::format("Content-Type: {}", content_type));
+    curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body.size()));
+    curl_easy_setopt(curl, CURLOPT_COPYPOSTFIELDS, body.empty() ? "" : body.data());
+    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, verb.c_str());
+  }
+  return state_->perform(path, headers, nullptr);
+}
+
+// Uses PUT unless another method is set.
+Result<HttpResponse> HttpClient::State::send(const std::string& path, const fs::path& file,
+                                             std::string_view content_type,
+                                             std::optional<std::uint64_t> offset) {
+  const FilePtr source(std::fopen(file.c_str(), "rbe"));
+  std::error_code error;
+  const auto bytes = fs::file_size(file, error);
+  if (!source || error) return fail(Errc::not_found, fmt::format("{} cannot be read", file.string()));
+  const std::uint64_t from = offset.value_or(0);
+  if (from > bytes || ::fseeko(source.get(), static_cast<off_t>(from), SEEK_SET) != 0)
+    return fail(Errc::not_found, fmt::format("{} has no byte {}: has it changed?", file.string(), from));
+  Headers list = headers();
+  add(list, fmt::format("Content-Type: {}", content_type));
+  if (offset)
+    add(list, from < bytes ? fmt::format("Content-Range: bytes {}-{}/{}", from, bytes - 1, bytes)
+                           : fmt::format("Content-Range: bytes */{}", bytes));
+  curl_easy_setopt(curl, CURLOPT_UPLOAD, 1L);
+  curl_easy_setopt(curl, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes - from));
+  curl_easy_setopt(curl, CURLOPT_READFUNCTION, &read_file_chunk);
+  curl_easy_setopt(curl, CURLOPT_READDATA, source.get());
+  return perform(path, list, nullptr);
+}
+
+Result<HttpResponse> HttpClient::upload(const std::string& path, const fs::path& file,
+                                        std::optional<std::uint64_t> offset) {
+  return state_->send(path, file, "application/octet-stream", offset);
+}
+
+Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::path& file,
+                                           std::string_view content_type) {
+  curl_easy_setopt(state_->curl, CURLOPT_CUSTOMREQUEST, "POST");
+  state_->stall_seconds = kWorkSeconds;
+  auto response = state_->send(path, file, content_type);
+  state_->stall_seconds = kStallSeconds;
+  curl_easy_reset(state_->curl);  // in case nothing was sent
+  return response;
+}
+
+Result<HttpResponse> HttpClient::download(const std::string& path, const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  const bool straight = fs::exists(status) && !fs::is_regular_file(status);
+  const fs::path aside = straight ? file : fs::path(file.string() + ".part");
+  FilePtr target(std::fopen(aside.c_str(), "wbe"));
+  if (!target) return fail(Errc::unavailable, fmt::format("{} cannot be written", aside.string()));
+  auto response = state_->perform(path, state_->headers(), target.get());
+  const bool closed = std::fclose(target.release()) == 0;
+  error.clear();
+  if (response && response->status / 100 == 2 && closed) {
+    if (!straight) fs::rename(aside, file, error);
+    if (!error) return response;
+  }
+  std::error_code ignored;
+  if (!straight) fs::remove(aside, ignored);
+  if (!response || response->status / 100 != 2) return response;
+  return fail(Errc::resource_exhausted,
+              fmt::format("{} cannot be written{}", file.string(), error ? ": " + error.message() : ""));
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,210 @@
+#include "cli/local/local_render.h"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "cli/local/instructions.h"
+#include "cli/local/local_farm.h"
+#include "cli/local/local_world.h"
+#include "cli/local/partial_dir.h"
+#include "cli/output/console.h"
+#include "cli/output/final_report.h"
+#include "cli/output/html_report.h"
+#include "cli/output/interrupt.h"
+#include "cli/output/output_file.h"
+#include "cli/output/progress.h"
+#include "common/image/reference/reference.h"
+#include "worker/render/base/thread_limit.h"
+
+namespace ls::cli {
+namespace {
+
+using coordinator::JobState;
+using coordinator::JobView;
+
+constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
+
+// Stores units besides the image. add() is called on the agent's thread, everything else before or after
+// that.
+struct Keepers {
+  std::optional<PartialDir> partials;
+  std::mutex mutex;
+  std::optional<Error> trouble;  // the first error; guarded by mutex
+
+  Result<void> add(const UnitResult& result) { return partials ? partials->keep(result) : Result<void>{}; }
+};
+
+Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
+  if (options.partial_dir) {
+    auto folder = PartialDir::open(*options.partial_dir);
+    if (!folder) return tl::unexpected(folder.error());
+    keepers.partials = std::move(*folder);
+  }
+  return {};
+}
+
+bool doubtful(const std::optional<ConvergenceStatus>& convergence_status) {
+  return convergence_status && !convergence_status->trusted;
+}
+
+ProgressFigures figures_of(const JobView& job) {
+  const double samples = job.spp_done * job.size.width * job.size.height;
+  return {std::string(to_string(job.state)),
+          job.progress,
+          job.spp_done,
+          job.elapsed_seconds > 0 ? samples / job.elapsed_seconds : 0,
+          job.error_now ? std::optional(job.error_now->relmse) : std::nullopt,
+          job.eta_seconds,
+          {},
+          {},
+          job.eta_ci95,
+          job.error_now ? std::optional(std::pair(job.error_now->relmse_lo, job.error_now->relmse_hi))
+                        : std::nullopt,
+          job.target_error,
+          {},
+          doubtful(job.convergence_status)};
+}
+
+void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {
+  ProgressBar bar(quiet);
+  std::jthread shower;
+  if (bar.shown())
+    shower = std::jthread([&](const std::stop_token& token) {
+      std::mutex mutex;
+      std::condition_variable_any woken;
+      std::unique_lock lock(mutex);
+      while (!woken.wait_for(lock, token, kProgressPeriod, [&] { return token.stop_requested(); }) &&
+             !token.stop_requested())
+        if (const auto job = coordinator.job(id)) bar.show(figures_of(*job));
+    });
+  (void)coordinator.wait(id);
+  shower = {};
+  if (const auto job = coordinator.job(id); job && bar.shown()) bar.show(figures_of(*job));
+}
+
+class LocalRender {
+ public:
+  LocalRender(const LocalScene& scene, const LocalRenderOptions& options)
+      : scene_(scene), options_(options) {}
+
+  int run() {
+    const auto limit = render::limit_threads(options_.threads);
+    auto farm = LocalFarm::open({options_.threads, options_.isolate});
+    if (!farm) return print_error(farm.error());
+    farm_ = std::move(*farm);
+    JobSpec spec = options_.spec;
+    if (options_.reference) {
+      const auto digest = farm_->adopt(*options_.reference);
+      if (!digest) return print_error({Errc::invalid_argument, "--reference: " + digest.error().message});
+      spec.reference = *digest;
+    }
+    auto submitted = farm_->submit(scene_, spec);
+    if (!submitted) return print_rejected(submitted.error());
+    job_ = std::move(*submitted);
+    if (scene_.frame) job_ = coordinator::frame_job(job_, *scene_.frame);
+    const auto view = farm_->coordinator().job(job_);
+    if (!view) return print_error(view.error());
+    for (const std::string& warning : view->warnings)
+      fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
+    if (view->reference_same_seed) print_note(fmt::format("warning: {}", kSameSeed));
+    if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
+    if (const auto opened = open_keepers(keepers_, options_); !opened) return print_error(opened.error());
+    if (const auto started = start(); !started) return print_error(started.error());
+    wait_with_progress(farm_->coordinator(), job_, options_.quiet);
+    farm_->stop();
+    return finish();
+  }
+
+ private:
+  Result<void> start() {
+    interrupt_.on_signal([this] { (void)farm_->coordinator().cancel(job_); });
+    if (!keepers_.partials) return farm_->start({});
+    return farm_->start([this](const UnitResult& result) {
+      const auto kept = keepers_.add(result);
+      if (kept) return;
+      {
+        const std::lock_guard lock(keepers_.mutex);
+        if (!keepers_.trouble) keepers_.trouble = kept.error();
+      }
+      (void)farm_->coordinator().cancel(job_);
+    });
+  }
+
+  int finish() {
+    const auto view = farm_->coordinator().job(job_);
+    if (!view) return print_error(view.error());
+    if (const auto error = farm_->agent_error()) return print_error(*error);
+    if (view->state == JobState::failed) {
+      if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
+      return print_error({Errc::internal, view->error});
+    }
+    // A full disk in the folder of partials does not affect the image.
+    if (keepers_.trouble) complain(keepers_.trouble->message);
+    const bool cut = view->state != JobState::done;
+    if (cut && view->spp_done == 0) {
+      print_note("lightshaft: interrupted before anything was rendered: no image is written");
+      return kFailed;
+    }
+    if (const auto written = write_results(cut); !written)
+      return print_error(Error{Errc::unavailable, written.error().message});
+    if (keepers_.trouble && !cut) return kFailed;
+    if (cut)
+      print_note(fmt::format("lightshaft: interrupted: {} holds what there was", options_.out.string()));
+    return cut ? kFailed : kOk;
+  }
+
+  Result<void> write_results(bool cut) {
+    coordinator::Coordinator& coordinator = farm_->coordinator();
+    const auto image = coordinator.image_exr(job_);
+    if (!image) return tl::unexpected(image.error());
+    const auto saved = save_result(options_.out, *image);
+    const auto told = write_report(cut, saved.has_value());
+    return saved ? told : saved;
+  }
+
+  Result<void> write_report(bool cut, bool print_summary) {
+    coordinator::Coordinator& coordinator = farm_->coordinator();
+    const auto tiles = coordinator.tiles(job_);
+    if (!tiles) return tl::unexpected(tiles.error());
+    std::vector<RoundIndex> folded;
+    for (const auto& tile : *tiles) folded.push_back(tile.rounds_folded);
+    if (keepers_.partials && !keepers_.trouble)
+      if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
+    const auto told = coordinator.report_json(job_);
+    if (!told) return tl::unexpected(told.error());
+    LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut,
+                     counter_.and_then([](const InstructionCounter& c) { return c.read(); })};
+    const auto report = local_report(*told, facts);
+    if (!report) return tl::unexpected(report.error());
+    if (options_.report)
+      if (auto saved = save_result(*options_.report, *report); !saved) return saved;
+    if (options_.html)
+      if (auto saved = save_html_report(*options_.html, coordinator, job_, *report); !saved) return saved;
+    if (!options_.quiet && print_summary)
+      print_note(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
+    print_report_health(*report);
+    if (options_.quiet || !print_summary) return {};
+    print("pixels_sha256 " + pixels_digest(*report));
+    return {};
+  }
+
+  const LocalScene& scene_;
+  const LocalRenderOptions& options_;
+  Interrupt interrupt_;  // created before anything that has threads
+  Result<InstructionCounter> counter_ = InstructionCounter::open();
+  Keepers keepers_;
+  std::unique_ptr<LocalFarm> farm_;
+  JobId job_;
+};
+
+}  // namespace
+
+int render_locally(const LocalScene& scene, const LocalRenderOptions& options) {
+  return LocalRender(scene, options).run();
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,22 @@
+// `lightshaft render`: one job on a LocalFarm, from the scene to the output files.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "cli/local/local_scene.h"
+
+namespace ls::cli {
+
+struct LocalRenderOptions {
+  JobSpec spec;
+  int threads = 1;
+  bool isolate = false, quiet = false, strict = false;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> report, html, partial_dir, reference;
+};
+// Returns the exit code.
+int render_locally(const LocalScene& scene, const LocalRenderOptions& options);
+
+}  // namespace ls::cli

@@ -1,0 +1,203 @@
+#include "cli/local/local_scene.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "common/job/frame_diagnostics.h"
+#include "common/scene/analysis/prune.h"
+#include "common/scene/folder_assets.h"
+#include "common/scene/limits.h"
+#include "common/scene/schema/integrators.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostShown = 200;  // characters of names in one message
+
+// A folder that records which files were requested.
+class RecordedFolder final : public AssetSource {
+ public:
+  explicit RecordedFolder(fs::path folder) : folder_(std::move(folder)) {}
+
+  Result<Asset> find(std::string_view name) override {
+    auto asset = folder_.find(name);
+    if (asset)
+      if (const auto path = folder_.path_of(name))
+        files_.insert_or_assign(std::string(name), LocalFile{*path, asset->digest, asset->bytes});
+    return asset;
+  }
+  Result<std::string> text(std::string_view name) override {
+    auto text = folder_.text(name);
+    if (!text) return text;
+    if (const auto asset = find(name); !asset) return tl::unexpected(asset.error());
+    if (const auto file = files_.find(std::string(name)); file != files_.end()) file->second.is_text = true;
+    texts_ += *text;
+    return text;
+  }
+  // The files requested since the last call.
+  std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
+  std::string take_included_texts() { return std::exchange(texts_, {}); }
+
+ private:
+  FolderAssets folder_;
+  std::map<std::string, LocalFile> files_;
+  std::string texts_;  // the reader limits its size
+};
+
+// The $names in a text, each as long as possible.
+std::set<std::string> parameters_in(const std::string& text) {
+  const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  std::set<std::string> names;
+  for (auto at = text.find('$'); at != std::string::npos; at = text.find('$', at + 1)) {
+    auto end = at + 1;
+    while (end < text.size() && is_name(text[end])) ++end;
+    if (end > at + 1) names.insert(text.substr(at + 1, end - at - 1));
+  }
+  return names;
+}
+
+// A -D that nothing in the scene uses is probably a typing error. ($ab may also mean the value of $a followed
+// by b.)
+std::optional<std::string> unused_define(const std::map<std::string, std::string>& defines,
+                                         const std::string& texts) {
+  if (defines.empty()) return std::nullopt;
+  const std::set<std::string> used = parameters_in(texts);
+  for (const auto& [name, value] : defines) {
+    if (const auto at = used.lower_bound(name); at != used.end() && at->starts_with(name)) continue;
+    std::string there = used.empty() ? "it has no parameters" : "it has";
+    for (const auto& u : used)
+      if (there.size() < kMostShown) there += " $" + u;
+    return fmt::format("-D {}: the scene has no ${}; {}", name, name, there);
+  }
+  return std::nullopt;
+}
+
+tl::unexpected<coordinator::Rejected> refused(const std::string& path, std::string text) {
+  Diagnostic d;
+  d.place.file = path;
+  d.text = std::move(text);
+  return tl::unexpected(coordinator::Rejected{{Errc::invalid_argument, d.text}, {std::move(d)}});
+}
+
+tl::expected<std::string, coordinator::Rejected> read_text(const std::string& path) {
+  std::error_code error;
+  const auto status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) return refused(path, "there is no such file");
+  if (error) return refused(path, "cannot be opened: " + error.message());
+  if (status.type() != fs::file_type::regular) return refused(path, "is not a regular file");
+  const auto bytes = fs::file_size(path, error);
+  if (!error && bytes > scene::kMaxTextBytes)
+    return refused(path, fmt::format("has {} bytes; a scene file may have {}", bytes, scene::kMaxTextBytes));
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return refused(path, "cannot be read");
+  return text;
+}
+
+}  // namespace
+
+struct SceneReader::Impl {
+  std::string path, text;
+  std::map<std::string, std::string> defines;
+  bool strict;
+  RecordedFolder folder;
+};
+
+SceneReader::SceneReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SceneReader::SceneReader(SceneReader&&) noexcept = default;
+SceneReader::~SceneReader() = default;
+
+tl::expected<SceneReader, coordinator::Rejected> SceneReader::open(const std::string& path,
+                                                                   std::map<std::string, std::string> defines,
+                                                                   bool strict) {
+  auto text = read_text(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  return SceneReader(std::unique_ptr<Impl>(new Impl{path, std::move(*text), std::move(defines), strict,
+                                                    RecordedFolder(fs::path(path).parent_path())}));
+}
+
+tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<std::uint32_t> frame,
+                                                                  bool labels) {
+  Impl& in = *impl_;
+  ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame, labels});
+  const std::string included = in.folder.take_included_texts();
+  auto files = in.folder.take_files();
+  if (!read.scene)
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
+  if (auto unused = unused_define(in.defines, in.text + included))
+    return refused(in.path, std::move(*unused));
+  LocalScene scene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
+                   std::move(files), frame};
+  for (const bool sees_media : {false, true})
+    for (const Asset& a : scene::pruned(scene.scene, {sees_media, !sees_media}).scene.assets)
+      scene.needed[sees_media].insert(a.digest);
+  return scene;
+}
+
+tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const FrameRange& frames) {
+  std::optional<LocalScene> first;
+  FrameDiagnostics wrong, warned;
+  for (const std::uint32_t frame : frames.frames()) {
+    auto scene = read(frame);
+    if (!scene && scene.error().diagnostics.empty()) return scene;
+    wrong.add(frame, scene ? std::vector<Diagnostic>{} : scene.error().diagnostics);
+    if (wrong.full()) break;
+    if (!scene) continue;
+    warned.add(frame, scene->warnings);
+    if (first) {
+      first->files.merge(scene->files);
+      for (std::size_t i = 0; i < first->needed.size(); ++i) first->needed[i].merge(scene->needed[i]);
+    } else {
+      first = std::move(*scene);
+    }
+  }
+  if (!wrong.empty())
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", impl_->path)}, wrong.take()});
+  first->warnings = warned.take();
+  return std::move(*first);
+}
+
+tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
+    const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
+    std::optional<std::uint32_t> frame, bool labels) {
+  auto reader = SceneReader::open(path, defines, strict);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  return reader->read(frame, labels);
+}
+
+tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict) {
+  auto text = read_text(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  RecordedFolder folder(fs::path(path).parent_path());
+  NoriTestResult read = read_nori_test(path, *text, folder, {{}, strict, {}});
+  if (!read.test)
+    return tl::unexpected(coordinator::Rejected{
+        {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
+  return LocalTest{std::move(*read.test), std::move(read.diagnostics), folder.take_files()};
+}
+
+bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file) {
+  const std::string integrator = spec.integrator.value_or(scene.scene.integrator.name);
+  return file.is_text || scene.needed[scene::sees_media(integrator)].contains(file.digest);
+}
+
+coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec) {
+  coordinator::SubmitRequest request;
+  request.scene_name = scene.name;
+  request.scene_text = scene.text;
+  for (const auto& [name, file] : scene.files) request.assets.emplace(name, file.digest);
+  request.spec = spec;
+  return request;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,80 @@
+// A scene on this machine's disk: read, checked, and with every file that it names.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/scene/read.h"
+#include "common/scene/reader/nori_test.h"
+#include "coordinator/service/coordinator.h"
+
+namespace ls::cli {
+
+struct LocalFile {
+  std::filesystem::path path;
+  Digest digest;
+  std::uint64_t bytes = 0;
+  bool is_text = false;  // an included scene file
+};
+
+struct LocalScene {
+  std::string name;  // as given by the user; used in every diagnostic
+  std::string text;
+  Scene scene;
+  std::vector<Diagnostic> warnings;
+  std::map<std::string, LocalFile> files;  // by the name in the scene: assets and included scene files
+  std::optional<std::uint32_t> frame;      // the frame for which it was read
+  // Assets that a job uses, with an integrator that ignores media and with one that does not: other assets
+  // need not be uploaded.
+  std::array<std::set<Digest>, 2> needed = {};
+};
+
+// True if the job uses this file of the scene.
+bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file);
+
+// File names are relative to the scene's folder. `strict`: warnings are errors. `frame`: for sequences.
+// `labels`: include the names of shapes and materials, which are part of the scene if the job has Cryptomatte
+// layers.
+tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
+    const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
+    std::optional<std::uint32_t> frame = {}, bool labels = false);
+
+// Reads a scene once per frame; its files are examined only once.
+class SceneReader {
+ public:
+  static tl::expected<SceneReader, coordinator::Rejected> open(const std::string& path,
+                                                               std::map<std::string, std::string> defines,
+                                                               bool strict);
+  SceneReader(SceneReader&&) noexcept;
+  ~SceneReader();
+
+  tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame,
+                                                       bool labels = false);
+  // Reads all frames, or returns what is wrong with them: every missing file, up to 20. The result has the
+  // scene of the first frame, the files of all frames, and each warning once.
+  tl::expected<LocalScene, coordinator::Rejected> read_all(const FrameRange& frames);
+
+ private:
+  struct Impl;
+  explicit SceneReader(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// A Nori test file, with every file that its scenes name.
+struct LocalTest {
+  NoriTest test;
+  std::vector<Diagnostic> warnings;
+  std::map<std::string, LocalFile> files;
+};
+tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict);
+
+coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec);
+
+}  // namespace ls::cli

@@ -1,0 +1,31 @@
+// A scene prepared for tracing in this process, without a farm: for `inspect` and for the replay of one
+// sample.
+#pragma once
+
+#include <memory>
+
+#include "cli/local/local_scene.h"
+#include "common/scene/analysis/needs.h"
+#include "coordinator/admission/admission.h"
+#include "worker/render/render.h"
+
+namespace ls::cli {
+
+struct LocalWorld {
+  coordinator::StoredJob job;  // settings, samples and warnings as for a job
+  std::shared_ptr<const render::World> world;
+  scene::Needs needs;
+  std::uint64_t scene_bytes = 0;  // of the canonical scene, as sent to workers
+};
+// Resolves the settings and checks the limits exactly as for a job.
+tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
+                                                                  const JobSpec& spec, int threads);
+
+// The world for the settings with which an image was rendered; no setting is taken from the scene.
+tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
+    const LocalScene& scene, const RenderSettings& settings, int threads);
+
+// Turns an error in one of the scene's files into a diagnostic of the scene as a whole.
+coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text);
+
+}  // namespace ls::cli

@@ -1,0 +1,30 @@
+// The report of a local render: the coordinator's, with additions that only this process knows.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls::cli {
+
+struct LocalFacts {
+  double load_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+  int threads = 1;
+  bool interrupted = false;
+  Result<std::uint64_t> instructions = 0;  // of the whole process; an error: why they were not counted
+};
+Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
+
+// One line with the main results.
+std::string report_summary(const std::string& report);
+// Prints numeric health problems to stderr; usually nothing.
+void print_report_health(const std::string& report);
+std::string pixels_digest(const std::string& report);  // empty: none
+
+std::uint64_t peak_rss_bytes();  // the maximum of this process and its ended children
+
+}  // namespace ls::cli

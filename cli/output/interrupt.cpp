@@ -1,0 +1,51 @@
+#include "cli/output/interrupt.h"
+
+#include <pthread.h>
+#include <signal.h>
+
+#include "cli/output/console.h"
+
+namespace ls::cli {
+namespace {
+
+// SIGUSR1 wakes the waiting thread at the end.
+sigset_t watched() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int s : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&set, s);
+  return set;
+}
+
+void die_of(int signal) {
+  ::signal(signal, SIG_DFL);
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, signal);
+  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+  ::raise(signal);
+}
+
+}  // namespace
+
+Interrupt::Interrupt() {
+  const sigset_t set = watched();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+}
+
+void Interrupt::on_signal(std::function<void()> stop) {
+  thread_ = std::jthread([this, stop = std::move(stop)] {
+    const sigset_t set = watched();
+    int signal = 0;
+    while (sigwait(&set, &signal) == 0 && signal != SIGUSR1) {
+      if (happened_.exchange(true)) die_of(signal);
+      print_note("lightshaft: stopping; once more ends at once");
+      stop();
+    }
+  });
+}
+
+Interrupt::~Interrupt() {
+  if (thread_.joinable()) pthread_kill(thread_.native_handle(), SIGUSR1);
+}
+
+}  // namespace ls::cli

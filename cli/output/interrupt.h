@@ -1,0 +1,28 @@
+// Handles Ctrl-C and SIGTERM while something runs: the first requests a stop, the second ends the process in
+// the usual way.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <thread>
+
+namespace ls::cli {
+
+// Create before any other thread, so that they inherit the blocked signals.
+class Interrupt {
+ public:
+  Interrupt();
+  ~Interrupt();
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  // Calls `stop` once, on a separate thread, at the first signal. Call once.
+  void on_signal(std::function<void()> stop);
+  bool happened() const { return happened_; }
+
+ private:
+  std::atomic<bool> happened_{false};
+  std::jthread thread_;
+};
+
+}  // namespace ls::cli

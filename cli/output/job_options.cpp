@@ -1,0 +1,178 @@
+#include "cli/output/job_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "common/job/limits.h"
+
+namespace ls::cli {
+namespace {
+
+template <class T>
+std::optional<T> number(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+// Splits "640x360" at `between`.
+std::optional<std::pair<int, int>> two_numbers(std::string_view text, char between) {
+  const auto at = text.find(between);
+  if (at == std::string_view::npos) return std::nullopt;
+  const auto first = number<int>(text.substr(0, at)), second = number<int>(text.substr(at + 1));
+  if (!first || !second) return std::nullopt;
+  return std::pair(*first, *second);
+}
+
+// Sets an optional field if the option was given.
+template <class T, class Parse>
+Result<void> take(const std::string& text, std::optional<T>& field, Parse parse) {
+  if (text.empty()) return {};
+  auto value = parse(text);
+  if (!value) return tl::unexpected(value.error());
+  field = std::move(*value);
+  return {};
+}
+
+Result<int> parse_priority(const std::string& text) {
+  const auto value = number<int>(text);
+  if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
+    return bad_argument(fmt::format("--priority '{}': it must be a whole number from -{} to {}", text,
+                                    kMaxPriority, kMaxPriority));
+  return *value;
+}
+
+}  // namespace
+
+Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
+                                  std::uint64_t most) {
+  const auto value = number<std::uint64_t>(text);
+  if (!value || *value < least || *value > most)
+    return bad_argument(
+        fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
+  return *value;
+}
+
+Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text) {
+  const std::string_view units = "KMGT";
+  const std::size_t unit = text.empty() ? std::string_view::npos : units.find(text.back());
+  const bool scaled = unit != std::string_view::npos;
+  const auto value = number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
+  const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
+  if (!value || *value == 0 || *value > kMaxMemory >> shift)
+    return bad_argument(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T",
+                                    what, text, kMaxMemory >> 40));
+  return *value << shift;
+}
+
+Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
+  const auto value = number<double>(text);
+  if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
+    return bad_argument(fmt::format("{} '{}': it must be a number above 0, at most {:g}", what, text, most));
+  return *value;
+}
+
+Result<FrameSize> parse_size(const std::string& text) {
+  const auto size = two_numbers(text, 'x');
+  if (!size) return bad_argument(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
+  const auto [width, height] = *size;
+  if (width < 1 || height < 1)
+    return bad_argument(fmt::format("--size '{}': such an image has no pixels", text));
+  if (width > kMaxFrameSide || height > kMaxFrameSide || std::int64_t{width} * height > kMaxFramePixels)
+    return bad_argument(fmt::format("--size '{}': at most {} pixels a side and {} in all", text,
+                                    kMaxFrameSide, kMaxFramePixels));
+  return FrameSize{width, height};
+}
+
+Result<std::pair<int, int>> parse_pixel(const std::string& text) {
+  const auto pixel = two_numbers(text, ',');
+  if (!pixel || pixel->first < 0 || pixel->second < 0)
+    return bad_argument(fmt::format("--pixel '{}': write it as X,Y, counted from 0 at the top left", text));
+  return *pixel;
+}
+
+Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::string>& defines) {
+  std::map<std::string, std::string> values;
+  for (const std::string& define : defines) {
+    const auto equals = define.find('=');
+    if (equals == std::string::npos || equals == 0)
+      return bad_argument(fmt::format("-D '{}': write it as name=value", define));
+    if (!values.emplace(define.substr(0, equals), define.substr(equals + 1)).second)
+      return bad_argument(fmt::format("-D '{}': '{}' is given twice", define, define.substr(0, equals)));
+  }
+  if (values.size() > kMaxDefines) return bad_argument(fmt::format("-D: at most {} of them", kMaxDefines));
+  return values;
+}
+
+void JobOptions::add_to(CLI::App& app) {
+  app.add_option("--spp", spp, "samples per pixel; default: the scene's")->type_name("N");
+  app.add_option("--target-error", target_error, "stop when the image's relMSE is below this")
+      ->type_name("E");
+  app.add_option("--time", time, "stop after this many seconds, counted from the first ray")
+      ->type_name("SECONDS");
+  app.add_option("--seed", seed, "default 0")->type_name("N");
+  app.add_option(
+         "--frames", frames,
+         "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
+         "$frame is it, too")
+      ->type_name("A-B");
+  app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
+  app.add_option("--integrator", integrator, "volpath, volpath_distant_mis or path instead of the scene's")
+      ->type_name("NAME");
+  app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,...");
+  app.add_option("-D,--define", defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+  app.add_flag("--float", float_output, "32-bit pixels in the image instead of half");
+  app.add_flag("--strict", strict, "warnings of the scene are errors");
+}
+
+Result<JobSpec> JobOptions::parse() const {
+  JobSpec spec;
+  const auto whole = [](const char* name, std::uint64_t least, std::uint64_t most) {
+    return [=](const std::string& text) { return parse_whole(name, text, least, most); };
+  };
+  const auto positive = [](const char* name, double most) {
+    return [=](const std::string& text) { return parse_positive(name, text, most); };
+  };
+  std::optional<int> priority_value;
+  std::optional<std::uint64_t> workers, units;
+  for (const auto& taken :
+       {take(spp, spec.spp, whole("--spp", 1, kMaxSpp)),
+        take(target_error, spec.target_error, positive("--target-error", kMaxTargetError)),
+        take(time, spec.time, positive("--time", kMaxSeconds)),
+        take(seed, spec.seed, whole("--seed", 0, ~std::uint64_t{0})), take(size, spec.size, parse_size),
+        take(priority, priority_value, parse_priority),
+        take(max_workers, workers, whole("--max-workers", 1, kMaxAtOnce)),
+        take(max_units, units, whole("--max-units", 1, kMaxAtOnce)),
+        take(memory, spec.memory, [](const std::string& text) { return parse_bytes("--memory", text); })})
+    if (!taken) return tl::unexpected(taken.error());
+  if (!integrator.empty()) spec.integrator = integrator;
+  auto values = parse_defines(defines);
+  if (!values) return tl::unexpected(values.error());
+  spec.defines = std::move(*values);
+  if (!frames.empty()) {
+    const auto range = parse_frames(frames);
+    if (!range) return fail(Errc::invalid_argument, "--" + range.error().message);
+    spec.frames = *range;
+    if (spec.defines.contains("frame"))
+      return bad_argument("-D frame: with --frames the scene's $frame is the number of the frame");
+  }
+  if (const auto known = parse_aovs(aov); !known) return bad_argument("--aov: " + known.error().message);
+  spec.aov = aov;
+  spec.priority = priority_value.value_or(0);
+  spec.float_output = float_output;
+  spec.tags = tags;
+  if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
+  if (units) spec.max_units = static_cast<std::uint32_t>(*units);
+  return spec;
+}
+
+}  // namespace ls::cli

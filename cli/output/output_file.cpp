@@ -1,0 +1,90 @@
+#include "cli/output/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+
+#include "coordinator/store/files.h"
+
+namespace ls::cli {
+
+namespace fs = std::filesystem;
+
+Result<void> check_output(const std::string& option, const fs::path& file) {
+  std::error_code error;
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error))
+    return fail(Errc::invalid_argument,
+                fmt::format("{} {}: there is no folder {}", option, file.string(), folder.string()));
+  const fs::file_status status = fs::status(file, error);
+  if (fs::is_directory(status))
+    return fail(Errc::invalid_argument, fmt::format("{} {}: this is a folder", option, file.string()));
+  if (!fs::exists(status) || fs::is_regular_file(status)) return check_folder(option, folder);
+  if (::access(file.c_str(), W_OK) != 0)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} {}: cannot be written: {}", option, file.string(), std::strerror(errno)));
+  return {};
+}
+
+Result<void> check_folder(const std::string& option, const fs::path& folder) {
+  std::string trial = (folder / ".lightshaft-XXXXXX").string();
+  const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));
+  if (!made)
+    return fail(Errc::invalid_argument, fmt::format("{}: no file can be made in the folder {}: {}", option,
+                                                    folder.string(), std::strerror(errno)));
+  ::unlink(trial.c_str());
+  return {};
+}
+
+Result<void> check_numbered(const std::string& option, const std::string& name, const FrameRange& frames) {
+  if (has_frame_number(name) || frames.count() == 1) return {};
+  const fs::path path(name);
+  const fs::path better = path.parent_path() / (path.stem().string() + "_####" + path.extension().string());
+  return fail(Errc::invalid_argument,
+              fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number",
+                          option, name, frames.count(), better.string()));
+}
+
+Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status) || fs::is_regular_file(status))
+    return coordinator::write_atomically(fs::absolute(file, error), bytes);
+  std::ofstream out(file, std::ios::binary);  // a pipe or device cannot be replaced by renaming
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) return fail(Errc::unavailable, fmt::format("{} cannot be written", file.string()));
+  return {};
+}
+
+Result<void> write_output(const fs::path& file, const std::string& text) {
+  return write_output(file, std::as_bytes(std::span(text)));
+}
+
+Result<void> save_result(const fs::path& file, std::span<const std::byte> bytes) {
+  auto written = write_output(file, bytes);
+  if (written) return written;
+  std::error_code error;
+  std::string aside =
+      (fs::temp_directory_path(error) / "lightshaft-XXXXXX").string() + file.extension().string();
+  const int suffix = static_cast<int>(file.extension().string().size());
+  const coordinator::File rescue(error ? -1 : ::mkostemps(aside.data(), suffix, O_CLOEXEC));
+  if (!rescue) return written;
+  if (auto rescued = coordinator::write_all(rescue, bytes, aside); !rescued) {
+    ::unlink(aside.c_str());
+    return written;
+  }
+  return fail(written.error().code,
+              fmt::format("{}; what was to be written there is in {}", written.error().message, aside));
+}
+
+Result<void> save_result(const fs::path& file, const std::string& text) {
+  return save_result(file, std::as_bytes(std::span(text)));
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,20 @@
+// Failpoints: named steps of a unit's life at which the chaos tests kill a process. With
+// LIGHTSHAFT_KILL_AT=STEP or STEP:N in the environment, the process dies as by kill -9 when it reaches the
+// step (for the N-th time). Otherwise a failpoint costs one comparison.
+#pragma once
+
+#include <string_view>
+
+namespace ls {
+
+// In the order of a unit's life.
+inline constexpr std::string_view kSteps[] = {
+    // coordinator                            worker
+    "lease-sent",        "lease-received",    "unit-rendered",    "result-sent",   "result-arrived",
+    "result-checked",    "result-appended",   "result-durable",   "result-folded", "result-acknowledged",
+    "acknowledged-seen", "checkpoint-stored", "snapshot-written", "image-written", "job-done",
+};
+
+void failpoint(std::string_view name);
+
+}  // namespace ls

@@ -1,0 +1,103 @@
+// Additional outputs of an image (AOVs): names, planes in a partial, sizes. docs/reference/aovs.md defines
+// each.
+//
+// After its six colour planes a partial has the planes of sums of the requested AOVs, then those of
+// identifiers (id_slots.h); each kind sorted by name, which is also the order in the file.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls {
+
+// Planes of colour in a partial: A.R A.G A.B B.R B.G B.B, the sums of the two halves.
+inline constexpr int kPartialChannels = 6;
+
+enum class Aov : std::uint8_t {
+  albedo,
+  coverage,
+  depth,
+  direct,
+  emission,
+  geo_normal,
+  indirect,
+  material_id,
+  multiple,
+  normal,
+  position,
+  shape_id,
+  single,
+  surface,
+  uv,
+  volume
+};
+inline constexpr std::size_t kAovs = 16;
+
+// The type of an AOV's values, and the divisor of their mean.
+enum class AovKind {
+  of_hits,  // sums over the samples that hit a surface; the mean is over these
+  of_all,   // likewise, but the mean is over all samples: 0 where nothing is hit
+  light,    // components of the radiance; the mean is over all samples
+  ids       // identifiers, each with its number of samples
+};
+
+struct AovRow {
+  Aov aov;
+  std::string_view name;  // name in requests, and of the layer
+  AovKind kind;
+  std::string_view components;  // of the layer: one letter per channel
+  bool half;                    // stored as half floats, unless the image is in floats
+};
+std::span<const AovRow> aov_rows();  // sorted by name
+const AovRow& row_of(Aov aov);
+
+class AovSet {
+ public:
+  constexpr AovSet() = default;
+  constexpr explicit AovSet(std::uint32_t bits) : bits_(bits & ((1u << kAovs) - 1)) {}
+  constexpr bool has(Aov a) const { return bits_ >> static_cast<int>(a) & 1; }
+  constexpr bool any_of(AovSet other) const { return bits_ & other.bits_; }
+  constexpr bool empty() const { return bits_ == 0; }
+  constexpr std::uint32_t bits() const { return bits_; }
+  constexpr AovSet with(Aov a) const { return AovSet(bits_ | 1u << static_cast<int>(a)); }
+  bool operator==(const AovSet&) const = default;
+
+ private:
+  std::uint32_t bits_ = 0;
+};
+AovSet aovs_of(AovKind kind);  // all of a kind
+
+// Accepts the names in common use ("normal", "sh_normal", "crypto_object"), ignoring case and with '-' for
+// '_'. "spp" and "stderr", which every image has, are accepted and add nothing. invalid_argument: an unknown
+// name; the message lists the known ones.
+Result<AovSet> parse_aovs(std::span<const std::string> names);
+std::vector<std::string> names_of(AovSet set);  // sorted
+std::string known_aovs();                       // "albedo, coverage, ..."
+
+// One plane of sums: a component of an AOV, or the number of samples that hit a surface.
+struct AovPlane {
+  std::string name;      // the partial's channel: "aov.albedo.B", "aov.hits"
+  Aov aov = Aov::depth;  // unused for hits
+  int component = 0;     // in the row's order
+  bool hits = false;
+};
+struct AovPlanes {
+  std::vector<AovPlane> sums;
+  std::vector<Aov> ids;            // each has kIdPlanes planes
+  std::vector<std::string> names;  // of all planes, in the order within a partial
+  std::size_t count() const { return names.size(); }
+  std::size_t hits = SIZE_MAX;  // index of the hits plane in sums, if present
+};
+AovPlanes planes_of(AovSet set);
+
+// Bytes per pixel: in a partial (and in a tail), and in the film's sums.
+std::size_t partial_bytes_per_pixel(AovSet set);
+std::size_t film_bytes_per_pixel(AovSet set);
+
+}  // namespace ls

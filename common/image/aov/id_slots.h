@@ -1,0 +1,46 @@
+// Counts which objects a pixel shows and in how many samples: a fixed number of slots (identifier, count),
+// and the number of samples that found no slot. An identifier is a float made from a name as in Cryptomatte:
+// normal, never 0. Slots have one canonical order: by count, largest first, then by the bits of the
+// identifier; unused slots are 0, 0.
+//
+// Adding two sets keeps the largest slots of both; the others are counted in `more`. While the samples of a
+// pixel show no more than kIdSlots objects in total, every count is exact in any order; beyond that a count
+// may be too low by at most `more`.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace ls {
+
+inline constexpr int kIdSlots = 8;
+inline constexpr std::size_t kIdPlanes = 2 * kIdSlots + 1;  // id, n of each slot; more
+
+struct IdSlot {
+  float id = 0;
+  float n = 0;  // a whole number, at most 2^24
+  bool operator==(const IdSlot&) const = default;
+};
+struct IdSlots {
+  std::array<IdSlot, kIdSlots> slots{};
+  float more = 0;
+  bool operator==(const IdSlots&) const = default;
+};
+
+bool is_identifier(float id);
+
+// Slots from the objects that one unit saw in a pixel, in any order, each once.
+IdSlots ranked(std::vector<IdSlot> seen);
+IdSlots operator+(const IdSlots& a, const IdSlots& b);
+
+// Checks slots against the number of samples; returns the fault, empty if none.
+std::string wrong_with(const IdSlots& slots, std::uint64_t samples);
+
+// Convert between slots and kIdPlanes planes, with a stride of `stride` floats, at one pixel.
+IdSlots load_slots(const float* planes, std::size_t stride);
+void store_slots(const IdSlots& slots, float* planes, std::size_t stride);
+
+}  // namespace ls

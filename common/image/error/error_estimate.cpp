@@ -1,0 +1,291 @@
+#include "common/image/error/error_estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "common/base/check.h"
+#include "common/image/error/relative_weights.h"
+
+namespace ls {
+namespace {
+
+constexpr int kReach = 2;                  // radius of the 5 x 5 window
+constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
+// If fewer pixels than this carry the error, their own scatter (sqrt(4/3/100) = 12 % of the sum) makes the
+// sum unreliable. Small images need fewer: in one of 32 x 32, object edges alone sometimes carry the error.
+constexpr double kFewPixels = 100, kPartOfSmall = 48;
+constexpr double kLargeShare = 0.1;  // of the error in one pixel, for images with many pixels
+// Limit, in smooth parts of the image, for fourth powers relative to the variance from pairs of neighbours: 1
+// for Gaussian noise, up to 6 for low-discrepancy points on a smooth image (tests/coverage).
+constexpr double kHeavy = 10;
+// ratio of the light in the two halves from which a pixel counts as having few hits
+constexpr double kOneSided = 19;
+// Least number of samples in the last round for estimating the distribution of the noise: with 8 samples per
+// half, a single sample that finds rare light would dominate.
+constexpr std::uint64_t kTellingSamples = 16;
+
+// The mean amount by which skewed noise lowers the sum of relative squares (derived in the header). Summed by
+// columns, so that the loop is vectorised.
+double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
+               const RelativeWeights& w) {
+  const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
+  const auto width = static_cast<std::size_t>(now.width);
+  std::vector<double> columns(width);
+  double* sums = columns.data();
+  for (std::size_t row = 0; row < now.a.size(); row += width) {
+    const double *a = &now.a[row], *b = &now.b[row], *a1 = &earlier.halves.a[row],
+                 *b1 = &earlier.halves.b[row];
+    const double *roots = &w.roots[row], *leans = &w.leans[row];
+    for (std::size_t x = 0; x < width; ++x) {
+      // each half's part of the mean: a = last * a_n + before * a_o
+      const double ao = before * a1[x], bo = before * b1[x], an = a[x] - ao, bn = b[x] - bo;
+      const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
+      const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
+      const double most = 0.5 * roots[x] * roots[x], change = leans[x] * apart;
+      const double up = last * change, down = -before * change;
+      sums[x] += of_last * (up < -most  ? -most
+                            : most < up ? most
+                                        : up) +
+                 of_before * (down < -most  ? -most
+                              : most < down ? most
+                                            : down);
+    }
+  }
+  return std::accumulate(columns.begin(), columns.end(), 0.0);
+}
+
+// Sum over pixels of tr(V^2), from fourth powers and, for a trusted image, also from pairs of neighbours;
+// derived in the header.
+double trace_of_moments(const NoiseSums& s, bool trusted) {
+  const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
+  const double channel = trusted ? s.edge_channel_fourth : s.channel_fourth,
+               pixel = trusted ? s.edge_pixel_fourth : s.pixel_fourth;
+  const double cross = std::max(0.0, pixel - channel);
+  return channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
+}
+
+// Standard deviation of (estimated - realised) sum of squares, divided by the estimated sum.
+double relative_spread(const NoiseSums& s, bool trusted) {
+  if (!(s.squares > 0)) return 0;
+  return trusted ? 2 * std::sqrt(s.changes.products) / s.changes.squares
+                 : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
+}
+
+// `a`, `b`: changes of the halves' means, three planes each; `scale`: factor on their squares.
+ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
+  const std::size_t n = a.size() / 3;
+  ChangeSums out;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double ar = a[i], ag = a[n + i], ab = a[2 * n + i], br = b[i], bg = b[n + i], bb = b[2 * n + i];
+    const double dot = ar * br + ag * bg + ab * bb;
+    out.squares += ar * ar + ag * ag + ab * ab + br * br + bg * bg + bb * bb;
+    out.products += dot * dot;
+  }
+  out.squares *= scale / 2;
+  out.products *= scale * scale;
+  return out;
+}
+
+// Ratio of fourth powers to pairs of neighbours in smooth parts of the image; 0 where edges dominate.
+double heaviness(const NoiseSums& s) {
+  constexpr double kPart = .25;
+  const double flat = s.pixel_fourth - s.edge_pixel_fourth;
+  if (!(flat > kPart * s.pixel_fourth)) return 0;
+  return s.flat_pairs > 0 ? flat / 3 / s.flat_pairs : std::numeric_limits<double>::infinity();
+}
+
+void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
+  const double few = std::min(kFewPixels, pixels / kPartOfSmall);
+  if (!lit) {
+    out.verdict =
+        "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to "
+        "find for so "
+        "few samples";
+  } else if (out.effective_pixels == 0) {
+    out.trusted = out.spp >= 64;
+    if (!out.trusted)
+      out.verdict = "the two halves of the samples do not differ yet: too few samples to tell the error";
+  } else if (out.effective_pixels < few ||
+             (out.top_share > kLargeShare && pixels * kLargeShare > 4 * kFewPixels)) {
+    out.verdict = fmt::format(
+        "don't trust yet: few pixels carry the error (like {:.0f} of {:.0f}; the worst one {:.0f} %); bright "
+        "outliers may still be missing, so the true error may be larger",
+        out.effective_pixels, pixels, 100 * out.top_share);
+  } else if (heaviness(sums) > kHeavy) {
+    out.verdict =
+        "don't trust yet: single pixels differ far more than those around them; more bright outliers may "
+        "still be "
+        "missing, so the true error may be larger";
+  } else {
+    out.trusted = true;
+  }
+}
+
+}  // namespace
+
+namespace {
+
+double light(std::span<const double> half, std::size_t pixel, std::size_t pixels) {
+  return half[pixel] + half[pixels + pixel] + half[2 * pixels + pixel];
+}
+
+}  // namespace
+
+bool has_few_hits(const HalfMeans& h, int x, int y) {
+  const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const auto at = [&](int i, int j) {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
+  };
+  const double a = light(h.a, at(x, y), pixels), b = light(h.b, at(x, y), pixels);
+  if (a != 0 || b != 0) return std::max(a, b) > kOneSided * std::min(a, b);
+  int lit = 0, all = 0;
+  for (int j = std::max(0, y - kReach); j <= std::min(h.height - 1, y + kReach); ++j)
+    for (int i = std::max(0, x - kReach); i <= std::min(h.width - 1, x + kReach); ++i) {
+      ++all;
+      lit += light(h.a, at(i, j), pixels) != 0 || light(h.b, at(i, j), pixels) != 0;
+    }
+  return 2 * lit > all - 1;
+}
+
+void NoiseSums::add(const NoiseSums& o) {
+  squares += o.squares;
+  channel_fourth += o.channel_fourth;
+  pixel_fourth += o.pixel_fourth;
+  pair_covariance += o.pair_covariance;
+  pair_variance += o.pair_variance;
+  edge_channel_fourth += o.edge_channel_fourth;
+  edge_pixel_fourth += o.edge_pixel_fourth;
+  flat_pairs += o.flat_pairs;
+  largest = std::max(largest, o.largest);
+  changes.squares += o.changes.squares;
+  changes.products += o.changes.products;
+}
+
+void TileError::add(const TileError& o) {
+  pixels += o.pixels;
+  samples += o.samples;
+  few_hits += o.few_hits;
+  lit += o.lit;
+  skew += o.skew;
+  plain.add(o.plain);
+  relative.add(o.relative);
+}
+
+void TileError::subtract_skew(double part) {
+  relative.squares -= part;
+  skew += part;
+}
+
+namespace {
+
+// A vectorised loop for pixels with light in both halves, which are nearly all; only black pixels need their
+// neighbours.
+void count_hits(const HalfMeans& h, TileError& out) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const double *a = h.a.data(), *b = h.b.data();
+  std::uint64_t lit = 0, one_sided = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double of_a = a[i] + a[n + i] + a[2 * n + i], of_b = b[i] + b[n + i] + b[2 * n + i];
+    lit += (of_a != 0) | (of_b != 0);
+    one_sided += (of_a > kOneSided * of_b) | (of_b > kOneSided * of_a);
+  }
+  out.lit = lit;
+  out.few_hits = one_sided;
+  if (lit == n || lit == 0) return;
+  for (std::size_t i = 0; i < n; ++i)
+    if (light(h.a, i, n) == 0 && light(h.b, i, n) == 0)
+      out.few_hits += has_few_hits(h, static_cast<int>(i) % h.width, static_cast<int>(i) / h.width);
+}
+
+}  // namespace
+
+namespace {
+
+// Uses the last round, if it is long enough.
+void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
+                  const std::vector<double>& roots, TileError& out) {
+  if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;
+  const std::size_t n = h.a.size();
+  const double scale = static_cast<double>(earlier.spp) / static_cast<double>(2 * (spp - earlier.spp));
+  std::vector<double> a(n), b(n);
+  for (std::size_t i = 0; i < n; ++i)
+    a[i] = h.a[i] - earlier.halves.a[i], b[i] = h.b[i] - earlier.halves.b[i];
+  const ChangeSums plain = change_sums(a, b, scale);
+  for (std::size_t i = 0; i < n; ++i) a[i] *= roots[i], b[i] *= roots[i];
+  const ChangeSums relative = change_sums(a, b, scale);
+  if (plain.squares > 0) out.plain.changes = plain;
+  if (relative.squares > 0) out.relative.changes = relative;
+}
+
+}  // namespace
+
+TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
+  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
+        h.b.size(), h.width, h.height);
+  TileError out{.pixels = n, .samples = spp * n};
+  count_hits(h, out);
+  std::vector<double> d(3 * n);
+  for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
+  const RelativeWeights w = relative_weights(h);
+  out.plain = noise_sums(d, w.edges, h.width, h.height);
+  for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
+  out.relative = noise_sums(d, w.edges, h.width, h.height);
+  for (NoiseSums* sums : {&out.plain, &out.relative})
+    sums->changes = {sums->squares, trace_of_moments(*sums, true)};
+  if (!earlier) return out;
+  CHECK(earlier->halves.a.size() == 3 * n && earlier->halves.b.size() == 3 * n && earlier->spp >= 2 &&
+            earlier->spp < spp,
+        "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
+        earlier->spp, 3 * n, spp);
+  // With low-discrepancy points the whole is better than its parts, so a correction estimated from the parts
+  // must be limited.
+  const double all = out.relative.squares;
+  out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
+  send_changes(h, spp, *earlier, w.roots, out);
+  return out;
+}
+
+namespace {
+
+// Half width of the 95 % interval of the logarithm of a sum of squares; on a log scale, so that the lower end
+// stays above zero. The spread is itself an estimate. From fourth powers: for n equal Gaussian pixels these
+// have a relative variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so they behave like a chi
+// square with e / 2 degrees of freedom. From changes: 4 products / squares^2 has a relative variance of (8 +
+// 4 - 8) / n (from the products, the square and their covariance), hence 3 e / 2 degrees; uneven noise has
+// fewer, but at least e / 2 in the scenes of tests/coverage. The factor is Student's t for these, to first
+// order (Abramowitz and Stegun 26.7.5).
+double half_width(const NoiseSums& s, bool trusted) {
+  if (!(s.pixel_fourth > 0)) return 0;
+  const double freedom = s.squares * s.squares / s.pixel_fourth / 2;
+  return k95 * (1 + (k95 * k95 + 1) / (4 * freedom)) * relative_spread(s, trusted);
+}
+
+}  // namespace
+
+ImageError image_error(const TileError& sums) {
+  ImageError out;
+  if (sums.pixels == 0) return out;
+  const auto pixels = static_cast<double>(sums.pixels);
+  out.rmse = std::sqrt(sums.plain.squares / (3 * pixels));
+  out.relmse = sums.relative.squares / (3 * pixels);
+  out.spp = static_cast<double>(sums.samples) / pixels;
+  out.few_hits = sums.few_hits;
+  if (sums.relative.pixel_fourth > 0) {
+    out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
+    out.top_share = sums.relative.largest / sums.relative.squares;
+  }
+  judge(out, sums.relative, pixels, sums.lit > 0);
+  const double plain = half_width(sums.plain, out.trusted), relative = half_width(sums.relative, out.trusted);
+  out.rmse_lo = out.rmse * std::exp(-plain / 2);
+  out.rmse_hi = out.rmse * std::exp(plain / 2);
+  out.relmse_lo = out.relmse * std::exp(-relative);
+  out.relmse_hi = out.relmse * std::exp(relative);
+  return out;
+}
+
+}  // namespace ls

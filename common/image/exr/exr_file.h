@@ -1,0 +1,90 @@
+// The interface to OpenEXR: reads external images, writes our own; partials have their own functions
+// (partial_exr.cpp, partial_decoder.h). No type of the library appears here, and none of its exceptions
+// escapes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/image/frame/frame.h"
+
+namespace ls {
+
+struct RgbImage {
+  FrameSize size;          // of the data window
+  std::vector<float> rgb;  // interleaved, row by row from the top; values as stored (may be NaN or infinite)
+};
+
+struct ExrLimits {
+  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // of the file
+  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // of the data window
+  int max_side = 65536;
+};
+
+// Reads flat scanline or tiled EXR, half or float, with any compression; a single part, or the first part
+// that has colour. Channels R G B, or Y alone (grey); alpha is ignored. Chroma-subsampled (luminance/chroma)
+// and deep files are rejected. `name` is for messages. Sizes are checked before anything is allocated.
+Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
+                              const ExrLimits& limits = {});
+// Reads a whole file. Errors: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
+Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,
+                                              const ExrLimits& limits = {});
+Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
+
+// An image with the standard error of each value, if the part has layers stderr.R, stderr.G and stderr.B at
+// full resolution; otherwise `error` is empty.
+struct RgbWithError {
+  RgbImage image;
+  std::vector<float> error;                    // interleaved like image.rgb
+  std::map<std::string, std::string> strings;  // header strings
+};
+Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
+                                         const ExrLimits& limits = {});
+
+inline constexpr float kLargestHalf = 65504;
+
+// An image of several planes of the same size.
+struct ExrHalf {
+  std::vector<float> values;
+};  // converted on writing; the caller must clamp to +-kLargestHalf
+struct ExrFloat {
+  std::vector<float> values;
+};
+struct ExrUint {
+  std::vector<std::uint32_t> values;
+};
+struct ExrPicture {
+  FrameSize size;
+  std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;  // "R", "stderr.R", "spp", ...
+  std::map<std::string, std::string> strings;                                // header attributes
+};
+// Scanline, ZIP compressed. The bytes depend only on the image.
+Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
+
+// Destination for files too large to be held in memory.
+class ByteSink {
+ public:
+  virtual ~ByteSink() = default;
+  virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
+};
+// An image delivered in bands of whole rows, from the top: each an ExrPicture of that many rows, all with the
+// same channels. The strings of the first one also go into the header.
+struct ExrBands {
+  FrameSize size;
+  std::map<std::string, std::string> strings;
+  // called for 0, 1, 2, ... until all rows are delivered, twice in total
+  std::function<ExrPicture(int band)> band;
+};
+// Writes the whole image as one file, with the seal of all of it in its header (seal.h).
+Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
+
+}  // namespace ls

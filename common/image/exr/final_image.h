@@ -1,0 +1,95 @@
+// The outputs of a film: the final EXR, its pixel digest, and a preview PNG.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/error/convergence.h"
+#include "common/image/exr/aov_layers.h"
+#include "common/image/film/film.h"
+
+namespace ls {
+
+// SHA-256 over float32((sumA+sumB)/(nA+nB)), divided in double, -0 replaced by +0; R, G, B interleaved per
+// pixel, row by row, little endian. Pixels without samples are zero.
+Digest pixels_sha256(const Film& film);
+
+// The note named `fake`, for an image that contains results of fake workers.
+inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
+
+// The header strings `lightshaft:...` of the final EXR; docs/design/error.md lists them. `:relmse`,
+// `:relmse_ci95`
+// ("LOW HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not)
+// and `:tiles` come from the film; without samples only the last is written. `:pixels_without_samples` is
+// written if there are any.
+struct Provenance {
+  Digest scene;
+  std::string settings_json;  // canonical RenderSettings
+  std::string build;
+  Digest numeric_class;
+  std::optional<std::uint64_t> seed = {};  // nullopt, here and below: unknown, and not written
+  std::optional<double> seconds = {};      // render time
+  // "clean", or canonical_json() of the Health; empty: unknown, and not written.
+  std::string health;
+  CryptomatteManifests manifests = {};
+  double core_seconds = 0;   // CPU time of units; 0: unknown, and not written
+  std::string stopped = {};  // why sampling stopped, and its consequences; empty: not written
+  std::optional<ConvergenceStatus> convergence_status =
+      {};  // includes the convergence curve, which the film alone does not have
+  std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
+  std::map<std::string, std::string> notes = {};  // further texts, likewise
+};
+struct FinalImage {
+  std::vector<std::byte> exr;
+  std::uint64_t clamped = 0;  // number of values above 65504, the largest half
+};
+// The layers of the final EXR of a film, or of one row of its tiles, with their header strings. Adds to
+// `clamped`.
+ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                        std::uint64_t* clamped = nullptr);
+// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers, all
+// sealed in `lightshaft:seal` (seal.h). Also works on an unfinished film.
+Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+// Writes the same bytes to `sink`, one row of tiles at a time, so that a large image is never in memory as a
+// whole. Returns the number of clamped values.
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
+                                      ByteSink& sink);
+
+// The header strings with the error of an image whose tiles have these sums, by full name;
+// `lightshaft:verdict` is based on the pixels only. None without samples.
+std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
+
+// Number of values of R, G and B that a half image clamps.
+std::uint64_t values_above_half(const Film& film);
+
+// A final EXR read back from an untrusted file: all layers and header strings; the layers that every final
+// EXR has are required. Sizes are bounded.
+inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
+struct FinalPicture : ExrPicture {
+  bool half = false;  // colours are stored as halves
+  // Layers and headers that do not match the seal, by name ("layer depth.Z"); nullopt: no seal.
+  std::optional<std::vector<std::string>> changed;
+};
+// invalid_argument: names what is missing or wrong.
+Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name);
+float as_half(float value);  // rounded to half precision
+
+// 8-bit sRGB (IEC 61966-2-1, rounded to nearest) of a linear pixel times `scale`; magenta if a channel is
+// NaN.
+std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
+
+// RGB, 8 bits, row by row, as a PNG.
+Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
+
+// 8-bit sRGB of the mean times 2^exposure. NaN is magenta; tiles without samples show a dark checker.
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);
+
+}  // namespace ls

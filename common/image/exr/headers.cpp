@@ -1,0 +1,148 @@
+#include "common/image/exr/headers.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "common/base/plain_text.h"
+#include "common/image/exr/attribute.h"
+#include "common/image/exr/byte_cursor.h"
+
+namespace ls::exr {
+namespace {
+
+constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
+constexpr std::size_t kMaxNameBytes = 255;
+// The library allocates a chunk's buffers before reading any of it. Above this size the file must be long
+// enough: the best compression in the format is a few thousand to one (deflate: 1032).
+constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
+constexpr double kMostPacking = 4096;
+constexpr std::size_t kLeastChannelBytes = 18;  // a name of one letter, the terminating zero, four int32
+
+struct Part {
+  std::optional<std::int64_t> width, height;
+  std::int64_t lines_per_chunk = 1;
+  std::size_t channels = 0;  // an upper bound
+  std::uint32_t tile_width = 0, tile_height = 0;
+  std::int32_t chunk_count = 0;
+};
+
+// Lines per chunk for each compression, by its number in the format: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44,
+// B44A, DWAA, DWAB.
+constexpr std::int64_t kLines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
+
+void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
+  ByteCursor in(raw);
+  if (name == "dataWindow" && raw.size() == 16) {
+    const std::int64_t x0 = *in.value<std::int32_t>(), y0 = *in.value<std::int32_t>(),
+                       x1 = *in.value<std::int32_t>(), y1 = *in.value<std::int32_t>();
+    part.width = x1 - x0 + 1;
+    part.height = y1 - y0 + 1;
+  } else if (name == "compression" && raw.size() == 1) {
+    const auto kind = static_cast<std::size_t>(raw[0]);
+    part.lines_per_chunk = kind < std::size(kLines) ? kLines[kind] : 256;
+  } else if (name == "channels") {
+    part.channels = raw.size() / kLeastChannelBytes;
+  } else if (name == "tiles" && raw.size() == 9) {
+    part.tile_width = *in.value<std::uint32_t>();
+    part.tile_height = *in.value<std::uint32_t>();
+  } else if (name == "chunkCount" && raw.size() == 4) {
+    part.chunk_count = *in.value<std::int32_t>();
+  }
+}
+
+class Scan {
+ public:
+  Scan(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits)
+      : in_(file), file_bytes_(file.size()), name_(name), limits_(limits) {}
+
+  Result<void> run() {
+    const auto magic = in_.value<std::uint32_t>(), version = in_.value<std::uint32_t>();
+    if (!magic || !version || *magic != kMagic) return refuse("not an EXR file");
+    tiled_ = *version & kTiledFlag;
+    const bool many = *version & kMultiPartFlag;
+    for (int p = 0;; ++p) {
+      if (p > kMaxParts) return refuse(fmt::format("more than {} parts", kMaxParts));
+      const auto part = read_part(many);
+      if (!part) return tl::unexpected(part.error());
+      if (!*part) return {};  // the empty header after the last part
+      if (const auto ok = check(**part); !ok) return ok;
+      if (!many) return {};
+    }
+  }
+
+ private:
+  tl::unexpected<Error> refuse(const std::string& what, Errc code = Errc::invalid_argument) const {
+    return fail(code, fmt::format("{}: cannot read this EXR: {}", name_, what));
+  }
+
+  Result<std::optional<Part>> read_part(bool many) {
+    Part part;
+    for (bool first = true;; first = false) {
+      const auto name = in_.name(kMaxNameBytes);
+      if (!name) return refuse("its header is cut off");
+      if (name->empty()) {
+        if (first && many) return std::optional<Part>{};
+        return std::optional<Part>(part);
+      }
+      const auto type = in_.name(kMaxNameBytes);
+      const auto size = in_.value<std::int32_t>();
+      if (!type || !size || *size < 0) return refuse("its header is cut off or damaged");
+      const auto raw = in_.take(static_cast<std::size_t>(*size));
+      if (!raw) return refuse(fmt::format("the header claims {} bytes, more than the file has", *size));
+      if (!fills_its_size(*type, *raw))
+        return refuse(fmt::format("its attribute '{}' is not as long as the header says", plain_text(*name)));
+      note(*name, *raw, part);
+    }
+  }
+
+  Result<void> check(const Part& part) const {
+    if (!part.width || !part.height) return refuse("a part has no data window");
+    const std::int64_t w = *part.width, h = *part.height;
+    if (w < 1 || h < 1) return refuse("the image is empty");
+    if (w > limits_.max_side || h > limits_.max_side ||
+        static_cast<std::uint64_t>(w * h) > limits_.max_pixels)
+      return refuse(fmt::format("{} x {} pixels; the limits are {} a side and {} in all", w, h,
+                                limits_.max_side, limits_.max_pixels),
+                    Errc::resource_exhausted);
+    const bool tiles = tiled_ || part.tile_width || part.tile_height;
+    if (tiles && (part.tile_width < 1 || part.tile_height < 1)) return refuse("its tiles have no size");
+    const auto up = [](std::int64_t n, std::int64_t d) {
+      return static_cast<std::uint64_t>((n + d - 1) / d);
+    };
+    const std::uint64_t chunks =
+        tiles ? up(w, part.tile_width) * up(h, part.tile_height) : up(h, part.lines_per_chunk);
+    // The table has 8 bytes per chunk; further levels make it longer, not shorter.
+    if (chunks > in_.left() / 8 || part.chunk_count < 0 ||
+        static_cast<std::uint64_t>(part.chunk_count) > in_.left() / 8)
+      return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));
+    const double chunk_pixels = tiles ? static_cast<double>(part.tile_width) * part.tile_height
+                                      : static_cast<double>(w) * static_cast<double>(part.lines_per_chunk);
+    const double bytes = chunk_pixels * 4 * static_cast<double>(part.channels);
+    if (bytes > static_cast<double>(kMaxChunkBytes))
+      return refuse(
+          fmt::format("one of its tiles or blocks of lines needs more than {} bytes", kMaxChunkBytes),
+          Errc::resource_exhausted);
+    if (bytes > static_cast<double>(kFreeChunkBytes) &&
+        bytes > kMostPacking * static_cast<double>(file_bytes_))
+      return refuse(
+          fmt::format("one of its tiles or blocks of lines needs {:.0f} bytes, more than {} can hold packed",
+                      bytes, file_bytes_));
+    return {};
+  }
+
+  ByteCursor in_;
+  const std::size_t file_bytes_;
+  const std::string& name_;
+  const ExrLimits& limits_;
+  bool tiled_ = false;
+};
+
+}  // namespace
+
+Result<void> check_headers(std::span<const std::byte> file, const std::string& name,
+                           const ExrLimits& limits) {
+  return Scan(file, name, limits).run();
+}
+
+}  // namespace ls::exr

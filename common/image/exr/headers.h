@@ -1,0 +1,21 @@
+// Checks an EXR's headers before the library reads them: it allocates whatever they claim (tables, buffers,
+// strings), and a file of a few hundred bytes can claim terabytes.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "common/base/error.h"
+#include "common/image/exr/exr_file.h"
+
+namespace ls::exr {
+
+// Checks that every part's size is within `limits`, every attribute lies inside the file and is as long as
+// its type requires, every chunk table is no longer than the file, and the buffer of one chunk is at most
+// kMaxChunkBytes. All else is left to the library.
+inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
+inline constexpr int kMaxParts = 256;
+Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);
+
+}  // namespace ls::exr

@@ -1,0 +1,90 @@
+// OpenEXR streams over memory. For the files of this folder only.
+#pragma once
+
+#include <ImfIO.h>
+#include <ImfThreading.h>
+#include <fmt/format.h>
+
+#include <Iex.h>
+
+#include <cstddef>
+#include <cstring>
+#include <exception>
+#include <mutex>
+#include <new>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls::exr {
+
+class MemoryReader final : public Imf::IStream {
+ public:
+  MemoryReader(std::span<const std::byte> bytes, const std::string& name)
+      : IStream(name.c_str()), bytes_(bytes) {}
+
+  bool read(char c[], int n) override {
+    if (n < 0 || static_cast<std::uint64_t>(n) > bytes_.size() - position_)
+      throw Iex::InputExc("the file ends too early");
+    std::memcpy(c, bytes_.data() + position_, static_cast<std::size_t>(n));
+    position_ += static_cast<std::uint64_t>(n);
+    return position_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return position_; }
+  void seekg(std::uint64_t position) override {
+    if (position > bytes_.size()) throw Iex::InputExc("the file ends too early");
+    position_ = position;
+  }
+
+ private:
+  std::span<const std::byte> bytes_;
+  std::uint64_t position_ = 0;
+};
+
+class MemoryWriter final : public Imf::OStream {
+ public:
+  MemoryWriter() : OStream("memory") {}
+
+  void write(const char c[], int n) override {
+    const auto end = position_ + static_cast<std::uint64_t>(n);
+    if (end > bytes_.size()) bytes_.resize(end);
+    if (n > 0)
+      // without bytes the address may be null
+      std::memcpy(bytes_.data() + position_, c, static_cast<std::size_t>(n));
+    position_ = end;
+  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = position; }
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
+  std::vector<std::byte> take() { return std::move(bytes_); }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::uint64_t position_ = 0;
+};
+
+// No threads of the library's own: the farm assigns threads itself, and small images gain nothing.
+inline void set_up_library() {
+  static std::once_flag once;
+  std::call_once(once, [] { Imf::setGlobalThreadCount(0); });
+}
+
+// Calls f, which returns a Result<T>; exceptions of the library become an error with this code and the
+// message `what: reason`.
+template <class F>
+auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
+  try {
+    set_up_library();
+    return f();
+  } catch (const std::bad_alloc&) {
+    return fail(Errc::resource_exhausted, fmt::format("{}: out of memory", what));
+  } catch (const std::exception& e) {
+    return fail(code, fmt::format("{}: {}", what, e.what()));
+  } catch (...) {
+    return fail(Errc::internal, fmt::format("{}: unknown exception", what));
+  }
+}
+
+}  // namespace ls::exr

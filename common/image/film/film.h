@@ -1,0 +1,146 @@
+// The film: per-pixel double sums of both halves (A: even sample indices, B: odd ones) of every tile, folded
+// round by round in order. Its pixels depend only on the partials, not on when or in which order they
+// arrived.
+//
+// A round shorter than its full range (the last one of a job) is a tile's *tail*: it is kept beside the sums,
+// is included in all results, and is replaced when a longer range of the same round arrives. So an N-sample
+// film that is continued to 2N has the same bits as a 2N film rendered at once.
+//
+// AOVs are folded likewise: sums in double, identifiers by the rule of id_slots.h.
+//
+// Not thread-safe: the caller locks. Copies are cheap (tiles are immutable and shared; a fold makes a new
+// one): copy under the lock, read or write files outside it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/error/error_estimate.h"
+#include "common/image/film/partial.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
+
+namespace ls {
+
+// The current pixels of one tile; interleaved R, G, B, row by row.
+struct TilePixels {
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  std::vector<double> mean;            // (sumA + sumB) / (nA + nB); zero if spp is 0
+  std::vector<double> standard_error;  // |A - B| / 2 of the half means
+};
+
+// The current AOVs of one tile.
+struct TileAovs {
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  std::vector<double> sums;  // planes_of(aovs).sums, planar; zero if spp is 0
+  std::vector<float> ids;    // kIdPlanes planes for each of planes_of(aovs).ids
+};
+
+class Film {
+ public:
+  explicit Film(TileGrid grid, AovSet aovs = {});
+
+  const TileGrid& grid() const { return grid_; }
+  AovSet aovs() const { return aovs_; }
+
+  // Folds round `round` of tile `tile`. Rounds must come in order 0, 1, 2, ... per tile; a cut round only as
+  // the last.
+  //   invalid_argument: the partial is not of this tile or round;
+  //   failed_precondition: an earlier round is missing (the message names the next one);
+  //   already_exists: this round, or more of it, has been folded.
+  // On error the film is unchanged. `digest` is unit_digest(partial), if already known.
+  Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
+  Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
+
+  // Resets a tile (a worker sent wrong results): it starts again from round 0.
+  void discard(TileIndex tile) { tiles_[tile] = nullptr; }
+
+  // One tile.
+  RoundIndex full_rounds(TileIndex tile) const;  // complete rounds; also the index of the next round to fold
+  RoundIndex rounds_folded(TileIndex tile) const;  // full_rounds(), plus one if there is a tail
+  std::optional<SampleRange> tail(TileIndex tile) const;
+  std::uint64_t spp(TileIndex tile) const;
+  TileError error(TileIndex tile) const;  // as of the last fold; zeros (and its pixel count) before the first
+  // SHA-256 chain over the unit digests in round order: c = SHA-256(c || unit digest), beginning with 32 zero
+  // bytes.
+  Digest tile_digest(TileIndex tile) const;
+  TilePixels pixels(TileIndex tile) const;
+  TileAovs aov_pixels(TileIndex tile) const;
+  // Half means of A and of B: R, G, B planes, as HalfMeans requires; empty without samples.
+  std::array<std::vector<double>, 2> half_means(TileIndex tile) const;
+
+  // The image.
+  std::uint64_t samples() const;       // over all pixels
+  std::uint64_t memory_bytes() const;  // of the sums and identifiers
+  // Sum over all tiles with samples, in tile order; the error of other tiles is unknown.
+  TileError error() const;
+  std::uint64_t pixels_without_samples() const;
+
+  // One row of tiles as a separate film that shares the tiles, for outputs made band by band.
+  Film row(int row) const;
+
+  // Restart.
+  //
+  // Versioned, with a SHA-256 at the end; the whole film or one tile at a time (no bytes: nothing folded).
+  // Loading rejects damaged or foreign bytes.
+  std::vector<std::byte> save() const;
+  static Result<Film> load(std::span<const std::byte> bytes);
+  std::vector<std::byte> save_tile(TileIndex tile) const;
+  // save_tile() of the current tile, to be called later: it keeps only that tile alive, where a copy of the
+  // film would keep all tiles.
+  std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
+  Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
+
+  bool operator==(const Film& other) const;  // compares grid, AOVs, and the bits of every tile
+
+ private:
+  struct Tail {
+    SampleRange samples;
+    Digest digest;
+    std::vector<float> sums;
+    bool operator==(const Tail&) const = default;
+  };
+  struct Tile {
+    RoundIndex full_rounds = 0;
+    Digest chain;              // over the full rounds
+    std::vector<double> sums;  // of the full rounds: planes as in Partial, without identifiers
+    std::vector<float> ids;    // identifiers of the full rounds
+    std::optional<Tail> tail;
+    TileError error;                 // including the tail
+    std::uint64_t full_spp() const;  // without the tail
+    std::uint64_t spp() const;
+    bool operator==(const Tile&) const = default;
+  };
+  // Sums of the full rounds, with or without the tail; R, G, B planes of A and of B.
+  static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels,
+                                                   bool with_tail = true);
+  static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels,
+                                                  bool with_tail = true);
+  // `before`: the tile before its last round; null if not available.
+  static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect);
+  Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
+  static std::vector<std::byte> tile_bytes(const Tile* tile, TileIndex index);
+  Result<std::shared_ptr<const Tile>> parse_tile(TileIndex tile, std::span<const std::byte> bytes) const;
+
+  // Number of planes of sums (including colour) and of identifiers.
+  struct Planes {
+    std::size_t sums, ids;
+  };
+
+  TileGrid grid_;
+  AovSet aovs_;
+  Planes planes_;
+  std::vector<std::shared_ptr<const Tile>> tiles_;  // null: nothing folded yet
+};
+
+}  // namespace ls

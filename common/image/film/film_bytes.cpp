@@ -1,0 +1,227 @@
+// The film as bytes, for restarts:
+//   film: "LSFILM01", i32 width, height, tile, u32 tiles present, then per tile u32 tile, u64 length, tile
+//         record; SHA-256
+//   tile: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0: none), 32 bytes
+//         tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64 relative.changes, 6 planes of doubles,
+//         with a tail 6 planes of floats; SHA-256 of everything before
+// With AOVs: "LSFILM02", with another u32 after the tile's side, the set of AOVs; the planes of their sums
+// follow the six, then those of identifiers in floats.
+// Little endian. The error figures are recomputed, except those that need the tile before its last round.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "common/image/film/film.h"
+#include "common/image/frame/render_limits.h"
+
+namespace ls {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE03";
+
+class Writer {
+ public:
+  explicit Writer(std::string_view magic) { put(std::as_bytes(std::span(magic))); }
+  void put(std::span<const std::byte> raw) { bytes_.insert(bytes_.end(), raw.begin(), raw.end()); }
+  template <class T>
+  void value(const T& v) {
+    put(std::as_bytes(std::span(&v, 1)));
+  }
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
+  std::vector<std::byte> close() {
+    value(sha256(std::span<const std::byte>(bytes_)).bytes);
+    return std::move(bytes_);
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+tl::unexpected<Error> damaged(std::string_view what) {
+  return fail(Errc::invalid_argument, fmt::format("saved film: {}; render again from the partials", what));
+}
+
+class Reader {
+ public:
+  // Reads between the magic and the checksum, after checking both.
+  static Result<Reader> open(std::span<const std::byte> bytes, std::string_view magic) {
+    if (bytes.size() < magic.size() + 32) return damaged("cut off");
+    if (std::memcmp(bytes.data(), magic.data(), magic.size()) != 0)
+      return damaged(fmt::format("does not begin with {} (another version?)", magic));
+    const auto body = bytes.first(bytes.size() - 32);
+    if (std::memcmp(sha256(body).bytes.data(), bytes.data() + body.size(), 32) != 0)
+      return damaged("its checksum is wrong");
+    return Reader(body.subspan(magic.size()));
+  }
+  std::size_t left() const { return bytes_.size(); }
+  // Returns zeros past the end; callers check ok() or left().
+  template <class T>
+  T value() {
+    T v{};
+    const auto raw = take(sizeof(T));
+    if (!raw.empty()) std::memcpy(&v, raw.data(), sizeof(T));
+    return v;
+  }
+  std::span<const std::byte> take(std::uint64_t n) {
+    if (n > bytes_.size()) {
+      ok_ = false;
+      return {};
+    }
+    const auto head = bytes_.first(static_cast<std::size_t>(n));
+    bytes_ = bytes_.subspan(static_cast<std::size_t>(n));
+    return head;
+  }
+  bool ok() const { return ok_; }
+
+ private:
+  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  std::span<const std::byte> bytes_;
+  bool ok_ = true;
+};
+
+template <class T>
+bool read_finite(Reader& in, std::vector<T>& out, std::size_t count) {
+  const auto raw = in.take(count * sizeof(T));
+  if (raw.empty()) return count == 0;
+  out.resize(count);
+  std::memcpy(out.data(), raw.data(), raw.size());
+  for (const T v : out)
+    if (!std::isfinite(v)) return false;
+  return true;
+}
+
+bool sound(const ChangeSums& sums) {
+  return sums.squares >= 0 && std::isfinite(sums.squares) && sums.products >= 0 &&
+         std::isfinite(sums.products);
+}
+
+}  // namespace
+
+std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
+  if (!tile) return {};
+  Writer out(kTileMagic);
+  out.reserve(256 + tile->sums.size() * sizeof(double) + tile->ids.size() * sizeof(float) +
+              (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0));
+  const Tail tail = tile->tail.value_or(Tail{});
+  out.value(index);
+  out.value(tile->full_rounds);
+  out.value(tile->chain.bytes);
+  out.value(tail.samples.s0);
+  out.value(tail.samples.s1);
+  out.value(tail.digest.bytes);
+  out.value(tile->error.skew);
+  out.value(tile->error.plain.changes);
+  out.value(tile->error.relative.changes);
+  out.put(std::as_bytes(std::span(tile->sums)));
+  out.put(std::as_bytes(std::span(tile->ids)));
+  out.put(std::as_bytes(std::span(tail.sums)));
+  return out.close();
+}
+
+Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
+                                                           std::span<const std::byte> bytes) const {
+  auto opened = Reader::open(bytes, kTileMagic);
+  if (!opened) return tl::unexpected(opened.error());
+  Reader& in = *opened;
+  if (in.value<TileIndex>() != index) return damaged(fmt::format("it is not tile {}", index));
+  auto tile = std::make_shared<Tile>();
+  tile->full_rounds = in.value<RoundIndex>();
+  tile->chain.bytes = in.value<decltype(Digest::bytes)>();
+  Tail tail;
+  tail.samples.s0 = in.value<std::uint64_t>();
+  tail.samples.s1 = in.value<std::uint64_t>();
+  tail.digest.bytes = in.value<decltype(Digest::bytes)>();
+  const auto skew = in.value<double>();
+  const auto plain = in.value<ChangeSums>(), relative = in.value<ChangeSums>();
+  const bool has_tail = tail.samples.s1 != 0;
+  const PixelRect rect = grid_.rect(index);
+  const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
+             ids = pixels * planes_.ids;
+  if (!in.ok() || !std::isfinite(skew) || !sound(plain) || !sound(relative) ||
+      !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
+      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
+    return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
+  const SampleRange full = round_range(tile->full_rounds);
+  if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
+    return damaged(fmt::format("tile {} has an impossible last round", index));
+  if (!has_tail && tile->full_rounds == 0) return damaged(fmt::format("tile {} has no rounds", index));
+  if (has_tail) tile->tail = std::move(tail);
+  tile->error = estimate(*tile, nullptr, rect);
+  tile->error.subtract_skew(skew);
+  tile->error.plain.changes = plain;
+  tile->error.relative.changes = relative;
+  return tile;
+}
+
+std::vector<std::byte> Film::save_tile(TileIndex tile) const { return tile_bytes(tiles_[tile].get(), tile); }
+
+std::function<std::vector<std::byte>()> Film::saver(TileIndex index) const {
+  return [tile = tiles_[index], index] { return tile_bytes(tile.get(), index); };
+}
+
+Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) {
+  if (index >= tiles_.size())
+    return fail(Errc::invalid_argument,
+                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+  if (bytes.empty()) {
+    discard(index);
+    return {};
+  }
+  auto tile = parse_tile(index, bytes);
+  if (!tile) return tl::unexpected(tile.error());
+  tiles_[index] = std::move(*tile);
+  return {};
+}
+
+std::vector<std::byte> Film::save() const {
+  Writer out(aovs_.empty() ? kFilmMagic : kAovFilmMagic);
+  std::uint32_t present = 0;
+  for (const auto& tile : tiles_) present += tile != nullptr;
+  out.reserve(static_cast<std::size_t>(memory_bytes()) + 64 + std::size_t{256} * present);
+  out.value(grid_.frame.width);
+  out.value(grid_.frame.height);
+  out.value(grid_.tile);
+  if (!aovs_.empty()) out.value(aovs_.bits());
+  out.value(present);
+  for (TileIndex i = 0; i < tiles_.size(); ++i) {
+    if (!tiles_[i]) continue;
+    const auto bytes = save_tile(i);
+    out.value(i);
+    out.value(static_cast<std::uint64_t>(bytes.size()));
+    out.put(bytes);
+  }
+  return out.close();
+}
+
+Result<Film> Film::load(std::span<const std::byte> bytes) {
+  const auto magic = std::as_bytes(std::span(kAovFilmMagic));
+  const bool further = bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+  auto opened = Reader::open(bytes, further ? kAovFilmMagic : kFilmMagic);
+  if (!opened) return tl::unexpected(opened.error());
+  Reader& in = *opened;
+  TileGrid grid;
+  grid.frame.width = in.value<int>();
+  grid.frame.height = in.value<int>();
+  grid.tile = in.value<int>();
+  const AovSet aovs(further ? in.value<std::uint32_t>() : 0);
+  const auto present = in.value<std::uint32_t>();
+  for (const int side : {grid.frame.width, grid.frame.height, grid.tile})
+    if (side < 1 || side > kMaxFrameSide) return damaged("its size is impossible");
+  if (present > grid.count()) return damaged("it has more tiles than its frame");
+  Film film(grid, aovs);
+  for (std::uint32_t i = 0; i < present; ++i) {
+    const auto index = in.value<TileIndex>();
+    const auto raw = in.take(in.value<std::uint64_t>());
+    if (raw.empty()) return damaged("cut off in a tile");
+    if (const auto ok = film.load_tile(index, raw); !ok) return tl::unexpected(ok.error());
+  }
+  if (!in.ok() || in.left() != 0) return damaged("more bytes than its tiles need");
+  return film;
+}
+
+}  // namespace ls

@@ -1,0 +1,63 @@
+// A unit's result: per-pixel float32 sums of both halves over one sample range of one tile, with its exact
+// identity.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/image/aov/aov.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
+
+namespace ls {
+
+// Everything that determines a unit's pixels.
+struct UnitHeader {
+  Digest scene;          // of the canonical scene
+  Digest settings;       // of the canonical RenderSettings (common/job/settings.h)
+  Digest numeric_class;  // of the machine that rendered it
+  PixelRect tile;
+  SampleRange samples;
+  bool operator==(const UnitHeader&) const = default;
+};
+
+// {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys sorted, no spaces.
+std::string canonical_json(const UnitHeader& header);
+Result<UnitHeader> parse_unit_header(std::string_view json);
+
+struct Partial {
+  UnitHeader header;
+  // Planar: six planes of tile.pixels() floats each, row by row, then those of planes_of(aovs). Sums, never
+  // averages; the number of samples of each half follows from the range, and AOVs are sums over both halves.
+  // Every value is finite (a non-finite sample is counted and contributes zero).
+  std::vector<float> sums;
+  AovSet aovs;  // as requested in the settings
+  bool operator==(const Partial&) const = default;
+};
+
+// SHA-256 over the header's canonical JSON followed by all planes (little endian); not over file bytes.
+Digest unit_digest(const Partial& partial);
+
+// The partial's EXR format: scanline, uncompressed, FLOAT, dataWindow the tile, displayWindow the frame.
+// Without AOVs it has exactly the six channels; with them also those of planes_of(aovs).
+Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
+
+// Rejects, naming the fault, anything but exactly such a file: other windows, channels, compression, part
+// counts, sizes, non-finite sums, impossible identifiers and counts, trailing data. `expected` must equal the
+// header in the file; `aovs` determines the required channels.
+Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
+                               AovSet aovs = {});
+
+// For `lightshaft merge`: header and AOVs are taken from the file.
+struct PartialFile {
+  Partial partial;
+  FrameSize frame;
+};
+Result<PartialFile> decode_partial_file(std::span<const std::byte> exr);
+
+}  // namespace ls

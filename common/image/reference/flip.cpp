@@ -1,0 +1,178 @@
+#include "common/image/reference/flip.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "common/base/check.h"
+#include "common/image/reference/flip_filters.h"
+
+namespace ls {
+namespace {
+
+using flip::Planes;
+
+// CIE XYZ of the Rec. 709 primaries with D65 white, and that white.
+constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
+                                {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
+                                {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
+constexpr float kToRgb[3][3] = {{3.241003275F, -1.537398934F, -0.498615861F},
+                                {-0.969224334F, 1.875930071F, 0.041554224F},
+                                {0.055639423F, -0.204011202F, 1.057148933F}};
+constexpr float kWhite[3] = {0.950428545F, 1.F, 1.088900371F};
+
+// [LDR] section 4.1: exponents, and the knee of the redistribution of colour errors.
+constexpr float kQc = .7F, kPc = .4F, kPt = .95F, kQf = .5F;
+
+using Triple = std::array<float, 3>;
+
+Triple times(const float (&m)[3][3], const Triple& v) {
+  Triple out{};
+  for (std::size_t i = 0; i < 3; ++i) out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
+  return out;
+}
+
+float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0 too
+
+// Linearised CIELAB, in which contrast sensitivity is defined ([LDR] equation (2)).
+Triple opponent(const Triple& rgb) {
+  Triple n = times(kToXyz, rgb);
+  for (std::size_t i = 0; i < 3; ++i) n[i] /= kWhite[i];
+  return {116 * n[1] - 16, 500 * (n[0] - n[1]), 200 * (n[1] - n[2])};
+}
+
+Triple rgb_of(const Triple& yc) {
+  const float y = (yc[0] + 16) / 116, x = yc[1] / 500 + y, z = y - yc[2] / 200;
+  return times(kToRgb, {x * kWhite[0], y * kWhite[1], z * kWhite[2]});
+}
+
+Triple lab(const Triple& rgb) {
+  constexpr float kDelta = 6.F / 29;
+  Triple f = times(kToXyz, rgb);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float t = f[i] / kWhite[i];
+    f[i] = t > kDelta * kDelta * kDelta ? std::cbrt(t) : t / (3 * kDelta * kDelta) + 4.F / 29;
+  }
+  return {116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])};
+}
+
+// In darker colours differences of hue are less visible (Hunt 1952; [LDR] equation (6)).
+Triple hunt(Triple v) {
+  v[1] *= .01F * v[0];
+  v[2] *= .01F * v[0];
+  return v;
+}
+
+float hyab(const Triple& a, const Triple& b) {  // Abasi, Tehran and Fairchild 2020; [LDR] equation (7)
+  return std::abs(a[0] - b[0]) + std::hypot(a[1] - b[1], a[2] - b[2]);
+}
+
+// [LDR] equations (8), (9): large differences are compressed into the range above kPt.
+float redistributed(float difference, float largest) {
+  const float e = std::pow(difference, kQc), bend = kPc * largest;
+  return e < bend ? kPt / bend * e : kPt + (e - bend) / (largest - bend) * (1 - kPt);
+}
+
+Planes opponents(const FlipImage& image) {
+  Planes out(image.size);
+  for (std::size_t i = 0; i < out.pixels(); ++i) {
+    const float* p = &image.rgb[3 * i];
+    const Triple yc = opponent({shown(p[0]), shown(p[1]), shown(p[2])});
+    for (std::size_t c = 0; c < 3; ++c) out[c][i] = yc[c];
+  }
+  return out;
+}
+
+// The colours as seen at this distance, in adjusted CIELAB.
+Triple seen(const Planes& filtered, std::size_t i) {
+  Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
+  for (float& v : rgb) v = shown(v);
+  return hunt(lab(rgb));
+}
+
+// [HDR] section 3: the fit of Narkowicz 2015 to the ACES curve, including its exposure bias of 0.6.
+constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F, .6F * .59F, .14F};
+
+float tone_mapped(float v) {
+  if (!(v > 0)) return 0;
+  if (!std::isfinite(v)) return 1;
+  // Beyond this, where squares would overflow, the curve has reached its limit, above 1.
+  v = std::min(v, 1e15F);
+  return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
+}
+
+float luminance(const float* rgb) {
+  const auto clean = [](float v) { return v > 0 && std::isfinite(v) ? v : 0.F; };
+  return kToXyz[1][0] * clean(rgb[0]) + kToXyz[1][1] * clean(rgb[1]) + kToXyz[1][2] * clean(rgb[2]);
+}
+
+std::vector<float> exposed(std::span<const float> rgb, float stops) {
+  const float scale = std::exp2(stops);
+  std::vector<float> out(rgb.size());
+  for (std::size_t i = 0; i < rgb.size(); ++i)
+    out[i] = std::isfinite(rgb[i]) ? tone_mapped(rgb[i] * scale) : 0.F;
+  return out;
+}
+
+}  // namespace
+
+std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image, float pixels_per_degree) {
+  const auto pixels =
+      static_cast<std::size_t>(reference.size.width) * static_cast<std::size_t>(reference.size.height);
+  CHECK(reference.size == image.size && reference.rgb.size() == 3 * pixels && image.rgb.size() == 3 * pixels,
+        "{} and {} values for {} pixels", reference.rgb.size(), image.rgb.size(), pixels);
+  const Planes r = opponents(reference), t = opponents(image);
+  const std::vector<float> features = flip::feature_difference(r, t, pixels_per_degree);
+  const Planes rf = flip::contrast_filtered(r, pixels_per_degree),
+               tf = flip::contrast_filtered(t, pixels_per_degree);
+  const float largest = std::pow(hyab(hunt(lab({0, 1, 0})), hunt(lab({0, 0, 1}))), kQc);
+  std::vector<float> out(pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float colour = redistributed(hyab(seen(rf, i), seen(tf, i)), largest);
+    // [LDR] equations (12) to (14).
+    const float feature = std::pow(features[i] * static_cast<float>(1 / std::numbers::sqrt2), kQf);
+    out[i] = std::pow(colour, 1 - feature);
+  }
+  return out;
+}
+
+FlipExposures flip_exposures(std::span<const float> rgb) {
+  std::vector<float> light;
+  for (std::size_t i = 0; i + 2 < rgb.size(); i += 3)
+    if (const float y = luminance(&rgb[i]); y > 0) light.push_back(y);
+  if (light.empty()) return {};
+  const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
+  std::nth_element(light.begin(), middle, light.end());
+  const float median = *middle, most = *std::max_element(light.begin(), light.end());
+  // The larger x at which the curve is 0.85: a quadratic equation.
+  constexpr float kLevel = .85F;
+  const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
+              c = kTone[2] - kLevel * kTone[5];
+  const float x = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
+  FlipExposures out{std::log2(x / most), std::log2(x / median), 2};
+  constexpr int kMost = 64;  // limit of exposures: a range of 64 stops is no sensible image
+  out.count = std::clamp(static_cast<int>(std::ceil(out.last - out.first)), 2, kMost);
+  return out;
+}
+
+std::vector<float> hdr_flip(const FlipImage& reference, const FlipImage& image, float pixels_per_degree) {
+  const FlipExposures exposures = flip_exposures(reference.rgb);
+  std::vector<float> out;
+  for (int i = 0; i < exposures.count; ++i) {
+    const std::vector<float> r = exposed(reference.rgb, exposures.at(i)),
+                             t = exposed(image.rgb, exposures.at(i));
+    const std::vector<float> error = ldr_flip({reference.size, r}, {image.size, t}, pixels_per_degree);
+    if (i == 0) out = error;
+    for (std::size_t p = 0; p < out.size(); ++p) out[p] = std::max(out[p], error[p]);
+  }
+  return out;
+}
+
+double mean_of(std::span<const float> values) {
+  double sum = 0;
+  for (const float v : values) sum += v;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+}  // namespace ls

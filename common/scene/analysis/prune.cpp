@@ -1,0 +1,301 @@
+#include "common/scene/analysis/prune.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "common/base/overloaded.h"
+#include "common/scene/analysis/unreachable.h"
+#include "common/scene/limits.h"
+#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/integrators.h"
+#include "common/scene/schema/validate.h"
+
+namespace ls::scene {
+namespace {
+
+class Pruner {
+ public:
+  Pruner(const Scene& scene, const PrunedFor& whom)
+      : assets_(scene.assets), s_(compacted(scene)), whom_(whom) {}
+
+  Pruned run() {
+    materials();
+    lights();
+    media();
+    phases();
+    invisible();
+    if (s_.sensor.aperture_scale && !(s_.sensor.aperture_radius > 0)) {
+      s_.sensor.aperture_scale.reset();
+      note("shape of the lens", "the camera is a pinhole");
+    }
+    Pruned out{compacted(s_), {}};
+    files(out.scene.assets);
+    out.left_out = std::move(left_out_);
+    return out;
+  }
+
+ private:
+  void note(std::string what, std::string why, std::uint32_t count = 1, std::uint64_t bytes = 0) {
+    if (count > 0) left_out_.push_back({std::move(what), std::move(why), count, bytes});
+  }
+  // The value of a constant texture; null for others.
+  const Rgb* constant(TextureIndex t) const {
+    const auto* c = std::get_if<ConstantTexture>(&s_.textures[t.value]);
+    return c ? &c->value : nullptr;
+  }
+  bool everywhere(TextureIndex t, double value) const {
+    const Rgb* c = constant(t);
+    return c && *c == Rgb{value, value, value};
+  }
+  bool black(TextureIndex t) const { return everywhere(t, 0); }
+  bool zero(VolumeIndex v) const {
+    const auto* c = std::get_if<ConstVolume>(&s_.volumes[v.value]);
+    return c && all_zero(c->value);
+  }
+
+  void media();
+  bool dense(const HomogeneousMedium& m) const { return m.scale != 0 && !all_zero(m.sigma_t); }
+  bool dense(const HeterogeneousMedium& m) const { return m.scale != 0 && !zero(m.sigma_t); }
+  bool does_something(const HomogeneousMedium& m) const { return dense(m) || !all_zero(m.emission); }
+  bool does_something(const HeterogeneousMedium& m) const {
+    return dense(m) || (m.emission && m.emission_scale != 0 && !zero(*m.emission));
+  }
+  bool scatters(const HomogeneousMedium& m) const { return dense(m) && !all_zero(m.albedo); }
+  bool scatters(const HeterogeneousMedium& m) const { return dense(m) && !zero(m.albedo); }
+  std::vector<bool> named_media() const;
+  void drop_dark_sources();
+  std::uint32_t drop_idle_media();
+  std::uint32_t drop_unreachable_media();
+  void phases();
+  void materials();
+  bool simplify(Bsdf& b);
+  void lights();
+  bool has_power(const Emitter& e) const;
+  void invisible();
+  void files(const std::vector<Asset>& after);
+
+  const std::vector<Asset> assets_;  // before pruning
+  Scene s_;
+  const PrunedFor whom_;
+  std::vector<LeftOut> left_out_;
+  std::uint32_t blends_ = 0, masks_ = 0;
+};
+
+// Removes emission of strength 0, so that the grid it multiplies is not needed.
+void Pruner::drop_dark_sources() {
+  std::uint32_t dark = 0;
+  for (Medium& medium : s_.media) {
+    auto* m = std::get_if<HeterogeneousMedium>(&medium);
+    if (!m || !(m->emission || m->source_radiance || m->temperature) || m->emission_scale != 0) continue;
+    m->emission = m->source_radiance = m->temperature = std::nullopt;
+    ++dark;
+  }
+  note("light given off by a medium", "its strength is 0", dark);
+}
+
+std::vector<bool> Pruner::named_media() const {
+  std::vector<bool> named(s_.media.size(), false);
+  const auto name = [&](const std::optional<MediumIndex>& m) {
+    if (m) named[m->value] = true;
+  };
+  name(s_.sensor.medium);
+  for (const Shape& s : s_.shapes) name(s.interior), name(s.exterior);
+  return named;
+}
+
+// Removes media without effect, except those that keep media of lower priority out.
+std::uint32_t Pruner::drop_idle_media() {
+  const std::vector<bool> named = named_media();
+  const auto idle = [&](const Medium& m) {
+    return !whom_.media || !std::visit([&](const auto& x) { return does_something(x); }, m);
+  };
+  const auto priority = [](const Medium& m) {
+    return std::visit([](const auto& x) { return x.priority; }, m);
+  };
+  int lowest = std::numeric_limits<int>::max();
+  for (std::size_t i = 0; i < named.size(); ++i)
+    if (named[i] && !idle(s_.media[i])) lowest = std::min(lowest, priority(s_.media[i]));
+  std::vector<bool> dead(named.size(), false);
+  std::uint32_t count = 0;
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    dead[i] = named[i] && idle(s_.media[i]) && priority(s_.media[i]) <= lowest;
+    count += dead[i];
+  }
+  const auto drop = [&](std::optional<MediumIndex>& m) {
+    if (m && dead[m->value]) m.reset();
+  };
+  drop(s_.sensor.medium);
+  for (Shape& s : s_.shapes) drop(s.interior), drop(s.exterior);
+  return count;
+}
+
+// Removes media that only fill bodies that no light enters.
+std::uint32_t Pruner::drop_unreachable_media() {
+  const std::vector<bool> out_of_reach = unreachable_interiors(s_);
+  std::vector<std::optional<MediumIndex>> set_aside(s_.shapes.size());
+  for (std::size_t i = 0; i < s_.shapes.size(); ++i)
+    if (out_of_reach[i]) set_aside[i] = std::exchange(s_.shapes[i].interior, std::nullopt);
+  const std::vector<bool> named = named_media();
+  std::vector<bool> dropped(named.size(), false);
+  for (std::size_t i = 0; i < set_aside.size(); ++i) {
+    if (!set_aside[i]) continue;
+    if (named[set_aside[i]->value])
+      s_.shapes[i].interior = set_aside[i];
+    else
+      dropped[set_aside[i]->value] = true;
+  }
+  return static_cast<std::uint32_t>(std::count(dropped.begin(), dropped.end(), true));
+}
+
+// Repeats until nothing changes: a removed medium may have been the reason to keep another.
+void Pruner::media() {
+  drop_dark_sources();
+  std::uint32_t dead = 0, hidden = 0;
+  for (bool more = true; more;) {
+    const std::uint32_t idle = drop_idle_media(), unreachable = drop_unreachable_media();
+    dead += idle;
+    hidden += unreachable;
+    more = idle + unreachable > 0;
+  }
+  // Without any medium no surface is a transition.
+  const std::vector<bool> named = named_media();
+  if (std::none_of(named.begin(), named.end(), [](bool n) { return n; }))
+    for (Shape& s : s_.shapes) s.is_medium_transition = false;
+  note("medium", whom_.media ? "it neither takes light nor gives any" : "the integrator `path` sees none",
+       dead);
+  note("medium", "no light gets into what it fills", hidden);
+}
+
+void Pruner::phases() {
+  std::uint32_t unasked = 0;
+  const std::vector<bool> named = named_media();
+  const PhaseIndex isotropic{static_cast<std::uint32_t>(s_.phases.size())};
+  for (std::size_t i = 0; i < named.size(); ++i)
+    std::visit(
+        [&](auto& m) {
+          if (!named[i] || scatters(m) || std::holds_alternative<IsotropicPhase>(s_.phases[m.phase.value]))
+            return;
+          m.phase = isotropic;
+          ++unasked;
+        },
+        s_.media[i]);
+  if (unasked > 0) s_.phases.emplace_back(IsotropicPhase{});
+  note("phase function", "its medium scatters no light", unasked);
+}
+
+// Simplifies by one step; false if it cannot. A branch keeps its own constants, so that the rest scatters as
+// before.
+bool Pruner::simplify(Bsdf& b) {
+  if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
+    const bool first = everywhere(blend->weight, 0);
+    if (!first && !everywhere(blend->weight, 1)) return false;
+    ++blends_;
+    const Bsdf kept = s_.bsdfs[(first ? blend->first : blend->second).value];
+    b = kept;
+    return true;
+  }
+  if (const auto* mask = std::get_if<MaskBsdf>(&b)) {
+    const bool clear = everywhere(mask->opacity, 0);
+    if (!clear && !everywhere(mask->opacity, 1)) return false;
+    ++masks_;
+    const Bsdf kept = clear ? Bsdf(NullBsdf{}) : s_.bsdfs[mask->bsdf.value];
+    b = kept;
+    return true;
+  }
+  return false;
+}
+
+// Each step removes one nesting level, and nesting is bounded.
+void Pruner::materials() {
+  for (Bsdf& b : s_.bsdfs)
+    for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
+    }
+  // A blend in a two-sided material may have contained a two-sided one, whose front is then shown on both
+  // sides.
+  for (Bsdf& b : s_.bsdfs)
+    if (auto* two = std::get_if<TwoSidedBsdf>(&b))
+      for (BsdfIndex* side : {&two->front, &two->back})
+        for (int step = 0; step < kMaxBsdfNesting; ++step)
+          if (const auto* inner = std::get_if<TwoSidedBsdf>(&s_.bsdfs[side->value])) *side = inner->front;
+  note("branch of a blend", "its weight is 0", blends_);
+  note("mask", "its opacity is 0 or 1 everywhere", masks_);
+}
+
+bool Pruner::has_power(const Emitter& emitter) const {
+  return std::visit(
+      overloaded{
+          [](const ConstantEmitter& e) { return !all_zero(e.radiance); },
+          [](const DirectionalEmitter& e) { return !all_zero(e.irradiance); },
+          [](const PointEmitter& e) { return !all_zero(e.intensity); },
+          [&](const SpotEmitter& e) { return !all_zero(e.intensity) && !(e.texture && black(*e.texture)); },
+          [](const EnvmapEmitter& e) { return e.scale != 0; },
+          [&](const ProjectorEmitter& e) { return e.scale != 0 && !black(e.irradiance); }},
+      emitter);
+}
+
+void Pruner::lights() {
+  std::uint32_t dark = 0;
+  for (Shape& s : s_.shapes) {
+    if (!s.emitter || !black(s.emitter->radiance)) continue;
+    s.emitter.reset();
+    ++dark;
+  }
+  dark +=
+      static_cast<std::uint32_t>(std::erase_if(s_.emitters, [&](const Emitter& e) { return !has_power(e); }));
+  note("light", "it is black", dark);
+}
+
+// Erases the elements for which `gone` is true, with their labels if any. Returns their number.
+template <class T, class Gone>
+std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, const Gone& gone) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (gone(all[i])) continue;
+    if (kept != i) {
+      all[kept] = std::move(all[i]);
+      if (!labels.empty()) labels[kept] = std::move(labels[i]);
+    }
+    ++kept;
+  }
+  const auto erased = static_cast<std::uint32_t>(all.size() - kept);
+  all.resize(kept);
+  if (!labels.empty()) labels.resize(kept);
+  return erased;
+}
+
+// Removes null surfaces that neither separate media nor emit. A group left without shapes is removed, with
+// its instances.
+void Pruner::invisible() {
+  const auto unseen = [&](const Shape& s) {
+    return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&
+           !s.is_medium_transition && !s.emitter;
+  };
+  note("surface", "light passes it unchanged, and there is no medium on either side",
+       erase_labelled(s_.shapes, s_.shape_labels, unseen));
+  std::vector<bool> seen(s_.groups.size(), false);
+  for (const Shape& s : s_.shapes)
+    if (s.group) seen[s.group->value] = true;
+  note("instance", "nothing of its group can be seen",
+       erase_labelled(s_.instances, s_.instance_labels,
+                      [&](const Instance& i) { return !seen[i.group.value]; }));
+}
+
+void Pruner::files(const std::vector<Asset>& after) {
+  for (const Asset& a : assets_)
+    if (std::none_of(after.begin(), after.end(), [&](const Asset& b) { return a.digest == b.digest; }))
+      note(a.name, "nothing that is needed names it", 1, a.bytes);
+}
+
+}  // namespace
+
+PrunedFor pruned_for(std::string_view integrator, int max_depth) {
+  const bool media = sees_media(integrator);
+  return {media, !media && max_depth >= 0};
+}
+
+Pruned pruned(const Scene& scene, const PrunedFor& whom) { return Pruner(scene, whom).run(); }
+
+}  // namespace ls::scene

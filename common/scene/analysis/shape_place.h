@@ -1,0 +1,26 @@
+// Bounding boxes of shapes from the scene description alone; not for meshes, whose files would have to be
+// read.
+#pragma once
+
+#include <optional>
+
+#include "common/scene/scene.h"
+
+namespace ls::scene {
+
+struct Box {  // parallel to the scene's axes
+  Vec3 lo, hi;
+  bool operator==(const Box&) const = default;
+};
+Vec3 corner(const Box& b, int k);  // 0 to 7
+Box grown(Box b, double by);       // to all sides
+bool touch(const Box& a, const Box& b);
+double largest_coordinate(const Box& b);
+
+// A box that encloses the shape, seldom the smallest. For shapes in a group, in the group's space.
+std::optional<Box> box_of(const Shape& shape);
+
+// True if the point is inside a sphere or cube, whose to_world must be invertible; false for other shapes.
+bool holds(const Shape& shape, const Vec3& p);
+
+}  // namespace ls::scene

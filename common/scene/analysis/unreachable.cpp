@@ -1,0 +1,149 @@
+#include "common/scene/analysis/unreachable.h"
+
+#include <algorithm>
+
+#include "common/base/overloaded.h"
+#include "common/scene/analysis/shape_place.h"
+#include "common/scene/limits.h"
+#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+namespace {
+
+// Distance, relative to the largest coordinate, at which rays offset from one object cannot get into another:
+// 16 times the renderer's offset.
+constexpr double kApart = 0x1p-16;
+Box with_margin(const Box& b, const Box& beside) {
+  return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
+}
+
+Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
+Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
+
+bool emits(const Medium& medium) {
+  return std::visit(overloaded{[](const HomogeneousMedium& m) {
+                                 return m.emission != Rgb{0, 0, 0} || m.source_radiance != Rgb{0, 0, 0};
+                               },
+                               [](const HeterogeneousMedium& m) {
+                                 return m.emission || m.source_radiance || m.temperature;
+                               }},
+                    medium);
+}
+
+// True if the camera and all of its near plane, where rays begin, are outside the box.
+bool camera_is_outside(const Sensor& s, const Box& tight) {
+  const Vec3 camera = place_of(s.to_world);
+  const Box box = with_margin(tight, {camera, camera});
+  if (touch(box, {camera, camera})) return false;
+  if (s.projection == Projection::spherical) return true;
+  const Vec3 normal = cross(column(s.to_world, 0), column(s.to_world, 1));
+  const double unit = dot(normal, column(s.to_world, 2));
+  bool before = true, behind = true;
+  for (int k = 0; k < 8; ++k) {
+    const Vec3 p = corner(box, k);
+    const double depth = dot(normal, {p[0] - camera[0], p[1] - camera[1], p[2] - camera[2]}) / unit;
+    before = before && depth < 0;
+    behind = behind && depth > s.near_clip * (1 + kApart);
+  }
+  return before || behind;
+}
+
+std::optional<Vec3> place_of(const Emitter& e) {
+  return std::visit(
+      []<class T>(const T& light) -> std::optional<Vec3> {
+        if constexpr (requires { light.position; }) return light.position;
+        if constexpr (std::is_same_v<T, SpotEmitter> || std::is_same_v<T, ProjectorEmitter>)
+          return place_of(light.to_world);
+        return std::nullopt;
+      },
+      e);
+}
+
+class Search {
+ public:
+  Search(const Scene& scene, const std::vector<BsdfTraits>& traits) : s_(scene), traits_(traits) {
+    for (std::size_t i = 0; i < s_.shapes.size(); ++i)
+      if (is_entrance(s_.shapes[i])) entrances_.push_back({i, place_in_scene(s_.shapes[i])});
+  }
+
+  bool unreachable(std::size_t i) {
+    const Shape& s = s_.shapes[i];
+    if (!s.interior || s.group || !has_interior_behind(s)) return false;
+    const auto box = box_of(s);
+    const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
+    return clear && (traits_[s.bsdf.value].black_behind || (box && sealed(s, i, *box)));
+  }
+
+ private:
+  struct Entrance {
+    std::size_t shape;
+    std::optional<Box> box;  // nullopt: may be anywhere
+  };
+  static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
+
+  // True if light may enter through the shape or come from it. Surfaces without any effect are removed later
+  // (prune.cpp).
+  bool is_entrance(const Shape& s) const {
+    const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(s_.media[m->value]); };
+    if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;
+    const bool nothing = std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition;
+    return traits_[s.bsdf.value].transmits && !nothing;
+  }
+
+  // False if the shape is mirrored, or if normals in a mesh's file may swap its sides
+  // (worker/render/geometry/geometry_build.cpp).
+  static bool has_interior_behind(const Shape& s) {
+    const auto* mesh = std::get_if<MeshShape>(&s.geometry);
+    return invertible(s.to_world) && determinant3(s.to_world) > 0 && (!mesh || mesh->face_normals);
+  }
+
+  // True if the shape is closed, with the interior inside, and no light can be there.
+  bool sealed(const Shape& s, std::size_t i, const Box& box) {
+    const bool closed =
+        std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
+    if (!closed || s.flip_normals || s.emitter || traits_[s.bsdf.value].transmits ||
+        emits(s_.media[s.interior->value]))
+      return false;
+    const auto lit = [&](const Emitter& e) {
+      const auto p = place_of(e);
+      return p && touch(with_margin(box, {*p, *p}), {*p, *p});
+    };
+    if (std::any_of(s_.emitters.begin(), s_.emitters.end(), lit)) return false;
+    if ((compared_ += entrances_.size()) > kMaxEntrances) return false;
+    return std::all_of(entrances_.begin(), entrances_.end(),
+                       [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
+  }
+
+  // True if the entrance is beside the shape, or surrounds it.
+  bool apart(const Box& tight, const Entrance& e) const {
+    const Box box = with_margin(tight, *e.box);
+    if (!touch(box, *e.box)) return true;
+    const Shape& s = s_.shapes[e.shape];
+    if (!invertible(s.to_world)) return false;
+    for (int k = 0; k < 8; ++k)
+      if (!holds(s, corner(box, k))) return false;
+    return true;
+  }
+
+  const Scene& s_;
+  const std::vector<BsdfTraits>& traits_;
+  std::vector<Entrance> entrances_;
+  std::uint64_t compared_ = 0;
+};
+
+}  // namespace
+
+std::vector<bool> unreachable_interiors(const Scene& scene) {
+  std::vector<bool> out(scene.shapes.size(), false);
+  const auto traits = bsdf_traits(scene);
+  const bool any = std::any_of(scene.shapes.begin(), scene.shapes.end(), [&](const Shape& s) {
+    return s.interior && traits && !(*traits)[s.bsdf.value].transmits;
+  });
+  if (!any) return out;
+  Search search(scene, *traits);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = search.unreachable(i);
+  return out;
+}
+
+}  // namespace ls::scene

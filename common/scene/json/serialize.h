@@ -1,0 +1,19 @@
+// Canonical form of a Scene: JSON with sorted keys, every field written, doubles in the shortest form that
+// reads back to the same bits. Its SHA-256 is the scene's digest; it is sent to workers.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/scene/scene.h"
+
+namespace ls {
+
+std::string serialize(const Scene& scene);
+Result<Scene> deserialize_scene(
+    std::string_view json);  // untrusted input: bounds, indices and ranges are checked
+Digest digest_of(const Scene& scene);
+
+}  // namespace ls

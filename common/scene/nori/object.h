@@ -1,0 +1,81 @@
+// One object of a Nori file during translation to Mitsuba: its parameters are taken by name and checked
+// against the table of parameters; those left over are reported.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/schema/nori_words.h"
+#include "common/scene/xml/document.h"
+#include "common/scene/xml/error_report.h"
+
+namespace ls::scene::nori {
+
+enum class Kind { object, property, transform, step, unknown };
+Kind object_kind(const Element& e);
+// Checks elements, their attributes and nesting; false if errors were reported.
+bool check_objects(const Element& root, Report& report);
+
+// Reports an unknown type, with a suggestion, or an unsupported one, and returns nullptr.
+const Plugin* known_plugin(const Element& e, Report& report);
+
+class Object {
+ public:
+  Object(const Element& e, const Plugin& plugin, Report& report);
+
+  const Element& element() const { return e_; }
+  std::string title() const;  // bsdf "microfacet"
+  std::string_view type() const { return plugin_.type; }
+  bool has(std::string_view parameter) const;
+
+  // The element that sets the parameter; nullptr if there is none, or it was wrong (and reported).
+  const Element* take(std::string_view parameter);
+  double number(std::string_view parameter, double fallback);
+  Rgb color(std::string_view parameter, const Rgb& fallback);
+  Vec3 triple(std::string_view parameter, const Vec3& fallback);
+  std::string_view text(std::string_view parameter, std::string_view fallback);
+  void missing(std::string_view parameter);
+  // Reports an error and returns true if both are given.
+  bool both(std::string_view one, std::string_view other);
+
+  // Nested objects with this tag that are not the value of a parameter.
+  std::vector<const Element*> nested(std::string_view tag);
+  const Element* only(std::string_view tag);  // reports a second one
+  void finish();
+  // For an unsupported object: reports only unknown parameters.
+  void finish_refused();
+
+ private:
+  struct Child {
+    const Element* e;
+    bool taken = false;
+  };
+  bool fits(const Parameter& p, const Element& e);
+  bool in_range(const Parameter& p, const Element& e, const std::vector<double>& values);
+  bool knows(std::string_view parameter) const;
+  void left_over(const Child& c);
+
+  const Element& e_;
+  const Plugin& plugin_;
+  Report& report_;
+  std::vector<Child> children_;
+};
+
+// Elements in Mitsuba's dialect. A new element gets the place of the Nori element it is made from.
+Element made(std::string tag, std::string_view type, const Span& at);
+void set(Element& e, std::string attribute, std::string value, const Span& at);
+void add(Element& parent, Element child);
+// Adds a property; numbers in the shortest form that reads back to the same bits.
+void add(Element& parent, std::string tag, std::string name, std::string value, const Span& at);
+void add(Element& parent, std::string name, double value, const Span& at);
+void add(Element& parent, std::string name, const Rgb& value, const Span& at);
+// Adds the same property under another name.
+void add_as(Element& parent, const Element* property, std::string name);
+// Adds a <transform> with these steps before its own; none if there are no steps at all.
+void add_transform(Element& parent, const Element* transform, std::string name,
+                   std::vector<Element> before = {});
+Element matrix_step(const std::array<double, 16>& m, const Span& at);
+
+}  // namespace ls::scene::nori

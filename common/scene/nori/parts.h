@@ -1,0 +1,38 @@
+// Translates the kinds of Nori's objects to Mitsuba. Each function returns nullopt if the object cannot be
+// translated, which has been reported.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/scene/nori/object.h"
+
+namespace ls::scene::nori {
+
+// Properties of a mesh on which its nested objects may depend.
+struct Mesh {
+  bool sphere = false;
+  std::optional<Vec3> low, high;  // its bounding box, if known without reading files
+};
+
+std::optional<Element> bsdf(const Element& e, const Mesh& mesh, Report& report);
+// A property or object `name` of a bsdf, from a colour or a <texture>.
+std::optional<Element> texture(const Element& given, std::string name, const Mesh& mesh, Report& report);
+
+std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report);
+
+// An emitter of the scene, or of a mesh.
+std::optional<Element> emitter(const Element& e, Report& report);
+std::optional<Element> mesh_emitter(const Element& e, Report& report);
+
+// <sensor> with film and sampler; `sampler` may be nullptr.
+std::optional<Element> camera(const Element& e, const Element* sampler, Report& report);
+
+struct Integrator {
+  Element element;
+  bool inmedium = false;  // Kombu: the camera is inside the medium of the mesh around it
+};
+std::optional<Integrator> integrator(const Element& e, Report& report);
+
+}  // namespace ls::scene::nori

@@ -1,0 +1,31 @@
+// Checks of media and camera after everything has been read.
+#include <fmt/format.h>
+
+#include "common/scene/analysis/shape_place.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+
+// As in Mitsuba, only the sensor's `medium` says which medium the camera is in.
+void Reader::warn_of_media_around_camera() {
+  if (!sensor_ || scene_.sensor.medium || report_.has_errors()) return;
+  const auto& m = scene_.sensor.to_world.m;
+  const Vec3 camera{m[3], m[7], m[11]};
+  for (std::size_t i = 0; i < scene_.shapes.size() && i < shape_elements_.size(); ++i) {
+    const Shape& s = scene_.shapes[i];
+    if (!s.interior || s.group || !invertible(s.to_world) || !holds(s, camera)) continue;
+    std::string id = "...";
+    for (const auto& [element, index] : media_)
+      if (index == s.interior && element->find("id")) id = element->get("id");
+    return report_.warning(
+        sensor_->at,
+        fmt::format(
+            "the camera is inside of a {} that holds a medium ({}), but its sensor names none, so that "
+            "it sees none up to the first boundary, as in Mitsuba: add <ref name=\"medium\" "
+            "id=\"{}\"/> to the sensor",
+            shape_elements_[i]->get("type"), report_.refer_to(shape_elements_[i]->at, sensor_->at), id));
+  }
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,229 @@
+// Sensor, film, filter, sampler and integrator.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/base/suggest.h"
+#include "common/scene/reader/plugin_error.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/reader/unsupported.h"
+#include "common/scene/schema/integrators.h"
+#include "common/scene/xml/transform_element.h"
+#include "common/scene/xml/values.h"
+
+namespace ls::scene {
+
+void Reader::read_sensor(const Element& e) {
+  if (!is_supported_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
+  if (sensor_)
+    return report_.warning(
+        e.at, fmt::format("a second sensor; the first ({}) is used", report_.refer_to(sensor_->at, e.at)));
+  sensor_ = &e;
+  Params p(*this, e);
+  Sensor& s = scene_.sensor;
+  read_projection(e, p, s);
+  read_sensor_medium(p, s);
+  const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
+  if (films.size() > 1) report_.error(films[1].use->at, "this sensor has a second film");
+  if (samplers.size() > 1) report_.error(samplers[1].use->at, "this sensor has a second sampler");
+  if (!films.empty()) read_film(*films[0].object);
+  if (!samplers.empty()) read_sampler(*samplers[0].object);
+  p.finish();
+}
+
+// Parameters specific to each camera plugin.
+void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
+  Binder binder(p);
+  if (e.get("type") == "spherical") {
+    s.projection = Projection::spherical;
+    if (const auto to_world = p.take_transform("to_world")) s.to_world = *to_world;
+  } else if (e.get("type") == "orthographic") {
+    s.projection = Projection::orthographic;
+    describe_clips(binder, s);
+  } else {
+    const bool has_focus = p.has("focus_distance"), has_aperture = p.has("aperture_radius");
+    read_fov(p, s);
+    describe_perspective(binder, s);
+    if (e.get("type") == "thinlens") {
+      describe_lens(binder, s);
+      if (s.aperture_scale) refuse_attributes(e, *s.aperture_scale, "aperture_scale");
+      if (!has_aperture) report_.error(e.at, "sensor \"thinlens\" needs 'aperture_radius'");
+      if (!has_focus) s.focus_distance = s.far_clip;
+    }
+  }
+  if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
+  if (s.projection == Projection::orthographic) {
+    if (!invertible(s.to_world))
+      report_.error(e.at,
+                    "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
+  } else if (!is_rigid(s.to_world)) {
+    report_.error(
+        e.at,
+        "to_world of a sensor may only move, turn and mirror: this one scales or shears, which Mitsuba 3 "
+        "refuses, too; leave its <scale> out");
+  }
+}
+
+// The name is "medium" or absent; any other name is an error, as only shapes have interior and exterior.
+void Reader::read_sensor_medium(Params& p, Sensor& s) {
+  const Element* use = p.take("medium");
+  if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);
+  for (const auto& nameless : p.take_nested("medium", Params::Names::none)) {
+    if (use) return report_.error(nameless.use->at, "this sensor has a second medium");
+    use = nameless.use;
+    s.medium = medium(*nameless.object, *use);
+  }
+}
+
+// Without `fov` the angle is that of a focal length on 35 mm film, over the diagonal of 36 mm x 24 mm.
+void Reader::read_fov(Params& p, Sensor& s) {
+  const bool has_fov = p.has("fov");
+  const Element* given = p.take("focal_length");
+  if (has_fov && given)
+    return report_.error(given->at, fmt::format("{} gives both fov and focal_length", p.title()));
+  if (has_fov) return;
+  double length = 50;
+  if (given) {
+    std::string_view text = given->get("value");
+    if (text.ends_with("mm")) text.remove_suffix(2);
+    const auto number = given->tag == "string" ? parse_number(text) : std::nullopt;
+    if (!number || *number <= 0)
+      return report_.error(value_place(*given, "value"), "'focal_length' wants a <string> such as \"50mm\"");
+    length = *number;
+  }
+  s.fov = 2 * std::atan(std::sqrt(36.0 * 36 + 24.0 * 24) / (2 * length)) * (180 / std::numbers::pi);
+  s.fov_axis = FovAxis::diagonal;
+  // As in Mitsuba.
+  if (const Element* axis = p.take("fov_axis"))
+    report_.warning(
+        value_place(*axis, "name"),
+        fmt::format("'fov_axis' of {} has no effect here: it says what fov measures, and there is no "
+                    "fov",
+                    p.title()));
+}
+
+void Reader::read_film(const Element& e) {
+  used_parts_.insert(&e);
+  if (!is_supported_plugin("film", e.get("type"))) return unknown_plugin(e, report_);
+  Params p(*this, e);
+  FilmSettings& film = scene_.film;
+  if (e.get("type") == "mfilm") film = {{1, 1}, BoxFilter{}};  // the default in Mitsuba 0.x
+  if (e.get("type") != "hdrfilm")
+    report_.warning(value_place(e, "type"),
+                    fmt::format("{} gives the size of the frame and its filter: what is written are linear "
+                                "colours, as of \"hdrfilm\"",
+                                p.title()));
+  const bool has_width = p.has("crop_width"), has_height = p.has("crop_height");
+  bind(p, film);
+  check_crop(e, p, has_width, has_height);
+  if (std::int64_t{film.size.width} * film.size.height > kMaxFramePixels)
+    report_.error(e.at, fmt::format("a frame of {} x {} is larger than {} pixels", film.size.width,
+                                    film.size.height, kMaxFramePixels));
+  const auto filters = p.take_nested("rfilter");
+  if (filters.size() > 1) report_.error(filters[1].use->at, "this film has a second filter");
+  if (!filters.empty()) film.filter = read_filter(*filters[0].object);
+  p.finish();
+}
+
+// A missing side is the frame's. A crop of the whole frame is stored as no crop, so that both scenes are
+// equal.
+void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_height) {
+  FilmSettings& f = scene_.film;
+  if (!has_width) f.crop_size.width = f.size.width;
+  if (!has_height) f.crop_size.height = f.size.height;
+  const auto outside = [](int offset, int width, int whole) {
+    return width < 1 || offset > whole || width > whole - offset;
+  };
+  if (outside(f.crop_offset[0], f.crop_size.width, f.size.width) ||
+      outside(f.crop_offset[1], f.crop_size.height, f.size.height))
+    report_.error(e.at,
+                  fmt::format("the crop of {} at ({}, {}) with {} x {} pixels is not within its frame of "
+                              "{} x {}: give crop_width and crop_height so that it is",
+                              p.title(), f.crop_offset[0], f.crop_offset[1], f.crop_size.width,
+                              f.crop_size.height, f.size.width, f.size.height));
+  if (f.crop_size == f.size) f.crop_size = {0, 0};
+}
+
+template <class T>
+ReconstructionFilter Reader::read_plain_filter(const Element& e) {
+  Params p(*this, e);
+  T filter;
+  bind(p, filter);
+  p.finish();
+  return filter;
+}
+
+ReconstructionFilter Reader::read_filter(const Element& e) {
+  used_parts_.insert(&e);
+  const std::string_view type = e.get("type");
+  if (type == "box") return read_plain_filter<BoxFilter>(e);
+  if (type == "tent") return read_plain_filter<TentFilter>(e);
+  if (type == "gaussian") return read_plain_filter<GaussianFilter>(e);
+  if (is_unsupported_plugin("rfilter", type))
+    report_.error(value_place(e, "type"),
+                  fmt::format("the filter \"{}\" has negative lobes, which samples that each belong to one "
+                              "pixel can't follow; use box, tent or gaussian",
+                              type));
+  else
+    unknown_plugin(e, report_);
+  return GaussianFilter{};
+}
+
+// The sampler is this program's own; only the number of samples is taken from the scene.
+void Reader::read_sampler(const Element& e) {
+  used_parts_.insert(&e);
+  if (!is_supported_plugin("sampler", e.get("type"))) return unknown_plugin(e, report_);
+  Params p(*this, e);
+  if (e.get("type") != "independent")
+    report_.warning(
+        value_place(e, "type"),
+        fmt::format("of {} only the number of samples is used: which they are is this program's own matter",
+                    p.title()));
+  if (const Element* count = p.take("sample_count"))
+    p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSpp}}, *count, scene_.sample_count);
+  p.finish();
+}
+
+void Reader::read_integrator(const Element& e, int depth) {
+  if (depth == 0 && integrator_)
+    return report_.error(e.at, fmt::format("a second integrator; the first is in {}",
+                                           report_.refer_to(integrator_->at, e.at)));
+  if (depth == 0) integrator_ = &e;
+  if (depth > 4) return report_.error(e.at, "integrators are nested too deep, or contain themselves");
+  const std::string_view type = e.get("type");
+  Params p(*this, e);
+  if (const WrapperRow* wrapper = wrapper_row(type)) {
+    read_channels(p);
+    const auto inner = p.take_nested("integrator");
+    if (inner.size() != 1)
+      report_.error(e.at, fmt::format("{} needs one nested integrator, not {}", p.title(), inner.size()));
+    if (type != "aov" || scene_.aovs.empty())
+      report_.warning(value_place(e, "type"),
+                      fmt::format("only the integrator within {} is used: {}", p.title(), wrapper->lost));
+    if (!inner.empty()) read_integrator(*inner[0].object, depth + 1);
+    return p.finish();
+  }
+  IntegratorSettings& i = scene_.integrator;
+  const IntegratorRow* row = integrator_row(type);
+  if (!row) return unknown_plugin(e, report_);
+  if (row->other_method)
+    report_.warning(value_place(e, "type"), fmt::format("{} is read as \"{}\", which gives the same picture "
+                                                        "by other means",
+                                                        p.title(), row->ours));
+  i.name = row->ours;
+  if (i.name != kDistantMis) refuse_distances(p);
+  bind(p, i);
+  if (row->max_depth) i.max_depth = *row->max_depth;
+  p.finish();
+}
+
+// Rejects parameters of `volpath_distant_mis` for other integrators.
+void Reader::refuse_distances(Params& p) {
+  for (const std::string_view name : {"distance", "heuristic"})
+    if (const Element* e = p.take(name))
+      report_.error(e->at, fmt::format("'{}' is a parameter of the integrator \"{}\" alone, not of {}", name,
+                                       kDistantMis, p.title()));
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,104 @@
+// Emitters without a shape.
+#include <fmt/format.h>
+
+#include "common/scene/reader/plugin_error.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+
+void Reader::read_emitter(const Element& e) {
+  const std::string_view type = e.get("type");
+  if (type == "directional") return read_directional(e);
+  if (type == "point") return read_point(e);
+  if (type == "spot") return read_spot(e);
+  if (type == "envmap") return read_envmap(e);
+  if (type == "projector") return read_projector(e);
+  if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
+  if (type != "constant") return unknown_plugin(e, report_);
+  Params p(*this, e);
+  ConstantEmitter emitter;
+  bind(p, emitter);
+  p.finish();
+  check_only_environment(e);
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::check_only_environment(const Element& e) {
+  for (const Emitter& other : scene_.emitters)
+    if (std::holds_alternative<ConstantEmitter>(other) || std::holds_alternative<EnvmapEmitter>(other))
+      report_.error(e.at, "a second environment: a scene has one emitter \"constant\" or \"envmap\" at most");
+}
+
+void Reader::read_envmap(const Element& e) {
+  Params p(*this, e);
+  EnvmapEmitter emitter;
+  bind(p, emitter);
+  p.finish();
+  check_only_environment(e);
+  if (!invertible(emitter.to_world) || !is_similarity(emitter.to_world))
+    report_.error(e.at, "to_world of an environment map may turn and mirror it, not stretch or flatten it");
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_directional(const Element& e) {
+  Params p(*this, e);
+  DirectionalEmitter emitter;
+  if (p.has("direction") && p.has("to_world"))
+    report_.error(e.at, "emitter \"directional\" gives both direction and to_world");
+  bind(p, emitter);
+  if (const auto t = p.take_transform("to_world")) emitter.direction = transform_vector(*t, {0, 0, 1});
+  p.finish();
+  if (emitter.direction == Vec3{0, 0, 0}) report_.error(e.at, "the direction of this light is zero");
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_point(const Element& e) {
+  Params p(*this, e);
+  PointEmitter emitter;
+  if (p.has("position") && p.has("to_world"))
+    report_.error(e.at, "emitter \"point\" gives both position and to_world");
+  bind(p, emitter);
+  if (const auto t = p.take_transform("to_world")) emitter.position = transform_point(*t, {0, 0, 0});
+  p.finish();
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_projector(const Element& e) {
+  Params p(*this, e);
+  ProjectorEmitter emitter;
+  Sensor lens;  // a projector has the field-of-view parameters of a camera
+  read_fov(p, lens);
+  emitter.fov = lens.fov;
+  emitter.fov_axis = lens.fov_axis;
+  if (!p.has("irradiance")) report_.error(e.at, "emitter \"projector\" needs 'irradiance': what it projects");
+  bind(p, emitter);
+  refuse_attributes(e, emitter.irradiance, "irradiance");
+  p.finish();
+  if (!is_rigid(emitter.to_world))
+    report_.error(e.at,
+                  "to_world of a projector may only move, turn and mirror: this one scales or shears; leave "
+                  "its <scale> out and give `scale` for brightness and `fov` for the image's size");
+  scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_spot(const Element& e) {
+  Params p(*this, e);
+  SpotEmitter emitter;
+  const bool has_beam = p.has("beam_width");
+  bind(p, emitter);
+  if (!has_beam) emitter.beam_width = emitter.cutoff_angle * 3 / 4;
+  p.finish();
+  if (emitter.beam_width > emitter.cutoff_angle)
+    report_.error(e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", emitter.beam_width,
+                                    emitter.cutoff_angle));
+  if (emitter.texture) refuse_attributes(e, *emitter.texture, "texture");
+  if (emitter.texture && std::holds_alternative<ConstantTexture>(scene_.textures[emitter.texture->value]))
+    report_.error(e.at,
+                  "'texture' of emitter \"spot\" wants an image; a single colour belongs into 'intensity'");
+  if (!invertible(emitter.to_world))
+    report_.error(e.at, "to_world flattens this light or leaves the range of numbers: it can't be inverted");
+  scene_.emitters.emplace_back(emitter);
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,100 @@
+// Names of shapes and materials (for Cryptomatte), and requested AOVs.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "common/base/suggest.h"
+#include "common/scene/reader/aov_names.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+namespace {
+
+constexpr std::size_t kMaxLabelBytes = 256;  // longer names are truncated
+
+// "meshes/Tub.obj" -> "Tub"
+std::string stem(std::string_view file) {
+  if (const auto slash = file.find_last_of("/\\"); slash != std::string_view::npos)
+    file.remove_prefix(slash + 1);
+  return std::string(file.substr(0, file.rfind('.')));
+}
+
+std::string given_name(const Element& e) {
+  if (const auto id = e.get("id"); !id.empty()) return std::string(id.substr(0, kMaxLabelBytes));
+  for (const Element& child : e.children)
+    if (child.tag == "string" && child.get("name") == "filename")
+      return stem(child.get("value")).substr(0, kMaxLabelBytes);
+  return {};
+}
+
+// A material without an id may be a wrapper (twosided, bumpmap) of one that has it.
+std::string material_name(const Element& e, std::size_t index) {
+  if (const auto id = e.get("id"); !id.empty()) return std::string(id.substr(0, kMaxLabelBytes));
+  for (const Element& child : e.children)
+    if (child.tag == "bsdf" && !child.get("id").empty())
+      return std::string(child.get("id").substr(0, kMaxLabelBytes));
+  return fmt::format("{}_{}", e.get("type"), index);
+}
+
+std::string no_channel(std::string_view name, const ChannelRow* row) {
+  std::vector<std::string> known;
+  for (const ChannelRow& r : channels())
+    if (r.mitsuba && !r.ours.empty()) known.emplace_back(r.theirs);
+  if (!row) return fmt::format("there is no channel \"{}\"{}", name, suggestion(name, known));
+  return fmt::format("the channel \"{}\" can't be written by this version; there are {}{}", name,
+                     fmt::join(known, ", "),
+                     name == "shape_index" ? "; --aov shape_id writes mattes of the shapes by name" : "");
+}
+
+}  // namespace
+
+// Makes a name unique by its index in the list.
+std::string Reader::fresh_label(std::string name, std::string_view type, std::size_t index) {
+  if (name.empty()) name = fmt::format("{}_{}", type, index);
+  if (!labels_.insert(name).second) labels_.insert(name = fmt::format("{}_{}", name, index));
+  return name;
+}
+
+void Reader::label_shape(const Element& e) {
+  if (!document_.labels) return;
+  const std::size_t index = scene_.shape_labels.size();
+  Label label{fresh_label(given_name(e), e.get("type"), index), {}};
+  label.material = material_ ? material_name(*material_, scene_.shapes.back().bsdf.value) : "default";
+  scene_.shape_labels.push_back(std::move(label));
+}
+
+void Reader::label_instance(const Element& e) {
+  if (!document_.labels) return;
+  scene_.instance_labels.push_back(
+      {fresh_label(given_name(e), e.get("type"), scene_.instance_labels.size()), {}});
+}
+
+// The wrapper's list "label:channel, ...": the AOVs that the scene requests.
+void Reader::read_channels(Params& p) {
+  const Element* channels = p.take("aovs");
+  if (!channels) return;
+  const Span at = value_place(*channels, "value");
+  std::vector<std::string> renamed;
+  std::string_view rest = channels->get("value");
+  while (!rest.empty()) {
+    const auto end = std::min(rest.find_first_of(", \t\r\n"), rest.size());
+    const std::string_view item = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (item.empty()) continue;
+    const auto colon = item.find(':');
+    if (colon == std::string_view::npos || colon == 0)
+      return report_.error(at, fmt::format("\"{}\" of 'aovs' is not written as label:channel", item));
+    const std::string_view name = item.substr(colon + 1), label = item.substr(0, colon);
+    const ChannelRow* row = channel_row(name);
+    if (!row || row->ours.empty()) return report_.error(at, no_channel(name, row));
+    const std::string_view ours = row->ours;
+    if (label != ours) renamed.push_back(fmt::format("\"{}\" is \"{}\"", label, ours));
+    (scene_.aovs += scene_.aovs.empty() ? "" : ",") += ours;
+  }
+  if (!renamed.empty())
+    report_.warning(at, fmt::format("layers have names of their own here: {}", fmt::join(renamed, ", ")));
+}
+
+}  // namespace ls::scene

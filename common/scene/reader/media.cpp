@@ -1,0 +1,178 @@
+// Volumes, phase functions and media.
+#include <fmt/format.h>
+
+#include "common/scene/reader/plugin_error.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+namespace {
+
+void need_both(Params& p, const char* one, const char* other, Report& report) {
+  if (p.has(one) && p.has(other)) return;
+  report.error(p.object().at, fmt::format("{} needs {} and {}", p.title(), one, other));
+}
+
+// Reads sigma_a and sigma_s, or sigma_t and albedo; the others are derived.
+void read_old_coefficients(Params& p, HomogeneousMedium& medium, Report& report) {
+  const bool apart = p.has("sigma_a") || p.has("sigma_s"), together = p.has("sigma_t") || p.has("albedo");
+  if (apart && together)
+    return report.error(p.object().at,
+                        fmt::format("{} gives both sigma_a or sigma_s and sigma_t or albedo", p.title()));
+  if (!apart && !together)
+    return report.error(p.object().at,
+                        fmt::format("{} needs its coefficients: sigma_a and sigma_s, or sigma_t and albedo; "
+                                    "those of human skin, the default of Mitsuba 0.x, are not known here",
+                                    p.title()));
+  if (!apart) return need_both(p, "sigma_t", "albedo", report);
+  need_both(p, "sigma_a", "sigma_s", report);
+  Rgb absorption{}, scattering{};
+  const auto read = [&](std::string_view name, Rgb& value) {
+    if (const Element* e = p.take(name))
+      p.convert({.name = name, .doc = "", .range = kNonNegative, .constvolume = true}, *e, value);
+  };
+  read("sigma_a", absorption);
+  read("sigma_s", scattering);
+  for (std::size_t i = 0; i < 3; ++i) {
+    medium.sigma_t[i] = absorption[i] + scattering[i];
+    medium.albedo[i] = medium.sigma_t[i] > 0 ? scattering[i] / medium.sigma_t[i] : 0;
+  }
+}
+
+void read_old_coefficients(Params& p, HeterogeneousMedium&, Report& report) {
+  if (!p.has("sigma_t")) report.error(p.object().at, fmt::format("{} needs density", p.title()));
+  if (!p.has("albedo")) report.error(p.object().at, fmt::format("{} needs albedo", p.title()));
+}
+
+void need_inverse(const Transform& to_world, const Element& e, Report& report) {
+  if (!invertible(to_world))
+    report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
+}
+
+// Parameters that need another one to have an effect; constructed before parameters are taken.
+struct Factors {
+  explicit Factors(const Params& p)
+      : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {}
+  bool light, heat;
+};
+
+void check_emission(const Params& p, const Factors& given, const HeterogeneousMedium& m, Report& report) {
+  const int sources = m.emission.has_value() + m.source_radiance.has_value() + m.temperature.has_value();
+  if (sources > 1)
+    report.error(p.object().at,
+                 fmt::format("{} gives more than one of emission, source_radiance and temperature; give one",
+                             p.title()));
+  if (given.heat && !m.temperature)
+    report.error(
+        p.object().at,
+        fmt::format("{} gives temperature_scale or temperature_offset, but no temperature", p.title()));
+  if (given.light && sources == 0)
+    report.error(p.object().at,
+                 fmt::format("{} gives emission_scale, but none of emission, source_radiance and temperature",
+                             p.title()));
+}
+void check_emission(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
+
+}  // namespace
+
+std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
+  const std::string_view type = e.get("type");
+  Params p(*this, e);
+  if (type == "constvolume") {
+    ConstVolume volume;
+    bind(p, volume);
+    need_inverse(volume.to_world, e, report_);
+    scene_.volumes.emplace_back(volume);
+  } else if (type == "gridvolume") {
+    GridVolume volume;
+    bind(p, volume);
+    if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
+    const std::string_view file = volume.file.value < scene_.assets.size()
+                                      ? std::string_view(scene_.assets[volume.file.value].name)
+                                      : "";
+    if (volume.order != GridOrder{} && !file.ends_with(".bin"))
+      report_.error(e.at, "'order' is of .bin files; others say for themselves how their values lie");
+    if (file.ends_with(".bin") && volume.wrap != Wrap::clamp)
+      report_.error(e.at, "a .bin grid ends at its outermost nodes: 'wrap_mode' can only be clamp");
+    if (volume.node_centred && volume.wrap != Wrap::clamp)
+      report_.error(e.at,
+                    "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
+    need_inverse(volume.to_world, e, report_);
+    scene_.volumes.emplace_back(volume);
+  } else {
+    unknown_plugin(e, report_);
+    return std::nullopt;
+  }
+  p.finish();
+  return VolumeIndex{static_cast<std::uint32_t>(scene_.volumes.size() - 1)};
+}
+
+std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
+  const std::string_view type = e.get("type");
+  Params p(*this, e);
+  if (type == "isotropic") {
+    scene_.phases.emplace_back(IsotropicPhase{});
+  } else if (type == "hg") {
+    HgPhase hg;
+    bind(p, hg);
+    scene_.phases.emplace_back(hg);
+  } else {
+    unknown_plugin(e, report_);
+    return std::nullopt;
+  }
+  p.finish();
+  return PhaseIndex{static_cast<std::uint32_t>(scene_.phases.size() - 1)};
+}
+
+std::optional<MediumIndex> Reader::read_medium(const Element& e) {
+  if (e.get("type") == "homogeneous") return read_any_medium<HomogeneousMedium>(e);
+  if (e.get("type") == "heterogeneous") return read_any_medium<HeterogeneousMedium>(e);
+  unknown_plugin(e, report_);
+  return std::nullopt;
+}
+
+template <class T>
+std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
+  Params p(*this, e);
+  T medium;
+  if (e.old) read_old_coefficients(p, medium, report_);
+  const Factors given(p);
+  bind(p, medium);
+  check_emission(p, given, medium, report_);
+  if constexpr (std::is_same_v<T, HeterogeneousMedium>)
+    if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr;
+        t && ((*t)[0] != (*t)[1] || (*t)[1] != (*t)[2]))
+      report_.error(e.at, fmt::format("'temperature' of {} is one number, not a colour", p.title()));
+  const auto phases = p.take_nested("phase");
+  if (phases.size() > 1)
+    report_.error(phases[1].use->at, fmt::format("{} has a second phase function", p.title()));
+  p.finish();
+  if (phases.empty()) {
+    scene_.phases.emplace_back(IsotropicPhase{});
+    medium.phase = {static_cast<std::uint32_t>(scene_.phases.size() - 1)};
+  } else if (const auto index = phase(*phases[0].object, *phases[0].use)) {
+    medium.phase = *index;
+  }
+  scene_.media.emplace_back(medium);
+  if constexpr (std::is_same_v<T, HeterogeneousMedium>)
+    if (e.old && !report_.has_errors()) unbound_constant_density(e);
+  return MediumIndex{static_cast<std::uint32_t>(scene_.media.size() - 1)};
+}
+
+// In 0.x a constant density extends everywhere, not only over the unit cube.
+void Reader::unbound_constant_density(const Element& e) {
+  const auto medium = std::get<HeterogeneousMedium>(scene_.media.back());
+  const Rgb* density = constant(medium.sigma_t);
+  if (!density) return;
+  const Rgb* albedo = constant(medium.albedo);
+  if (!albedo)
+    return report_.error(e.at, "the density of this medium is the same everywhere, but its albedo is a grid");
+  if (medium.emission || medium.source_radiance || medium.temperature)
+    return report_.error(e.at,
+                         "the density of this medium is the same everywhere: write it as a medium "
+                         "\"homogeneous\" to give it an emission");
+  scene_.media.back() =
+      HomogeneousMedium{*density, *albedo, medium.scale, medium.phase, {}, {}, medium.priority};
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,51 @@
+// Nori's <test type="ttest"> and <test type="chi2test"> as plain data: scenes or bsdfs with their expected
+// results. `lightshaft validate FILE` runs them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/read.h"
+
+namespace ls {
+
+enum class NoriTestKind { t_test, chi2_test };
+
+struct NoriTest {
+  NoriTestKind kind = NoriTestKind::t_test;
+  double significance_level = .01;  // of the whole file, in (0, 1)
+  // Paths or directions drawn per scene or bsdf. chi2_test: 0 means 5,000 per cell of the table.
+  std::uint64_t sample_count = 100'000;
+
+  // The tested scenes or bsdfs, in the order of the file. A bsdf is represented by a scene whose one shape is
+  // a rectangle (normal +z) with that bsdf: scene.bsdfs[scene.shapes[0].bsdf.value].
+  std::vector<Scene> scenes, bsdfs;
+
+  // t_test. For scenes: references[i] is the expected mean luminance of the whole frame of scenes[i]; or, as
+  // an extension of Nori, references[3 i], [3 i + 1] and [3 i + 2] are its red, green and blue. For bsdfs:
+  // references[b * angles.size() + a] is the expected luminance of weights (f cos / pdf) of bsdfs[b] sampled
+  // for light that arrives angles[a] degrees from the normal.
+  std::vector<double> references, angles;
+
+  // chi2_test, of bsdfs: `resolution` cells in cos theta, twice that in phi; cells with fewer expected
+  // samples than min_expected are merged; `test_count` random directions are tested.
+  int resolution = 10, test_count = 5;
+  double min_expected = 5;
+  bool operator==(const NoriTest&) const = default;
+};
+
+struct NoriTestResult {
+  std::optional<NoriTest> test;  // absent if there is any error
+  std::vector<Diagnostic> diagnostics;
+};
+
+// True if the root element of this text is a <test>; false if it is not XML.
+bool is_nori_test(std::string_view text);
+
+// Like read_scene(), with errors of the same kind.
+NoriTestResult read_nori_test(std::string_view file_name, std::string_view text, AssetSource& assets,
+                              const ReadOptions& options = {});
+
+}  // namespace ls

@@ -1,0 +1,133 @@
+// The parameters of one object: readers take those they know; those left over at the end are reported.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/schema/describe_fields.h"
+#include "common/scene/xml/document.h"
+
+namespace ls::scene {
+
+class Reader;
+
+class Params {
+ public:
+  Params(Reader& reader, const Element& object);
+
+  const Element& object() const { return object_; }
+  std::string title() const;  // bsdf "diffuse"
+  bool has(std::string_view name) const;
+  // The child of that name (a property, an object or a reference); marks the name as known.
+  const Element* take(std::string_view name);
+  // A nested object that nobody took by name, and the element at this place (which may be a reference).
+  struct Nested {
+    const Element* object;
+    const Element* use;
+  };
+  enum class Names { any, none };  // none: only those without a name
+  std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
+  // Reports the parameters that nobody took.
+  void finish();
+
+  // Plain values; nullopt if absent or (reported) of the wrong type.
+  std::optional<std::string> take_string(std::string_view name);
+  std::optional<double> take_number(std::string_view name);
+  std::optional<Transform> take_transform(std::string_view name);
+
+  // For Binder: converts `e` to `value`, in the file's notation for that type. Reports errors.
+  void convert(const Field& f, const Element& e, double& value);
+  void convert(const Field& f, const Element& e, int& value);
+  void convert(const Field& f, const Element& e, bool& value);
+  void convert(const Field& f, const Element& e, std::uint64_t& value);
+  void convert(const Field& f, const Element& e, std::string& value);
+  void convert(const Field& f, const Element& e, Vec3& value);
+  void convert(const Field& f, const Element& e, Rgb& value);
+  void convert(const Field& f, const Element& e, Transform& value);
+  void convert(const Field& f, const Element& e, UvTransform& value);
+  void convert(const Field& f, const Element& e, AssetIndex& value);
+  void convert(const Field& f, const Element& e, TextureIndex& value);
+  void convert(const Field& f, const Element& e, std::optional<TextureIndex>& value);
+  void convert(const Field& f, const Element& e, VolumeIndex& value);
+  void convert(const Field& f, const Element& e, std::optional<VolumeIndex>& value);
+  template <class E>
+  requires std::is_enum_v<E>
+  void convert(const Field& f, const Element& e, E& value) {
+    const auto text = string_value(f.name, e);
+    if (!text) return;
+    std::vector<std::string> names;
+    for (const auto& [name, named] : NamesOf<E>::all) {
+      if (name == *text) {
+        value = named;
+        return;
+      }
+      names.emplace_back(name);
+    }
+    not_one_of(f.name, e, *text, names);
+  }
+
+  void absent(const Field& f, TextureIndex& value);
+  void absent(const Field& f, VolumeIndex& value);
+  template <class T>
+  void absent(const Field& f, T&) {
+    if (f.required) missing(f.name);
+  }
+
+ private:
+  struct Child {
+    const Element* element;
+    const Element* object = nullptr;  // for objects and (resolved) references
+    std::string_view name;
+    bool taken = false;
+  };
+  void left_over(const Child& c);
+  void missing(std::string_view name);
+  void wrong_type(std::string_view name, const Element& e, std::string_view wanted);
+  void not_one_of(std::string_view name, const Element& e, const std::string& given,
+                  const std::vector<std::string>& names);
+  bool in_range(const Field& f, const Element& e, double x);
+  bool in_range(const Field& f, const Element& e, const std::array<double, 3>& x);
+  // The object at `e`, nested or referenced; nullptr if `e` is a plain value (or wrong, and reported).
+  const Element* object_at(const Element& e);
+  std::optional<std::string> string_value(std::string_view name, const Element& e);
+  std::optional<Rgb> colour(const Field& f, const Element& e, std::string_view wanted);
+  std::optional<Rgb> spectrum(const Field& f, const Element& e, std::string_view wanted);
+  Rgb shown(const Field& f, const Element& e, const Rgb& seen);
+
+  Reader& reader_;
+  const Element& object_;
+  std::vector<Child> children_;
+  std::vector<std::string> known_;
+};
+
+// Reads a described object from its parameters.
+class Binder {
+ public:
+  explicit Binder(Params& params) : params_(params) {}
+  template <class T>
+  void field(const Field& f, T& value) {
+    if (f.derived) return;
+    if constexpr (requires(Params & p, const Element& e) { p.convert(f, e, value); }) {
+      if (const Element* e = params_.take(f.name))
+        params_.convert(f, *e, value);
+      else
+        params_.absent(f, value);
+    }
+  }
+
+ private:
+  Params& params_;
+};
+
+// Reads all fields that the table has for T; the caller may take further parameters before params.finish().
+template <class T>
+void bind(Params& params, T& value) {
+  Binder binder(params);
+  describe(binder, value);
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,79 @@
+// The part of Params that reads colours in their various notations.
+#include <algorithm>
+#include <cmath>
+
+#include "common/scene/reader/params.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/xml/grammar.h"
+#include "common/scene/xml/spectrum.h"
+#include "common/scene/xml/transform_element.h"
+#include "common/scene/xml/values.h"
+
+namespace ls::scene {
+
+std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_view wanted) {
+  const std::string_view text = e.get("value");
+  if (e.tag == "spectrum" && kind_of(e) == TagKind::property) return spectrum(f, e, wanted);
+  std::optional<Rgb> c;
+  if (e.tag == "rgb" || e.tag == "color") c = parse_rgb(text);
+  if (e.tag == "float" || e.tag == "integer")
+    if (const auto x = parse_number(text)) c = Rgb{*x, *x, *x};
+  if (!c) {
+    wrong_type(f.name, e, wanted);
+    return std::nullopt;
+  }
+  return in_range(f, e, *c) ? c : std::nullopt;
+}
+
+// Follows the RGB modes of Mitsuba. Version 3: reflectances are seen under D65, light as it is, so light of
+// equal power at all wavelengths is not white. 0.x: all curves are seen as they are, single numbers are grey.
+std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::string_view wanted) {
+  const SpectrumText text = parse_spectrum(e.get("value"));
+  const bool emits = object_.tag == "emitter";
+  std::optional<Rgb> c;
+  if (const auto* x = std::get_if<double>(&text)) {
+    c = emits && !e.old ? equal_energy_srgb() : Rgb{1, 1, 1};
+    for (double& part : *c) part *= *x;
+  } else if (const auto* rgb = std::get_if<Rgb>(&text)) {
+    c = *rgb;
+  } else if (const auto* curve = std::get_if<SpectralCurve>(&text)) {
+    c = shown(f, e, linear_srgb(*curve, emits || e.old ? Illuminant::equal_energy : Illuminant::d65));
+  } else if (e.find("filename")) {
+    reader_.report().error(
+        value_place(e, "filename"),
+        fmt::format("'{}' of {}: curves in files are not read; give it as value=\"400:0.1, "
+                    "500:0.3, ...\"",
+                    f.name, title()));
+    return std::nullopt;
+  } else if (e.get("value").find(':') != std::string_view::npos) {
+    reader_.report().error(value_place(e, "value"),
+                           fmt::format("'{}' of {} wants wavelength:value pairs, at least two, in increasing "
+                                       "order of their wavelengths",
+                                       f.name, title()));
+    return std::nullopt;
+  } else {
+    wrong_type(f.name, e, wanted);
+    return std::nullopt;
+  }
+  return in_range(f, e, *c) ? c : std::nullopt;
+}
+
+// Clamps values outside sRGB, or above 1 for a reflectance, as Mitsuba does.
+Rgb Params::shown(const Field& f, const Element& e, const Rgb& seen) {
+  // Tables and matrix have four digits or more: no warning for the resulting deviation of a white from 1.
+  constexpr double kSlack = 1e-3;
+  Rgb c = seen;
+  double most = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    c[i] = std::clamp(seen[i], std::max(f.range.min, 0.0), f.range.max);
+    most = std::max(most, std::abs(c[i] - seen[i]));
+  }
+  if (most > kSlack)
+    reader_.report().warning(
+        value_place(e, "value"),
+        fmt::format("'{}' of {} is, as linear sRGB, {:.4f} {:.4f} {:.4f}: cut off to what it can be", f.name,
+                    title(), seen[0], seen[1], seen[2]));
+  return c;
+}
+
+}  // namespace ls::scene

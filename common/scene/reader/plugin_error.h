@@ -1,0 +1,10 @@
+#pragma once
+
+#include "common/scene/xml/document.h"
+
+namespace ls::scene {
+
+// Reports that the object's type cannot be read: unsupported, or unknown with a suggestion.
+void unknown_plugin(const Element& e, Report& report);
+
+}  // namespace ls::scene

@@ -1,0 +1,158 @@
+// Converts a Document to a Scene: the state shared by the readers of all kinds of objects. One .cpp per kind.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "common/scene/reader/params.h"
+#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/xml/grammar.h"
+
+namespace ls::scene {
+
+class Reader {
+ public:
+  Reader(const Document& document, AssetSource& assets, Report& report);
+  Scene read();  // valid only if the report has no errors afterwards
+
+  Report& report() { return report_; }
+  // The object that `child` is or refers to; nullptr (reported) if there is none.
+  const Element* resolve(const Element& child);
+
+  // Objects are read once, however often they are referred to; `use` is the place of the reference. nullopt:
+  // an error was reported.
+  std::optional<TextureIndex> texture(const Element& object, const Element& use);
+  std::optional<BsdfIndex> bsdf(const Element& object, const Element& use);
+  std::optional<VolumeIndex> volume(const Element& object, const Element& use);
+  std::optional<PhaseIndex> phase(const Element& object, const Element& use);
+  std::optional<MediumIndex> medium(const Element& object, const Element& use);
+
+  TextureIndex add_constant_texture(const Rgb& value);
+  VolumeIndex add_constant_volume(const Rgb& value);
+  // Bounds of a texture's values; nullopt if they depend on an image.
+  struct Bounds {
+    double low, high;
+  };
+  const std::optional<Bounds>& bounds(TextureIndex texture);
+  const Rgb* constant(VolumeIndex volume) const;  // nullptr: it is a grid
+  std::optional<AssetIndex> asset(const std::string& name, const Span& at);
+
+ private:
+  template <class I>
+  using Memo = std::unordered_map<const Element*, std::optional<I>>;
+  template <class I, class F>
+  std::optional<I> once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
+                        F read);
+
+  std::string hint_for(const Element& reference) const;
+  void read_child(const Element& child);
+  void read_idle_parts();
+  void warn_unused_sensor(const Element& e);
+
+  std::optional<TextureIndex> read_texture(const Element& e);
+  template <class T>
+  std::optional<TextureIndex> read_plain_texture(const Element& e);
+  std::optional<TextureIndex> read_mesh_attribute(const Element& e);
+  void refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter);
+  void check_attributes(const Element& e, const Shape& shape);
+  std::optional<TextureIndex> read_uniform_texture(const Element& e, std::string_view parameter);
+  std::optional<BsdfIndex> read_bsdf(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_plain_bsdf(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_metal(const Element& e);
+  template <class T>
+  std::optional<BsdfIndex> read_rough(const Element& e);
+  std::optional<BsdfIndex> read_twosided(const Element& e);
+  TextureIndex old_number(const Element& e, TextureIndex t);
+  void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
+  std::optional<BsdfIndex> read_mask(const Element& e);
+  std::optional<BsdfIndex> read_blend(const Element& e);
+  std::optional<BsdfIndex> read_normal_map(const Element& e);
+  std::optional<BsdfIndex> read_bump_map(const Element& e);
+  bool read_heights(Params& p, BumpMapBsdf& b);
+  std::optional<BsdfIndex> read_principled(const Element& e);
+  std::optional<std::vector<BsdfIndex>> read_inner_bsdfs(Params& p, std::size_t at_least,
+                                                         std::size_t at_most);
+  std::optional<BsdfIndex> add_bsdf(const Element& e, const Bsdf& bsdf);
+  const BsdfTraits& traits(BsdfIndex bsdf);
+  void read_metal_preset(Params& p, Rgb& eta, Rgb& k);
+  std::optional<VolumeIndex> read_volume(const Element& e);
+  std::optional<PhaseIndex> read_phase(const Element& e);
+  std::optional<MediumIndex> read_medium(const Element& e);
+  template <class T>
+  std::optional<MediumIndex> read_any_medium(const Element& e);
+  void unbound_constant_density(const Element& e);
+
+  void read_shape(const Element& e);
+  template <class T>
+  void read_geometry(const Element& e, T geometry);
+  void read_shape_parts(Params& p, Shape& shape);
+  std::optional<AreaEmitter> read_area(const Element& e);
+  void check_placement(const Element& e, const Shape& shape);
+  void warn_of_media_around_camera();
+  void read_shape_group(const Element& e);
+  void read_instance(const Element& e);
+
+  void read_emitter(const Element& e);
+  void read_directional(const Element& e);
+  void read_point(const Element& e);
+  void read_spot(const Element& e);
+  void read_projector(const Element& e);
+  void read_envmap(const Element& e);
+  void check_only_environment(const Element& e);
+
+  void read_sensor(const Element& e);
+  void read_projection(const Element& e, Params& p, Sensor& sensor);
+  void read_sensor_medium(Params& p, Sensor& sensor);
+  void read_fov(Params& p, Sensor& sensor);
+  void read_film(const Element& e);
+  void check_crop(const Element& e, Params& p, bool has_width, bool has_height);
+  ReconstructionFilter read_filter(const Element& e);
+  template <class T>
+  ReconstructionFilter read_plain_filter(const Element& e);
+  void read_sampler(const Element& e);
+  void read_integrator(const Element& e, int depth);
+  void refuse_distances(Params& p);
+  void read_channels(Params& p);
+
+  std::string fresh_label(std::string name, std::string_view type, std::size_t index);
+  void label_shape(const Element& e);  // the last shape of scene_
+  void label_instance(const Element& e);
+
+  const Document& document_;
+  AssetSource& assets_;
+  Report& report_;
+  Ids ids_;
+  Scene scene_;
+  std::vector<const Element*> shape_elements_;  // for the scene's shapes
+  const Element* sensor_ = nullptr;
+  const Element* integrator_ = nullptr;
+  const Element* material_ = nullptr;  // of the last shape read; nullptr: the default
+  std::unordered_set<std::string> labels_;
+  // Top-level films, filters and samplers, and those that a sensor refers to.
+  std::vector<const Element*> parts_;
+  std::unordered_set<const Element*> used_parts_;
+  std::vector<std::optional<Bounds>> texture_bounds_;  // for the first textures of scene_
+  std::vector<BsdfTraits> bsdf_traits_;                // for the first bsdfs of scene_
+
+  bool reads_attributes_ = false;                     // some texture read so far is a mesh attribute
+  std::map<TextureIndex, TextureIndex> old_numbers_;  // keyed by the textures as they were read
+  Memo<TextureIndex> textures_;
+  Memo<BsdfIndex> bsdfs_;
+  Memo<VolumeIndex> volumes_;
+  Memo<PhaseIndex> phases_;
+  Memo<MediumIndex> media_;
+  // Read where they are defined; nullopt: without a shape, or wrong.
+  std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
+  std::optional<GroupIndex> group_;  // the group whose shapes are being read
+  std::map<std::string, AssetIndex> assets_by_name_;
+  std::unordered_set<const Element*> in_progress_;
+  std::unordered_set<const Element*> bad_refs_;  // already reported
+};
+
+}  // namespace ls::scene

@@ -1,0 +1,340 @@
+// Textures and bsdfs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/suggest.h"
+#include "common/scene/limits.h"
+#include "common/scene/reader/plugin_error.h"
+#include "common/scene/reader/reader.h"
+#include "common/scene/reader/unsupported.h"
+#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/materials.h"
+#include "common/scene/schema/mesh_attributes.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene {
+
+std::optional<TextureIndex> Reader::read_texture(const Element& e) {
+  const std::string_view type = e.get("type");
+  if (type == "uniform") return read_uniform_texture(e, "value");
+  if (type == "srgb") return read_uniform_texture(e, "color");
+  if (type == "bitmap" && e.tag == "texture") return read_plain_texture<BitmapTexture>(e);
+  if (type == "checkerboard" && e.tag == "texture") return read_plain_texture<CheckerboardTexture>(e);
+  if (type == "peak" && e.tag == "texture") return read_plain_texture<PeakTexture>(e);
+  if (type == "mesh_attribute" && e.tag == "texture") return read_mesh_attribute(e);
+  unknown_plugin(e, report_);
+  return std::nullopt;
+}
+
+template <class T>
+std::optional<TextureIndex> Reader::read_plain_texture(const Element& e) {
+  Params p(*this, e);
+  T texture;
+  bind(p, texture);
+  p.finish();
+  scene_.textures.emplace_back(texture);
+  return TextureIndex{static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+}
+
+std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
+  const auto index = read_plain_texture<MeshAttributeTexture>(e);
+  reads_attributes_ = true;
+  const std::string& name = std::get<MeshAttributeTexture>(scene_.textures[index->value]).name;
+  if (!name.empty() && !is_attribute_name(name))
+    report_.error(e.at, fmt::format("a mesh has no attribute \"{}\": their names begin with \"vertex_\" or "
+                                    "\"face_\"",
+                                    name));
+  return index;
+}
+
+// Rejects mesh attributes where there is no mesh.
+void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
+  if (!reads_attributes_) return;
+  for (const AttributeUse& use : attribute_uses(scene_, t))
+    report_.error(e.at, fmt::format("'{}' of {} \"{}\" can't be the mesh attribute \"{}\": there is no mesh "
+                                    "here that has it",
+                                    parameter, e.tag, e.get("type"),
+                                    std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name));
+}
+
+std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::string_view parameter) {
+  Params p(*this, e);
+  Rgb value{1, 1, 1};
+  if (const Element* given = p.take(parameter))
+    p.convert({.name = parameter, .doc = "", .range = kNonNegative}, *given, value);
+  p.finish();
+  return add_constant_texture(value);
+}
+
+namespace {
+
+// Reads all fields that the table has for T; `alpha` sets alpha_u and alpha_v.
+template <class T>
+void bind_with_alpha(Params& p, T& b, Report& report) {
+  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
+    report.error(p.object().at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
+  bind(p, b);
+  if (const Element* alpha = p.take("alpha")) {
+    p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
+    b.alpha_v = b.alpha_u;
+  }
+}
+
+}  // namespace
+
+std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
+  const std::string_view type = e.get("type");
+  if (type == "diffuse") return read_plain_bsdf<DiffuseBsdf>(e);
+  if (type == "null") return read_plain_bsdf<NullBsdf>(e);
+  if (type == "dielectric") return read_plain_bsdf<DielectricBsdf>(e);
+  if (type == "thindielectric") return read_plain_bsdf<ThinDielectricBsdf>(e);
+  if (type == "roughdielectric") return read_rough<RoughDielectricBsdf>(e);
+  if (type == "plastic") return read_plain_bsdf<PlasticBsdf>(e);
+  if (type == "roughplastic") return read_plain_bsdf<RoughPlasticBsdf>(e);
+  if (type == "conductor") return read_metal<ConductorBsdf>(e);
+  if (type == "roughconductor") return read_metal<RoughConductorBsdf>(e);
+  if (type == "twosided") return read_twosided(e);
+  if (type == "mask") return read_mask(e);
+  if (type == "blendbsdf") return read_blend(e);
+  if (type == "normalmap") return read_normal_map(e);
+  if (type == "bumpmap") return read_bump_map(e);
+  if (type == "principled") return read_principled(e);
+  unknown_plugin(e, report_);
+  return std::nullopt;
+}
+
+std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
+  scene_.bsdfs.push_back(bsdf);
+  const BsdfIndex index{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  if (traits(index).depth <= kMaxBsdfNesting) return index;
+  report_.error(e.at, fmt::format("bsdfs are nested more than {} deep", kMaxBsdfNesting));
+  return std::nullopt;
+}
+
+const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
+  // A bsdf's inner bsdfs precede it in the list.
+  for (std::size_t i = bsdf_traits_.size(); i < scene_.bsdfs.size(); ++i)
+    bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_));
+  return bsdf_traits_[bsdf.value];
+}
+
+template <class T>
+std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
+  Params p(*this, e);
+  T b;
+  bind(p, b);
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+// The energy table is for a single roughness.
+void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v) {
+  const std::size_t n = scene_.textures.size();
+  if (alpha_u.value >= n || alpha_v.value >= n) return;  // already reported
+  const auto* u = std::get_if<ConstantTexture>(&scene_.textures[alpha_u.value]);
+  const auto* v = std::get_if<ConstantTexture>(&scene_.textures[alpha_v.value]);
+  if (!u || !v)
+    report_.error(e.at, fmt::format("multiple_scattering of bsdf \"{}\" needs a roughness that is a number, "
+                                    "not a texture: give alpha a number, or leave multiple_scattering out",
+                                    e.get("type")));
+  else if (u->value != v->value)
+    report_.error(e.at, fmt::format("multiple_scattering of bsdf \"{}\" needs the same roughness both ways: "
+                                    "give alpha instead of alpha_u and alpha_v, or leave multiple_scattering "
+                                    "out",
+                                    e.get("type")));
+}
+
+template <class T>
+std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
+  Params p(*this, e);
+  T b;
+  bind_with_alpha(p, b, report_);
+  b.alpha_u = old_number(e, b.alpha_u);
+  b.alpha_v = old_number(e, b.alpha_v);
+  if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+// Like the others, but eta and k may also be given by a metal's name.
+template <class T>
+std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
+  Params p(*this, e);
+  T b;
+  read_metal_preset(p, b.eta, b.k);
+  if constexpr (std::is_same_v<T, RoughConductorBsdf>) {
+    bind_with_alpha(p, b, report_);
+    b.alpha_u = old_number(e, b.alpha_u);
+    b.alpha_v = old_number(e, b.alpha_v);
+    if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
+  } else {
+    bind(p, b);
+  }
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
+  const Element* given = p.take("material");
+  if (!given) return;
+  if (given->tag != "string")
+    return report_.error(given->at, fmt::format("'material' of {} wants a <string>", p.title()));
+  const Metal* metal = named_metal(given->get("value"));
+  if (!metal) {
+    const std::string hint = suggestion(given->get("value"), named_metals());
+    return report_.error(
+        value_place(*given, "value"),
+        fmt::format("there is no metal \"{}\" in the table{}; or give eta and k", given->get("value"), hint));
+  }
+  if (p.has("eta") || p.has("k"))
+    return report_.error(given->at, fmt::format("{} gives both a material and eta or k", p.title()));
+  eta = metal->eta;
+  k = metal->k;
+}
+
+// The nested bsdfs in the order of the file; for a blend, as in Mitsuba, ordered by name if both have one.
+std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::size_t at_least,
+                                                               std::size_t at_most) {
+  auto nested = p.take_nested("bsdf");
+  p.finish();
+  if (nested.size() < at_least || nested.size() > at_most) {
+    const auto wanted = at_least == at_most ? (at_most == 1 ? "one nested bsdf" : "two nested bsdfs")
+                                            : "one or two nested bsdfs";
+    report_.error(p.object().at, fmt::format("{} needs {}, not {}", p.title(), wanted, nested.size()));
+    return std::nullopt;
+  }
+  const bool blend = p.object().get("type") == "blendbsdf";
+  const auto named = [](const auto& n) { return !n.use->get("name").empty(); };
+  if (blend && std::all_of(nested.begin(), nested.end(), named))
+    std::stable_sort(nested.begin(), nested.end(),
+                     [](const auto& a, const auto& b) { return a.use->get("name") < b.use->get("name"); });
+  const bool two_sided = p.object().get("type") == "twosided";
+  std::vector<BsdfIndex> inner;
+  for (const auto& [object, use] : nested) {
+    const auto index = bsdf(*object, *use);
+    if (!index) return std::nullopt;
+    if (two_sided && (traits(*index).transmits || traits(*index).two_sided)) {
+      report_.error(use->at,
+                    fmt::format("bsdf \"{}\" has two sides of its own: it can't stand in \"twosided\"",
+                                object->get("type")));
+      return std::nullopt;
+    }
+    inner.push_back(*index);
+  }
+  return inner;
+}
+
+std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
+  Params p(*this, e);
+  const auto sides = read_inner_bsdfs(p, 1, 2);
+  if (!sides) return std::nullopt;
+  return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
+}
+
+// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour (see scene.h): as
+// a scalar it becomes another one with the colours swapped.
+TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
+  if (!e.old || t.value >= scene_.textures.size()) return t;
+  const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);
+  if (!given) return t;
+  if (const auto it = old_numbers_.find(t); it != old_numbers_.end()) return it->second;
+  const CheckerboardTexture as_colour = *given;  // a copy, because the list grows
+  // Recursion is bounded, as nested textures were read within kMaxReferenceDepth.
+  const CheckerboardTexture swapped{old_number(e, as_colour.color1), old_number(e, as_colour.color0),
+                                    as_colour.to_uv};
+  scene_.textures.emplace_back(swapped);
+  return old_numbers_[t] = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+}
+
+std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
+  Params p(*this, e);
+  MaskBsdf b;
+  bind(p, b);
+  b.opacity = old_number(e, b.opacity);
+  // After an error a mask may have no texture.
+  const bool known = b.opacity.value < scene_.textures.size();
+  if (const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr) {
+    BitmapTexture opacity = *image;  // a copy, because others may use its colour
+    opacity.alpha = true;
+    scene_.textures.emplace_back(opacity);
+    b.opacity = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+  }
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_blend(const Element& e) {
+  Params p(*this, e);
+  BlendBsdf b;
+  bind(p, b);
+  b.weight = old_number(e, b.weight);
+  const auto inner = read_inner_bsdfs(p, 2, 2);
+  if (!inner) return std::nullopt;
+  b.first = inner->front();
+  b.second = inner->back();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_normal_map(const Element& e) {
+  Params p(*this, e);
+  NormalMapBsdf b;
+  bind(p, b);
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_bump_map(const Element& e) {
+  Params p(*this, e);
+  BumpMapBsdf b;
+  if (!read_heights(p, b)) return std::nullopt;
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(e, b);
+}
+
+// The nested texture may have any name, or none.
+bool Reader::read_heights(Params& p, BumpMapBsdf& b) {
+  const bool named = p.has("texture");
+  bind(p, b);
+  const auto nested = named ? std::vector<Params::Nested>{} : p.take_nested("texture");
+  if (nested.size() > 1)
+    return report_.error(nested[1].use->at, fmt::format("{} has a second texture", p.title())), false;
+  if (!nested.empty()) {
+    const auto index = texture(*nested[0].object, *nested[0].use);
+    if (!index) return false;
+    b.texture = *index;
+  }
+  // After an error the texture may be missing.
+  if (b.texture.value >= scene_.textures.size()) return false;
+  if (std::holds_alternative<BitmapTexture>(scene_.textures[b.texture.value])) return true;
+  report_.error(p.object().at,
+                fmt::format("{} needs a texture \"bitmap\": others have no slopes", p.title()));
+  return false;
+}
+
+std::optional<BsdfIndex> Reader::read_principled(const Element& e) {
+  Params p(*this, e);
+  PrincipledBsdf b;
+  if (p.has("eta") && p.has("specular"))
+    report_.error(e.at, "bsdf \"principled\" gives both eta and specular; each follows from the other");
+  bind(p, b);
+  if (const Element* given = p.take("specular")) {
+    double specular = .5;
+    p.convert({.name = "specular", .doc = "", .range = kUnit}, *given, specular);
+    b.eta = 2 / (1 - std::sqrt(.08 * specular)) - 1;
+  }
+  p.finish();
+  if (b.spec_trans && b.spec_trans->value < scene_.textures.size())
+    if (const auto* share = std::get_if<ConstantTexture>(&scene_.textures[b.spec_trans->value]))
+      if (share->value == Rgb{0, 0, 0}) b.spec_trans.reset();
+  return add_bsdf(e, b);
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,220 @@
+#include "common/scene/reader/unsupported.h"
+
+#include <algorithm>
+#include <map>
+
+#include "common/scene/schema/integrators.h"
+
+namespace ls::scene {
+namespace {
+
+using Names = std::vector<std::string>;
+
+struct PluginRow {
+  Names supported, unsupported;
+};
+
+Names integrator_names() {
+  Names names;
+  for (const IntegratorRow& row : integrators()) names.emplace_back(row.name);
+  for (const WrapperRow& row : integrator_wrappers()) names.emplace_back(row.name);
+  return names;
+}
+
+const std::map<std::string_view, PluginRow>& plugins() {
+  static const std::map<std::string_view, PluginRow> table = {
+      {"integrator",
+       {integrator_names(),
+        {"ao", "depth", "direct_projective", "field", "multichannel", "prb_projective", "prb_reparam",
+         "stokes"}}},
+      {"sensor",
+       {{"orthographic", "perspective", "spherical", "thinlens"},
+        {"batch", "distant", "irradiancemeter", "perspective_rdist", "radiancemeter", "fluencemeter",
+         "telecentric"}}},
+      {"film", {{"hdrfilm", "ldrfilm", "mfilm", "tiledhdrfilm"}, {"specfilm"}}},
+      {"sampler",
+       {{"independent", "stratified", "multijitter", "orthogonal", "ldsampler", "halton", "hammersley",
+         "sobol"},
+        {}}},
+      {"rfilter", {{"box", "gaussian", "tent"}, {"catmullrom", "lanczos", "mitchell"}}},
+      {"shape",
+       {{"cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized", "shapegroup",
+         "sphere"},
+        {"bsplinecurve", "deformable", "ellipsoids", "ellipsoidsmesh", "hair", "heightfield", "linearcurve",
+         "merge", "sdfgrid"}}},
+      {"bsdf",
+       {{"blendbsdf", "bumpmap", "conductor", "dielectric", "diffuse", "mask", "normalmap", "null", "plastic",
+         "principled", "roughconductor", "roughdielectric", "roughplastic", "thindielectric", "twosided"},
+        {"circular", "coating", "difftrans", "hair", "hk", "irawan", "measured", "measured_polarized",
+         "mixturebsdf", "phong", "pplastic", "polarizer", "principledthin", "retarder", "roughcoating",
+         "roughdiffuse", "ward"}}},
+      {"emitter",
+       {{"area", "constant", "directional", "envmap", "point", "projector", "spot"},
+        {"collimated", "directionalarea", "sky", "sun", "sunsky", "timed_sunsky", "avg_sunsky"}}},
+      {"texture",
+       {{"bitmap", "checkerboard", "mesh_attribute", "peak", "srgb", "uniform"},
+        {"scale", "sampledspectrum", "volume", "vertexcolors", "wireframe", "curvature", "gridtexture"}}},
+      {"spectrum", {{"srgb", "uniform"}, {"blackbody", "d65", "irregular", "rawconstant", "regular"}}},
+      {"volume", {{"constvolume", "gridvolume"}, {"hgridvolume", "volcache"}}},
+      {"medium", {{"heterogeneous", "homogeneous"}, {}}},
+      {"phase",
+       {{"hg", "isotropic"},
+        {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
+  };
+  return table;
+}
+
+const Names kNone;
+
+}  // namespace
+
+const std::vector<MeaninglessRow>& meaningless_table() {
+  static const std::string_view output = "the output format is chosen by the command line or the job";
+  static const std::string_view sampling = "it only steers sampling, which is chosen here";
+  static const std::string_view once = "motion is not rendered";
+  static const std::vector<MeaninglessRow> rows = {
+      {"film",
+       "",
+       {"pixel_format", "component_format", "file_format", "banner", "attach_log", "high_quality_edges",
+        "compensate", "fps"},
+       output},
+      {"film", "", {"sample_border"}, "pixels at the border see samples from beyond it in any case"},
+      {"film", "ldrfilm", {"gamma", "exposure", "tonemap_method", "key", "burn"}, "colours stay linear"},
+      {"film", "mfilm", {"digits", "variable"}, output},
+      {"sampler",
+       "",
+       {"seed", "scramble", "jitter", "dimension", "strict"},
+       "samples are this program's own (--seed)"},
+      {"integrator",
+       "",
+       {"strict_normals", "samples_per_pass", "block_size", "timeout", "render_time_step"},
+       "it does not change the exact answer"},
+      {"integrator",
+       "direct",
+       {"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"},
+       sampling},
+      {"integrator", "volpath", {"version", "max_null_collisions"}, "all light is followed"},
+      {"integrator", "bdpt", {"light_image", "sample_direct"}, sampling},
+      {"integrator",
+       "erpt",
+       {"num_chains", "max_chains", "chain_length", "direct_samples", "bidirectional_mutation",
+        "lens_perturbation", "caustic_perturbation", "multi_chain_perturbation", "manifold_perturbation",
+        "lambda"},
+       sampling},
+      {"integrator",
+       "mlt",
+       {"luminance_samples", "direct_samples", "two_stage", "bidirectional_mutation", "lens_perturbation",
+        "caustic_perturbation", "multi_chain_perturbation", "manifold_perturbation", "lambda"},
+       sampling},
+      {"integrator",
+       "photonmapper",
+       {"direct_samples", "glossy_samples", "global_photons", "caustic_photons", "volume_photons",
+        "global_lookup_radius", "caustic_lookup_radius", "lookup_size", "granularity"},
+       sampling},
+      {"integrator",
+       "ppm",
+       {"photon_count", "initial_radius", "alpha", "granularity", "max_passes"},
+       sampling},
+      {"integrator",
+       "sppm",
+       {"photon_count", "initial_radius", "alpha", "granularity", "max_passes"},
+       sampling},
+      {"integrator",
+       "pssmlt",
+       {"bidirectional", "luminance_samples", "direct_samples", "two_stage", "p_large"},
+       sampling},
+      {"integrator", "vpl", {"shadow_map_resolution", "clamping"}, sampling},
+      {"integrator", "adaptive", {"max_error", "p_value", "max_sample_factor"}, sampling},
+      {"integrator",
+       "irrcache",
+       {"resolution", "quality", "gradients", "clamp_neighbor", "clamp_screen", "overture",
+        "quality_adjustment", "indirect_only", "debug"},
+       sampling},
+      {"sensor", "", {"shutter_open", "shutter_close"}, once},
+      {"sensor", "", {"srf"}, "colours are linear RGB"},
+      {"sensor", "perspective", {"focus_distance"}, "a pinhole has everything in focus"},
+      {"shape", "", {"silhouette_sampling_weight", "sampling_weight"}, sampling},
+      {"shape", "obj", {"collapse"}, "files are read as they are"},
+      {"shape", "ply", {"srgb"}, "colours of vertices are not used"},
+      {"bsdf", "roughconductor", {"sample_visible"}, sampling},
+      {"bsdf", "roughdielectric", {"sample_visible"}, sampling},
+      {"bsdf", "roughplastic", {"sample_visible", "specular_sampling_weight"}, sampling},
+      {"bsdf",
+       "principled",
+       {"diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate"},
+       sampling},
+      {"emitter", "", {"sampling_weight"}, sampling},
+      {"emitter", "", {"medium"}, "which medium light crosses follows from the shapes around it"},
+      {"emitter", "constant", {"to_world"}, "it is the same from everywhere"},
+      {"emitter", "envmap", {"mis_compensation"}, sampling},
+      {"emitter", "envmap", {"cache"}, "it does not change the values"},
+      {"texture", "bitmap", {"format", "accel", "cache", "max_anisotropy"}, "it does not change the values"},
+      {"volume", "gridvolume", {"accel", "max_value", "send_data"}, "it does not change the values"},
+      {"medium",
+       "",
+       {"sample_emitters", "has_spectral_extinction", "majorant_resolution_factor", "majorant_factor",
+        "majorant_grid_resolution", "max_density", "method", "step_size"},
+       sampling},
+  };
+  return rows;
+}
+
+std::string_view meaningless_because(std::string_view tag, std::string_view plugin,
+                                     std::string_view parameter) {
+  for (const MeaninglessRow& row : meaningless_table())
+    if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin) &&
+        std::find(row.parameters.begin(), row.parameters.end(), parameter) != row.parameters.end())
+      return row.because;
+  return {};
+}
+
+std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin) {
+  std::vector<std::string> all;
+  for (const MeaninglessRow& row : meaningless_table())
+    if (row.tag == tag && (row.plugin.empty() || row.plugin == plugin))
+      all.insert(all.end(), row.parameters.begin(), row.parameters.end());
+  return all;
+}
+
+std::string_view replacement(std::string_view tag, std::string_view parameter) {
+  static constexpr std::string_view kCoefficients =
+      "Mitsuba 3 describes media by sigma_t = sigma_a + sigma_s and albedo = sigma_s / sigma_t";
+  static constexpr struct {
+    std::string_view tag, parameter, instead;
+  } rows[] = {
+      {"medium", "sigma_a", kCoefficients},
+      {"medium", "sigma_s", kCoefficients},
+      {"medium", "density", "the density is the volume `sigma_t`; `scale` multiplies it"},
+      {"medium", "material", "measured media are not known by name here; give their coefficients"},
+      {"shape", "max_smooth_angle",
+       "normals are those of the file or, with face_normals, those of its triangles"},
+      {"texture", "gamma", "only 1 is understood, for values that are linear as they are"},
+      {"texture", "wrap_mode_u", "only the same mode in both directions is understood"},
+      {"texture", "wrap_mode_v", "only the same mode in both directions is understood"},
+  };
+  for (const auto& row : rows)
+    if (row.tag == tag && row.parameter == parameter) return row.instead;
+  return {};
+}
+
+const std::vector<std::string>& supported_plugins(std::string_view tag) {
+  const auto it = plugins().find(tag);
+  return it == plugins().end() ? kNone : it->second.supported;
+}
+
+const std::vector<std::string>& unsupported_plugins(std::string_view tag) {
+  const auto it = plugins().find(tag);
+  return it == plugins().end() ? kNone : it->second.unsupported;
+}
+
+bool is_supported_plugin(std::string_view tag, std::string_view plugin) {
+  const Names& names = supported_plugins(tag);
+  return std::find(names.begin(), names.end(), plugin) != names.end();
+}
+
+bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {
+  const Names& names = unsupported_plugins(tag);
+  return std::find(names.begin(), names.end(), plugin) != names.end();
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,31 @@
+// Parts of the dialect that are not supported: parameters that have no effect here, and plugins.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ls::scene {
+
+// Why a parameter of the dialect has no effect here; empty for all other parameters.
+std::string_view meaningless_because(std::string_view tag, std::string_view plugin,
+                                     std::string_view parameter);
+std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin);
+
+// What to write instead of a parameter of an older or related dialect; empty for all other parameters.
+std::string_view replacement(std::string_view tag, std::string_view parameter);
+
+// The plugins of a tag that can be read, and the other ones of the dialect.
+const std::vector<std::string>& supported_plugins(std::string_view tag);
+const std::vector<std::string>& unsupported_plugins(std::string_view tag);
+bool is_supported_plugin(std::string_view tag, std::string_view plugin);
+bool is_unsupported_plugin(std::string_view tag, std::string_view plugin);
+
+struct MeaninglessRow {
+  std::string_view tag, plugin;  // plugin "": all plugins of this tag
+  std::vector<std::string> parameters;
+  std::string_view because;
+};
+const std::vector<MeaninglessRow>& meaningless_table();  // used for the documentation
+
+}  // namespace ls::scene

@@ -1,0 +1,30 @@
+// Upgrades files of Mitsuba 0.5 and 0.6, and of other programs with the same format, to Mitsuba 3: camelCase
+// names, renamed parameters, values with other meanings, other defaults. Later stages know one dialect; where
+// that is not enough, they check Element::old.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/scene/xml/document.h"
+
+namespace ls::scene {
+
+// True for a version of such a file ("0.5.0", but not "3.0.0").
+bool is_old_version(std::string_view version);
+
+// Rewrites an element, whose children have been rewritten already, and marks it as old. Leaves what it does
+// not understand, to be reported when it is read.
+void upgrade(Element& e);
+
+// maxDepth -> max_depth, intIOR -> int_ior.
+std::string snake_case(std::string_view name);
+
+// Parameters whose new name is not just the old one in snake_case; also used for the documentation.
+struct Renamed {
+  std::string_view tag, plugin, before, now;
+};
+std::span<const Renamed> renamed_parameters();
+
+}  // namespace ls::scene

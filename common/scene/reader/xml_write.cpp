@@ -1,0 +1,400 @@
+#include "common/scene/reader/xml_write.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <variant>
+
+#include "common/base/check.h"
+#include "common/scene/reader/aov_names.h"
+#include "common/scene/schema/describe_fields.h"
+#include "common/scene/schema/integrators.h"
+
+namespace ls {
+namespace scene {
+namespace {
+
+// Counts the references to each texture and volume.
+class Uses {
+ public:
+  template <class T>
+  void field(const Field&, const T& value) {
+    count(value);
+  }
+  int of(TextureIndex i) const { return found(textures_, i); }
+  int of(VolumeIndex i) const { return found(volumes_, i); }
+
+ private:
+  template <class I>
+  static int found(const std::map<I, int>& counts, I i) {
+    const auto it = counts.find(i);
+    return it == counts.end() ? 0 : it->second;
+  }
+  template <class T>
+  void count(const T& value) {
+    if constexpr (Described<const T>) describe(*this, value);
+  }
+  void count(TextureIndex i) { ++textures_[i]; }
+  void count(VolumeIndex i) { ++volumes_[i]; }
+  template <class T>
+  void count(const std::optional<T>& x) {
+    if (x) count(*x);
+  }
+  template <class T>
+  void count(const std::vector<T>& list) {
+    for (const T& x : list) count(x);
+  }
+  template <class... Ts>
+  void count(const std::variant<Ts...>& x) {
+    std::visit([&](const auto& alternative) { describe(*this, alternative); }, x);
+  }
+
+  std::map<TextureIndex, int> textures_;
+  std::map<VolumeIndex, int> volumes_;
+};
+
+// The shortest text that reads back to the same bits; -0 is 0, as in the digest.
+std::string number(double x) {
+  CHECK(std::isfinite(x), "a scene with the number {} can't be written", x);
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, x == 0 ? 0.0 : x).ptr};
+}
+
+template <class List>
+std::string numbers(const List& list) {
+  std::string out;
+  for (const double x : list) out += (out.empty() ? "" : " ") + number(x);
+  return out;
+}
+
+// Escapes an attribute value; "$" would begin a parameter.
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '"')
+      out += "&quot;";
+    else if (c == '$')
+      out += "\\$";
+    else
+      out += c;
+  }
+  return out;
+}
+
+// A flag that Mitsuba 3 does not know: written only if set.
+constexpr std::string_view kOurOwn = "node_centred";
+
+// The plugin for a value of this type.
+template <class T>
+std::string_view plugin(const T&) {
+  const TypeInfo& info = kInfo<T>;
+  return info.plugins.empty() ? info.name : info.plugins.substr(0, info.plugins.find(','));
+}
+template <class E>
+std::string_view name_of(E e) {
+  for (const auto& [name, value] : NamesOf<E>::all)
+    if (value == e) return name;
+  CHECK(false, "an enumerator of value {} has no name", static_cast<int>(e));
+  return {};
+}
+std::string_view plugin(const MeshShape& mesh) { return name_of(mesh.format); }
+std::string_view plugin(const IntegratorSettings& integrator) { return integrator.name; }
+bool is_pinhole(const Sensor& s) {
+  return s.aperture_radius == 0 && s.focus_distance == Sensor{}.focus_distance && !s.aperture_scale;
+}
+std::string_view plugin(const Sensor& s) {
+  if (s.projection != Projection::perspective) return name_of(s.projection);
+  return is_pinhole(s) ? "perspective" : "thinlens";
+}
+
+class Writer {
+ public:
+  explicit Writer(const Scene& s) : scene_(s) {
+    describe(uses_, s);
+    name_assets();
+  }
+
+  std::string run() {
+    out_ = "<scene version=\"3.0.0\">\n";
+    write_integrator();
+    pool(scene_.textures, TextureIndex{});
+    pool(scene_.bsdfs, BsdfIndex{});
+    pool(scene_.volumes, VolumeIndex{});
+    pool(scene_.phases, PhaseIndex{});
+    pool(scene_.media, MediumIndex{});
+    write_shapes();
+    for (const Instance& instance : scene_.instances) object(instance);
+    for (const Emitter& emitter : scene_.emitters) std::visit([&](const auto& e) { object(e); }, emitter);
+    write_sensor();
+    return out_ + "</scene>\n";
+  }
+
+  template <class T>
+  void field(const Field& f, const T& value) {
+    if (f.derived && f.given_as.empty()) return;  // derived from something else
+    if constexpr (std::equality_comparable<T>)
+      if (f.elided && value == T{}) return;
+    const std::string_view name = f.given_as.starts_with('<') ? "" : f.name;
+    constexpr bool is_object = requires { nested(name, value); };
+    constexpr bool is_property = requires { property(f, value); };
+    static_assert(is_object || is_property, "a type of fields that nothing here can write");
+    if constexpr (is_object)
+      if (f.derived) return nested(name, value);
+    if constexpr (is_property) property(f, value);
+  }
+
+ private:
+  // Makes names unique, so that two assets of the same name are kept apart.
+  void name_assets() {
+    std::map<std::string, int> seen;
+    for (const Asset& a : scene_.assets) {
+      std::string& name = asset_names_.emplace_back();
+      for (int i = seen[a.name]++; i > 0; --i) name += a.name.starts_with('/') ? "/" : "./";
+      name += a.name;
+    }
+  }
+
+  // Elements.
+  void line(std::string_view text) { out_ += fmt::format("{:{}}{}\n", "", 2 * depth_, text); }
+  void open(std::string_view tag, std::string_view type, const std::string& id, std::string_view name) {
+    line(fmt::format("<{} type=\"{}\"{}{}>", tag, type, id.empty() ? "" : fmt::format(" id=\"{}\"", id),
+                     name.empty() ? "" : fmt::format(" name=\"{}\"", name)));
+    ++depth_;
+    opened_ = out_.size();
+  }
+  void close(std::string_view tag) {
+    --depth_;
+    if (out_.size() == opened_) {  // it is empty
+      out_.replace(out_.size() - 2, 1, "/>");
+      return;
+    }
+    line(fmt::format("</{}>", tag));
+  }
+  void value(std::string_view tag, std::string_view name, std::string_view text) {
+    line(fmt::format("<{} name=\"{}\" value=\"{}\"/>", tag, name, escaped(text)));
+  }
+  void matrix(std::string_view name, const std::array<double, 16>& m) {
+    line(fmt::format("<transform name=\"{}\"><matrix value=\"{}\"/></transform>", name, numbers(m)));
+  }
+  void reference(std::string_view name, const std::string& id) {
+    line(fmt::format("<ref {}id=\"{}\"/>", name.empty() ? "" : fmt::format("name=\"{}\" ", name), id));
+  }
+
+  template <class T>
+  void object(const T& x, const std::string& id = "", std::string_view name = "") {
+    open(kInfo<T>.kind, plugin(x), id, name);
+    describe(*this, x);
+    close(kInfo<T>.kind);
+  }
+
+  template <class List, class I>
+  void pool(const List& list, I index) {
+    for (const auto& one : list) {
+      if (!stands_inline(index)) std::visit([&](const auto& x) { object(x, id_of(index)); }, one);
+      ++index.value;
+    }
+  }
+  template <class I>
+  bool stands_inline(I) const {
+    return false;
+  }
+  bool stands_inline(TextureIndex i) const {
+    return std::holds_alternative<ConstantTexture>(scene_.textures[i.value]) && uses_.of(i) == 1;
+  }
+  bool stands_inline(VolumeIndex i) const {
+    const auto* c = std::get_if<ConstVolume>(&scene_.volumes[i.value]);
+    return c && c->to_world == Transform{} && uses_.of(i) == 1;
+  }
+  static std::string id_of(TextureIndex i) { return fmt::format("texture{}", i.value); }
+  static std::string id_of(BsdfIndex i) { return fmt::format("bsdf{}", i.value); }
+  static std::string id_of(VolumeIndex i) { return fmt::format("volume{}", i.value); }
+  static std::string id_of(PhaseIndex i) { return fmt::format("phase{}", i.value); }
+  static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
+  static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
+
+  // For a mesh, only fields that its plugin has.
+  struct GeometryFields {
+    Writer& writer;
+    const Geometry& geometry;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      const auto* mesh = std::get_if<MeshShape>(&geometry);
+      if (!mesh || mesh->format != MeshFormat::serialized || f.name != "flip_tex_coords") writer.field(f, x);
+    }
+  };
+  // The shapes of a group are contiguous.
+  void write_shapes() {
+    std::optional<GroupIndex> group;
+    const auto go_to = [&](std::optional<GroupIndex> next) {
+      if (group == next) return;
+      if (group) close("shape");
+      group = next;
+      if (group) open("shape", kInfo<ShapeGroup>.name, id_of(*group), "");
+    };
+    for (const Shape& shape : scene_.shapes) {
+      go_to(shape.group);
+      write_shape(shape);
+    }
+    go_to(std::nullopt);
+  }
+  void write_shape(const Shape& shape) {
+    std::visit(
+        [&](const auto& geometry) {
+          open("shape", plugin(geometry), "", "");
+          GeometryFields fields{*this, shape.geometry};
+          describe(fields, geometry);
+        },
+        shape.geometry);
+    describe(*this, shape);
+    close("shape");
+  }
+
+  // Omits the parameters of `volpath_distant_mis` for other integrators.
+  struct WithoutDistances {
+    Writer& writer;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      if (f.name != "distance" && f.name != "heuristic") writer.field(f, x);
+    }
+  };
+  void write_integrator() {
+    const IntegratorSettings& i = scene_.integrator;
+    WithoutDistances plain{*this};
+    if (!scene_.aovs.empty()) {
+      open("integrator", "aov", "", "");
+      value("string", "aovs", mitsuba_channels(scene_.aovs));
+    }
+    open("integrator", plugin(i), "", "");
+    if (i.name == kDistantMis)
+      describe(*this, i);
+    else
+      describe(plain, i);
+    close("integrator");
+    if (!scene_.aovs.empty()) close("integrator");
+  }
+
+  // For a camera, only fields that its plugin has.
+  struct SensorFields {
+    Writer& writer;
+    const Sensor& sensor;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      const bool lens =
+          f.name == "aperture_radius" || f.name == "focus_distance" || f.name == "aperture_scale";
+      const bool clip = f.name.ends_with("_clip"), always = f.name == "to_world" || f.name == "medium";
+      if (always || (clip && sensor.projection == Projection::orthographic) ||
+          (sensor.projection == Projection::perspective && !(lens && is_pinhole(sensor))))
+        writer.field(f, x);
+    }
+  };
+  void write_sensor() {
+    const Sensor& s = scene_.sensor;
+    open("sensor", plugin(s), "", "");
+    SensorFields fields{*this, s};
+    describe(fields, s);
+    open("sampler", "independent", "", "");
+    value("integer", "sample_count", std::to_string(scene_.sample_count));
+    close("sampler");
+    object(scene_.film);
+    close("sensor");
+  }
+
+  // Members of an object, by type.
+  template <class Tag>
+  requires(!std::is_same_v<Tag, AssetTag>) void nested(std::string_view name, const Index<Tag>& i) {
+    reference(name, id_of(i));
+  }
+  template <class T>
+  void nested(std::string_view name, const std::optional<T>& x) {
+    if (x) nested(name, *x);
+  }
+  template <class... Ts>
+  void nested(std::string_view name, const std::variant<Ts...>& x) {
+    std::visit([&](const auto& alternative) { object(alternative, "", name); }, x);
+  }
+  template <Described T>
+  void nested(std::string_view name, const T& x) {
+    object(x, "", name);
+  }
+
+  void property(const Field& f, double x) {
+    if (x != f.unwritten) value("float", f.name, number(x));
+  }
+  void property(const Field& f, int x) {
+    // Omitted if there is no crop, or for the only mesh of a file.
+    if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
+    if (x == f.unwritten) return;
+    value("integer", f.name, std::to_string(x));
+  }
+  void property(const Field& f, std::uint64_t x) { value("integer", f.name, std::to_string(x)); }
+  void property(const Field& f, bool x) {
+    if (x || f.name != kOurOwn) value("boolean", f.name, x ? "true" : "false");
+  }
+  void property(const Field& f, const std::string& x) {
+    if (!x.empty()) value("string", f.name, x);
+  }
+  template <class E>
+  requires std::is_enum_v<E>
+  void property(const Field& f, E e) { value("string", f.name, name_of(e)); }
+  void property(const Field& f, GridOrder o) {  // not in Mitsuba 3
+    if (o != GridOrder{}) value("string", f.name, name_of(o));
+  }
+  void property(const Field& f, const Vec3& x) {
+    line(fmt::format("<{} name=\"{}\" x=\"{}\" y=\"{}\" z=\"{}\"/>",
+                     f.given_as == "vector" ? "vector" : "point", f.name, number(x[0]), number(x[1]),
+                     number(x[2])));
+  }
+  void property(const Field& f, const Rgb& x) {
+    const bool grey = x[0] == x[1] && x[1] == x[2];
+    if (grey && x[0] == f.unwritten) return;
+    value(grey ? "float" : "rgb", f.name, grey ? number(x[0]) : numbers(x));
+  }
+  void property(const Field& f, const Transform& x) {
+    if (x != Transform{}) matrix(f.name, x.m);
+  }
+  void property(const Field& f, const UvTransform& x) {
+    if (x != UvTransform{})
+      matrix(f.name, {x.m[0], x.m[1], 0, x.m[2], x.m[3], x.m[4], 0, x.m[5], 0, 0, 1, 0, 0, 0, 0, 1});
+  }
+  void property(const Field& f, const AssetIndex& i) { value("string", f.name, asset_names_[i.value]); }
+  void property(const Field& f, const TextureIndex& i) {
+    if (stands_inline(i))
+      property(f, std::get<ConstantTexture>(scene_.textures[i.value]).value);
+    else
+      reference(f.name, id_of(i));
+  }
+  void property(const Field& f, const VolumeIndex& i) {
+    if (stands_inline(i))
+      property(f, std::get<ConstVolume>(scene_.volumes[i.value]).value);
+    else
+      reference(f.name, id_of(i));
+  }
+  void property(const Field& f, const std::optional<TextureIndex>& x) {
+    if (x) property(f, *x);
+  }
+  void property(const Field& f, const std::optional<VolumeIndex>& x) {
+    if (x) property(f, *x);
+  }
+
+  const Scene& scene_;
+  Uses uses_;
+  std::vector<std::string> asset_names_;  // as written
+  std::string out_;
+  int depth_ = 1;
+  std::size_t opened_ = 0;  // where the text of the last opened object begins
+};
+
+}  // namespace
+}  // namespace scene
+
+std::string write_xml(const Scene& s) { return scene::Writer(s).run(); }
+
+}  // namespace ls

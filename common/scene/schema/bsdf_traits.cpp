@@ -1,0 +1,71 @@
+#include "common/scene/schema/bsdf_traits.h"
+
+#include <algorithm>
+
+#include "common/base/overloaded.h"
+#include "common/scene/limits.h"
+
+namespace ls::scene {
+
+std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
+  using Nested = std::array<std::optional<BsdfIndex>, 2>;
+  return std::visit(overloaded{[](const TwoSidedBsdf& b) {
+                                 return Nested{b.front, b.back};
+                               },
+                               [](const MaskBsdf& b) {
+                                 return Nested{b.bsdf, std::nullopt};
+                               },
+                               [](const NormalMapBsdf& b) {
+                                 return Nested{b.bsdf, std::nullopt};
+                               },
+                               [](const BumpMapBsdf& b) {
+                                 return Nested{b.bsdf, std::nullopt};
+                               },
+                               [](const BlendBsdf& b) {
+                                 return Nested{b.first, b.second};
+                               },
+                               [](const auto&) { return Nested{}; }},
+                    bsdf);
+}
+
+BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
+  BsdfTraits t;
+  for (const auto& inner : nested_bsdfs(bsdf)) {
+    if (!inner || inner->value >= known.size()) continue;
+    const BsdfTraits& i = known[inner->value];
+    t.depth = std::max(t.depth, i.depth + 1);
+    t.transmits = t.transmits || i.transmits;
+    t.passes = t.passes || i.passes;
+    t.black_behind = t.black_behind && i.black_behind;
+  }
+  t.two_sided = std::holds_alternative<TwoSidedBsdf>(bsdf);
+  t.passes = t.passes || std::holds_alternative<NullBsdf>(bsdf) || std::holds_alternative<MaskBsdf>(bsdf) ||
+             std::holds_alternative<ThinDielectricBsdf>(bsdf);
+  const auto* principled = std::get_if<PrincipledBsdf>(&bsdf);
+  t.transmits = t.transmits || t.passes || (principled && principled->spec_trans) ||
+                std::holds_alternative<DielectricBsdf>(bsdf) ||
+                std::holds_alternative<RoughDielectricBsdf>(bsdf);
+  t.black_behind = t.black_behind && !t.transmits && !t.two_sided;
+  return t;
+}
+
+// By relaxation, for any order of the list: a chain of n settles after n rounds, a cycle never does.
+std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
+  for (const Bsdf& b : scene.bsdfs)
+    for (const auto& inner : nested_bsdfs(b))
+      if (inner && inner->value >= scene.bsdfs.size()) return std::nullopt;
+  std::vector<BsdfTraits> traits(scene.bsdfs.size());
+  for (int round = 0; round <= kMaxBsdfNesting; ++round) {
+    bool changed = false;
+    for (std::size_t i = 0; i < traits.size(); ++i) {
+      const BsdfTraits t = traits_of(scene.bsdfs[i], traits);
+      if (t.depth > kMaxBsdfNesting) return std::nullopt;
+      changed |= !(t == traits[i]);
+      traits[i] = t;
+    }
+    if (!changed) return traits;
+  }
+  return std::nullopt;
+}
+
+}  // namespace ls::scene

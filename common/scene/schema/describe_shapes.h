@@ -1,0 +1,184 @@
+// The describe() overloads of shapes, camera and film; see describe.h.
+#pragma once
+
+#include "common/scene/schema/describe.h"
+
+namespace ls::scene {
+
+// Shapes.
+template <class V, Of<RectangleShape> T>
+void describe(V&, T&) {}
+template <class V, Of<CubeShape> T>
+void describe(V&, T&) {}
+template <class V, Of<DiskShape> T>
+void describe(V&, T&) {}
+template <class V, Of<SphereShape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "center", .doc = "centre", .unit = "length", .given_as = "point"}, s.center);
+  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
+}
+template <class V, Of<MeshShape> T>
+void describe(V& v, T& s) {
+  v.field(
+      {.name = "filename", .doc = "Wavefront OBJ, Stanford PLY or Mitsuba's `.serialized`", .required = true},
+      s.file);
+  v.field({.name = "format", .doc = "of the file: the plugin's name", .derived = true}, s.format);
+  v.field({.name = "face_normals", .doc = "flat shading: the file's vertex normals are left out"},
+          s.face_normals);
+  v.field({.name = "flip_tex_coords", .doc = "v becomes 1 - v; true unless said otherwise for `obj`"},
+          s.flip_tex_coords);
+  v.field({.name = "shape_index", .doc = "which mesh of a `serialized` file", .range = {0, 1e6}},
+          s.shape_index);
+}
+template <class V, Of<CylinderShape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "p0", .doc = "where its axis begins", .unit = "length", .given_as = "point"}, s.p0);
+  v.field({.name = "p1", .doc = "where its axis ends", .unit = "length", .given_as = "point"}, s.p1);
+  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
+}
+template <class V, Of<ShapeGroup> T>
+void describe(V&, T&) {}
+template <class V, Of<Instance> T>
+void describe(V& v, T& s) {
+  v.field({.name = "group", .doc = "the group", .derived = true, .given_as = "<shapegroup>"}, s.group);
+  v.field({.name = "to_world", .doc = "places the group in the world"}, s.to_world);
+}
+// Common to all shapes; their geometry, emitter, bsdf and media are nested objects.
+template <class V, Of<Shape> T>
+void describe(V& v, T& s) {
+  v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
+  v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
+  v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
+  v.field({.name = "bsdf",
+           .doc = "`diffuse` if there is none, black if the shape emits light",
+           .derived = true,
+           .given_as = "<bsdf>"},
+          s.bsdf);
+  v.field({.name = "emitter",
+           .doc = "an `area`: the shape emits light",
+           .derived = true,
+           .given_as = "<emitter>"},
+          s.emitter);
+  v.field({.name = "interior",
+           .doc = "what is on the side that the normal points away from",
+           .derived = true,
+           .given_as = "medium"},
+          s.interior);
+  v.field({.name = "exterior",
+           .doc = "what is on the side that the normal points to",
+           .derived = true,
+           .given_as = "medium"},
+          s.exterior);
+  v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
+          s.is_medium_transition);
+  v.field({.name = "group", .doc = "the group that it is in", .derived = true}, s.group);
+}
+
+// Camera and film.
+template <class V, Of<BoxFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+}
+template <class V, Of<TentFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+}
+template <class V, Of<GaussianFilter> T>
+void describe(V& v, T& f) {
+  v.field({.name = "stddev", .doc = "standard deviation", .unit = "pixels", .range = {0, 8, true}}, f.stddev);
+}
+template <class V, Of<Sensor> T>
+void describe_clips(V& v, T& s) {
+  v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
+  v.field({.name = "near_clip",
+           .doc = "nearest depth that is seen (not `spherical`)",
+           .unit = "length",
+           .range = kPositive},
+          s.near_clip);
+  v.field({.name = "far_clip",
+           .doc = "farthest depth that is seen, of surfaces and of media (not `spherical`)",
+           .unit = "length",
+           .range = kPositive},
+          s.far_clip);
+}
+template <class V, Of<Sensor> T>
+void describe_perspective(V& v, T& s) {
+  describe_clips(v, s);
+  v.field(
+      {.name = "fov",
+       .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given); this and "
+              "all that follows of `perspective` and `thinlens` only",
+       .unit = "degrees",
+       .range = {0, 180, true, true}},
+      s.fov);
+  v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
+  v.field({.name = "principal_point_offset_x",
+           .doc = "how far right of its place the camera looks",
+           .unit = "frame widths"},
+          s.principal_point_offset[0]);
+  v.field({.name = "principal_point_offset_y",
+           .doc = "how far below its place the camera looks",
+           .unit = "frame heights"},
+          s.principal_point_offset[1]);
+}
+template <class V, Of<Sensor> T>
+void describe_lens(V& v, T& s) {
+  v.field({.name = "aperture_radius",
+           .doc = "radius of the lens (`thinlens` only, and needed there); 0: pinhole",
+           .unit = "length",
+           .range = kNonNegative},
+          s.aperture_radius);
+  v.field({.name = "focus_distance",
+           .doc = "depth that is sharp (`thinlens`); far_clip if not given",
+           .unit = "length",
+           .range = kPositive},
+          s.focus_distance);
+  v.field({.name = "aperture_scale",
+           .doc = "over the frame, (0, 0) its upper left corner: multiplies aperture_radius (`thinlens`; not "
+                  "in Mitsuba)",
+           .range = kUnit},
+          s.aperture_scale);
+}
+template <class V, Of<Sensor> T>
+void describe(V& v, T& s) {
+  v.field({.name = "projection", .doc = "the plugin", .derived = true}, s.projection);
+  describe_perspective(v, s);
+  describe_lens(v, s);
+  v.field({.name = "medium",
+           .doc = "what the camera is in; the name may be left out",
+           .derived = true,
+           .given_as = "medium"},
+          s.medium);
+}
+template <class V, Of<FilmSettings> T>
+void describe(V& v, T& f) {
+  v.field({.name = "width", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
+          f.size.width);
+  v.field({.name = "height", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
+          f.size.height);
+  v.field({.name = "filter",
+           .doc = "reconstruction filter; `gaussian` if there is none",
+           .derived = true,
+           .given_as = "<rfilter>"},
+          f.filter);
+  v.field({.name = "crop_offset_x",
+           .doc = "of the part of the frame that is rendered",
+           .unit = "pixels",
+           .range = {0, kMaxFrameSide}},
+          f.crop_offset[0]);
+  v.field({.name = "crop_offset_y",
+           .doc = "of the part of the frame that is rendered",
+           .unit = "pixels",
+           .range = {0, kMaxFrameSide}},
+          f.crop_offset[1]);
+  v.field({.name = "crop_width",
+           .doc = "of the part that is rendered, which is the image that is written; the whole frame if it "
+                  "is not given. A size that a job asks for is that of this part",
+           .unit = "pixels",
+           .range = {0, kMaxFrameSide}},
+          f.crop_size.width);
+  v.field({.name = "crop_height", .doc = "likewise", .unit = "pixels", .range = {0, kMaxFrameSide}},
+          f.crop_size.height);
+}
+
+}  // namespace ls::scene

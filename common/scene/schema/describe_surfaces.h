@@ -1,0 +1,257 @@
+// The describe() overloads of surfaces; see describe.h.
+#pragma once
+
+#include "common/scene/schema/describe.h"
+
+namespace ls::scene {
+
+// For rough surfaces.
+template <class V, class T>
+void describe_multiple_scattering(V& v, T& b) {
+  v.field({.name = "multiple_scattering",
+           .doc = "our own: light that microfacets throw onto each other is not lost (see "
+                  "docs/design/multiple-scattering.md); needs one roughness that is no texture",
+           .elided = true},
+          b.multiple_scattering);
+}
+
+// Surfaces.
+template <class V, Of<DiffuseBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "reflectance", .doc = "share of light sent back", .range = kUnit, .fallback = {.5, .5, .5}},
+      b.reflectance);
+}
+template <class V, Of<ConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<RoughConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_u);
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_v);
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  describe_multiple_scattering(v, b);
+}
+template <class V, Of<DielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<RoughDielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_u);
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_v);
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
+          b.specular_transmittance);
+  describe_multiple_scattering(v, b);
+}
+template <class V, Of<ThinDielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction around", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
+          b.specular_transmittance);
+}
+template <class V, Of<PlasticBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+template <class V, Of<RoughPlasticBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha", .doc = "roughness", .range = kPositive}, b.alpha);
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+  describe_multiple_scattering(v, b);
+}
+template <class V, Of<NullBsdf> T>
+void describe(V&, T&) {}
+template <class V, Of<TwoSidedBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "front", .doc = "of the front", .derived = true, .given_as = "<bsdf>"}, b.front);
+  v.field({.name = "back",
+           .doc = "of the back; the first again if there is no second",
+           .derived = true,
+           .given_as = "<bsdf>"},
+          b.back);
+}
+
+template <class V, Of<MaskBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "opacity",
+           .doc = "1: nothing passes. Of an image its alpha channel, if that falls below 1/2 somewhere; "
+                  "else the luminance",
+           .range = kUnit,
+           .fallback = {.5, .5, .5},
+           .number = true},
+          b.opacity);
+  v.field({.name = "bsdf", .doc = "of the opaque share", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+}
+template <class V, Of<BlendBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "weight",
+           .doc = "share of the second bsdf; the luminance of a colour",
+           .range = kUnit,
+           .fallback = {.5, .5, .5},
+           .number = true},
+          b.weight);
+  v.field({.name = "first", .doc = "where the weight is 0", .derived = true, .given_as = "<bsdf>"}, b.first);
+  v.field({.name = "second", .doc = "where the weight is 1", .derived = true, .given_as = "<bsdf>"},
+          b.second);
+}
+
+template <class V, class T>
+void describe_map(V& v, T& b) {
+  v.field(
+      {.name = "flip_invalid_normals",
+       .doc = "turn normals that face away from the viewer to the other side; false in files of version 0.x"},
+      b.flip_invalid_normals);
+  v.field({.name = "use_shadowing_function",
+           .doc = "let steep places cast shadows, so that light ends softly; false in files of version 0.x"},
+          b.use_shadowing_function);
+}
+template <class V, Of<NormalMapBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "normalmap",
+           .doc = "normals: (x, y, z) = 2 (r, g, b) - 1 along u, across it and along the surface's normal",
+           .range = kUnit,
+           .fallback = {.5, .5, 1}},
+          b.normalmap);
+  v.field({.name = "bsdf", .doc = "that sees them", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  describe_map(v, b);
+}
+
+template <class V, Of<BumpMapBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "texture", .doc = "heights, a `bitmap`", .fallback = {0, 0, 0}}, b.texture);
+  v.field({.name = "scale", .doc = "multiplies the heights", .unit = "length"}, b.scale);
+  v.field({.name = "bsdf", .doc = "that sees the slopes", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  describe_map(v, b);
+}
+template <class V, Of<PrincipledBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "base_color", .doc = "the colour", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.base_color);
+  v.field({.name = "roughness",
+           .doc = "its square is GGX's alpha",
+           .range = kUnit,
+           .fallback = {.5, .5, .5},
+           .number = true},
+          b.roughness);
+  v.field({.name = "anisotropic",
+           .doc = "stretches highlights along u",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.anisotropic);
+  v.field(
+      {.name = "metallic", .doc = "share of metal", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
+      b.metallic);
+  v.field({.name = "spec_trans",
+           .doc = "share of glass in what is not metal; not given, or 0, it has one side",
+           .range = kUnit,
+           .number = true},
+          b.spec_trans);
+  v.field({.name = "eta", .doc = "index of refraction inside over that outside", .range = kPositive}, b.eta);
+  v.field({.name = "spec_tint",
+           .doc = "how far the colour tints the reflection",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.spec_tint);
+  v.field({.name = "sheen",
+           .doc = "of cloth, at grazing angles",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.sheen);
+  v.field({.name = "sheen_tint",
+           .doc = "how far the colour tints it",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.sheen_tint);
+  v.field({.name = "flatness",
+           .doc = "from diffuse to an imitation of light that scatters below",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.flatness);
+  v.field(
+      {.name = "clearcoat", .doc = "of a thin coat", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
+      b.clearcoat);
+  v.field({.name = "clearcoat_gloss",
+           .doc = "of the coat",
+           .range = kUnit,
+           .fallback = {0, 0, 0},
+           .number = true},
+          b.clearcoat_gloss);
+}
+
+}  // namespace ls::scene

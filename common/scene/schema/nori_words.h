@@ -1,0 +1,69 @@
+// The vocabulary of Nori's scene files: its objects with their parameters, and its integrators. One table for
+// reading, suggestions and docs/reference/scene-format.md.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/schema/describe.h"
+
+namespace ls::scene::nori {
+
+// The element types that may set a parameter.
+enum Types : unsigned {
+  kFloat = 1,
+  kInteger = 2,
+  kBoolean = 4,
+  kString = 8,
+  kColor = 16,
+  kPoint = 32,
+  kVector = 64,
+  kTransform = 128,
+  kTexture = 256,
+  kVolume = 512,
+  kBsdf = 1024
+};
+// Names of these types, as "<float> or <color>".
+std::string text_of(unsigned types);
+
+struct Parameter {
+  std::string_view name;
+  unsigned types;
+  std::string_view fallback;  // the default in words; "" without further remark: optional
+  std::string_view meaning;
+  Range range = kAny;          // of a number, or of each component
+  std::string_view idle = "";  // why it has no effect here (causes a warning)
+};
+
+struct Plugin {
+  std::string_view tag, type;
+  std::string_view becomes;  // the equivalent Mitsuba object, in words
+  std::vector<Parameter> parameters;
+};
+std::span<const Plugin> plugins();
+const Plugin* find_plugin(std::string_view tag, std::string_view type);
+std::vector<std::string> plugin_names(std::string_view tag);
+
+// Objects of Nori or its descendants that are rejected by name.
+struct Refused {
+  std::string_view tag, type, because;
+};
+std::span<const Refused> refused_plugins();
+std::string_view refused_because(std::string_view tag, std::string_view type);  // empty: not rejected
+
+struct IntegratorRow {
+  std::string_view name;
+  std::string_view ours;         // IntegratorSettings::name
+  std::optional<int> max_depth;  // implied by the name
+  std::string_view but = "";     // how the image differs from Nori's (causes a warning)
+};
+std::span<const IntegratorRow> integrators();
+const IntegratorRow* integrator_row(std::string_view name);
+
+// Generates the section of docs/reference/scene-format.md.
+std::string markdown();
+
+}  // namespace ls::scene::nori

@@ -1,0 +1,53 @@
+// A scene file as a tree of elements with places: includes are spliced in, $parameters substituted, but
+// nothing is interpreted yet.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/read.h"
+#include "common/scene/xml/error_report.h"
+
+namespace ls::scene {
+
+struct Attribute {
+  std::string name, value;  // value: entities decoded, parameters substituted
+  Span name_at, value_at;   // value_at: between the quotes
+};
+
+struct Element {
+  std::string tag;
+  Span at;  // the tag's name
+  std::vector<Attribute> attributes;
+  std::vector<Element> children;
+  bool old = false;  // in a file of Mitsuba 0.x; see upgrade.h
+
+  const Attribute* find(std::string_view attribute) const;
+  // The attribute's value, empty if there is none.
+  std::string_view get(std::string_view attribute) const;
+};
+
+struct Document {
+  Element root;
+  std::vector<std::string> search_paths;  // from <path>, in the order in which they are tried
+  std::optional<std::uint32_t> frame;     // ReadOptions::frame
+  bool labels = false;                    // ReadOptions::labels
+};
+
+// Parses XML text; nullopt (and diagnostics) if it is malformed, not UTF-8 or beyond the limits. The only
+// user of pugixml.
+std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
+
+// The whole stage: parses, follows <include>, applies <default> and the defines. <include>, <default> and
+// <path> are not in the result.
+std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
+                                      const ReadOptions& options, Report& report);
+
+// `name` relative to `folder` (either may be absolute or empty), with "." and ".." resolved where that is
+// possible without the disk.
+std::string join_path(std::string_view folder, std::string_view name);
+
+}  // namespace ls::scene

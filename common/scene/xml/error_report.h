@@ -1,0 +1,42 @@
+// Collects the diagnostics while a scene is read, up to kMaxDiagnostics.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "common/scene/xml/source_text.h"
+
+namespace ls::scene {
+
+class Report {
+ public:
+  explicit Report(bool strict) : strict_(strict) {}
+
+  // Adds a file, which lives as long as the report; the returned index is for Span::file.
+  std::uint32_t add_file(SourceText file);
+  const SourceText& file(std::uint32_t index) const { return files_[index]; }
+
+  void error(const Span& at, std::string text);
+  void warning(const Span& at, std::string text);  // an error under --strict
+
+  bool has_errors() const { return errors_ > 0; }
+  bool full() const { return errors_ >= kMax; }  // further errors would not be shown: reading may stop
+  // True if further warnings would be shown; check before expensively composing one.
+  bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
+  // "line 9", with the file's name if it differs from that of `here`.
+  std::string refer_to(const Span& there, const Span& here) const;
+  std::vector<Diagnostic> take();  // in the order found; with too many, errors are kept before warnings
+
+ private:
+  static const std::size_t kMax;
+  void add(Diagnostic::Severity severity, const Span& at, std::string text);
+
+  bool strict_;
+  std::deque<SourceText> files_;
+  std::vector<Diagnostic> found_;
+  std::size_t errors_ = 0, warnings_ = 0;
+};
+
+}  // namespace ls::scene

@@ -1,0 +1,21 @@
+// Checks which elements exist, their attributes and their nesting, for a whole document before anything is
+// interpreted, so that the readers of objects can rely on it.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "common/scene/xml/document.h"
+
+namespace ls::scene {
+
+enum class TagKind { object, property, transform, step, reference, alias, unknown };
+
+TagKind kind_of(const Element& e);  // a <spectrum type="..."> is an object
+
+using Ids = std::map<std::string, const Element*, std::less<>>;
+// Reports structural errors, duplicate ids and aliases without a target; returns the objects that have ids,
+// as pointers into `root`.
+Ids check_structure(const Element& root, Report& report);
+
+}  // namespace ls::scene

@@ -1,0 +1,108 @@
+#include "common/scene/xml/source_text.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/scene/limits.h"
+
+namespace ls::scene {
+namespace {
+
+constexpr std::size_t kBlock = 4096;
+static_assert(kMaxTextBytes < std::size_t{1} << 31, "numbers of lines are ints");
+
+bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
+
+int count_characters(std::string_view text) {
+  return static_cast<int>(
+      std::count_if(text.begin(), text.end(), [](char c) { return !is_continuation(c); }));
+}
+
+std::uint32_t count_lines(std::string_view text) {
+  return static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// Length in bytes of the well-formed sequence at the start of `text`; 0 if there is none (RFC 3629, table 3-7
+// of Unicode).
+std::size_t sequence_length(std::string_view text) {
+  const auto at = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = at(0);
+  if (lead < 0x80) return 1;
+  const std::size_t n = lead >= 0xC2 && lead <= 0xDF   ? 2
+                        : (lead & 0xF0) == 0xE0        ? 3
+                        : lead >= 0xF0 && lead <= 0xF4 ? 4
+                                                       : 0;
+  if (n == 0 || text.size() < n) return 0;
+  for (std::size_t i = 1; i < n; ++i)
+    if (!is_continuation(text[i])) return 0;
+  const bool overlong = (lead == 0xE0 && at(1) < 0xA0) || (lead == 0xF0 && at(1) < 0x90);
+  const bool out_of_range = (lead == 0xED && at(1) > 0x9F) || (lead == 0xF4 && at(1) > 0x8F);
+  return overlong || out_of_range ? 0 : n;
+}
+
+}  // namespace
+
+SourceText::SourceText(std::string name, std::string text) : name_(std::move(name)), text_(std::move(text)) {
+  lines_before_.reserve(text_.size() / kBlock + 1);
+  std::uint32_t lines = 0;
+  for (std::size_t begin = 0; begin <= text_.size(); begin += kBlock) {
+    lines_before_.push_back(lines);
+    lines += count_lines(std::string_view(text_).substr(begin, kBlock));
+  }
+}
+
+int SourceText::line(std::size_t offset) const {
+  offset = std::min(offset, text_.size());
+  const std::size_t block = offset / kBlock, begin = block * kBlock;
+  return static_cast<int>(lines_before_[block] +
+                          count_lines(std::string_view(text_).substr(begin, offset - begin))) +
+         1;
+}
+
+std::size_t SourceText::line_start(std::size_t offset) const {
+  const std::size_t end = offset == 0 ? std::string::npos : text_.rfind('\n', offset - 1);
+  return end == std::string::npos ? 0 : end + 1;
+}
+
+SourcePlace SourceText::place(std::size_t offset) const {
+  offset = std::min(offset, text_.size());
+  const std::size_t start = line_start(offset);
+  return {name_, line(offset), count_characters(std::string_view(text_).substr(start, offset - start)) + 1};
+}
+
+Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
+                                std::string message) const {
+  offset = std::min(offset, text_.size());
+  Diagnostic d{severity, place(offset), std::move(message), {}, 1};
+  const std::size_t start = line_start(offset);
+  std::size_t end = std::min(text_.find('\n', start), text_.size());
+  if (end > start && text_[end - 1] == '\r') --end;
+  const std::size_t shown = std::min(length, end - std::min(offset, end));
+  d.length = std::max(1, count_characters(std::string_view(text_).substr(std::min(offset, end), shown)));
+  // Lines of megabytes are not shown; lines that are merely long are, so that columns and carets fit.
+  const std::string_view line = std::string_view(text_).substr(start, end - start);
+  if (line.size() <= 20 * kMaxExcerptBytes && find_invalid_utf8(line) == std::string_view::npos)
+    d.source_line = line;
+  return d;
+}
+
+std::size_t find_control(std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const bool blank = c == '\t' || c == '\n' || c == '\r';
+    const bool c1 = c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+    if ((c < 0x20 && !blank) || c == 0x7F || c1) return i;
+  }
+  return std::string_view::npos;
+}
+
+std::size_t find_invalid_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t n = sequence_length(text.substr(i));
+    if (n == 0) return i;
+    i += n;
+  }
+  return std::string_view::npos;
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,36 @@
+// Converts spectral curves to linear sRGB: as seen by the CIE 1931 2-degree standard observer, with the
+// primaries and the white (D65) of ITU-R BT.709.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "common/scene/scene.h"
+
+namespace ls::scene {
+
+// Linear between the points, 0 beyond the ends. At least two points; nm increases.
+struct SpectralCurve {
+  std::vector<double> nm, value;
+  bool operator==(const SpectralCurve&) const = default;
+};
+
+// The illuminant of a reflectance. Spectra of light, and all curves of Mitsuba 0.x, use equal_energy: the
+// same power at all wavelengths.
+enum class Illuminant { equal_energy, d65 };
+
+// integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear sRGB.
+// Components are negative for colours outside sRGB.
+Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
+
+// From CIE 1931 X, Y, Z.
+Rgb linear_srgb(const std::array<double, 3>& xyz);
+
+// X, Y, Z of a black body by Planck's law [W/(m^2 sr nm)], in the units of linear_srgb(): 1 at all
+// wavelengths gives X = Y = Z = 1. kelvin > 0.
+std::array<double, 3> black_body_xyz(double kelvin);
+
+// Light of the same power at all wavelengths and luminance 1: X = Y = Z = 1, which is not white.
+Rgb equal_energy_srgb();
+
+}  // namespace ls::scene

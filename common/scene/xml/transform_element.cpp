@@ -1,0 +1,243 @@
+#include "common/scene/xml/transform_element.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/scene/xml/values.h"
+
+namespace ls::scene {
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+namespace {
+
+constexpr double kUnitSlack = 1e-3;  // tolerance for an axis written with three digits
+
+Vec3 normalized(const Vec3& v) {
+  // Scaled first, so that squares of tiny or huge components neither underflow nor overflow.
+  const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+  const Vec3 s{v[0] / largest, v[1] / largest, v[2] / largest};
+  const double n = std::sqrt(dot(s, s));
+  return {s[0] / n, s[1] / n, s[2] / n};
+}
+bool is_zero(const Vec3& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
+
+Transform translation(const Vec3& d) { return {{1, 0, 0, d[0], 0, 1, 0, d[1], 0, 0, 1, d[2], 0, 0, 0, 1}}; }
+Transform scaling(const Vec3& s) { return {{s[0], 0, 0, 0, 0, s[1], 0, 0, 0, 0, s[2], 0, 0, 0, 0, 1}}; }
+
+// Rodrigues' formula, right-handed.
+Transform rotation(const Vec3& axis, double degrees) {
+  const Vec3 a = normalized(axis);
+  const double angle = degrees * (std::numbers::pi / 180), s = std::sin(angle), c = std::cos(angle),
+               t = 1 - c;
+  return {{t * a[0] * a[0] + c, t * a[0] * a[1] - s * a[2], t * a[0] * a[2] + s * a[1], 0,
+           t * a[0] * a[1] + s * a[2], t * a[1] * a[1] + c, t * a[1] * a[2] - s * a[0], 0,
+           t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c, 0, 0, 0, 0, 1}};
+}
+
+// A vector perpendicular to the unit vector n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited":
+// the first of the two).
+Vec3 some_up(const Vec3& n) {
+  const double sign = std::copysign(1.0, n[2]), a = -1 / (sign + n[2]);
+  return {1 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]};
+}
+
+// Camera space to world: +z from origin to target, +x to the left.
+std::optional<Transform> look_at(const Vec3& origin, const Vec3& target, Vec3 up) {
+  const Vec3 way{target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]};
+  if (is_zero(way)) return std::nullopt;
+  const Vec3 dir = normalized(way);
+  if (is_zero(up)) up = some_up(dir);
+  const Vec3 across = cross(up, dir);
+  if (is_zero(across)) return std::nullopt;
+  const Vec3 left = normalized(across), true_up = cross(dir, left);
+  return Transform{{left[0], true_up[0], dir[0], origin[0], left[1], true_up[1], dir[1], origin[1], left[2],
+                    true_up[2], dir[2], origin[2], 0, 0, 0, 1}};
+}
+
+std::optional<Vec3> read_triple(const Element& e, std::string_view attribute, Report& report) {
+  const auto numbers = parse_numbers(e.get(attribute), 3);
+  if (numbers && numbers->size() == 3) return Vec3{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+  report.error(value_place(e, attribute), fmt::format("'{}' of <{}> wants three numbers, not \"{}\"",
+                                                      attribute, e.tag, e.get(attribute)));
+  return std::nullopt;
+}
+
+std::optional<Transform> read_lookat(const Element& e, Report& report) {
+  const auto origin = read_triple(e, "origin", report), target = read_triple(e, "target", report);
+  const auto up = e.find("up") ? read_triple(e, "up", report) : Vec3{0, 0, 0};
+  if (!origin || !target || !up) return std::nullopt;
+  auto t = look_at(*origin, *target, *up);
+  if (!t)
+    report.error(e.at,
+                 "<lookat> has no direction: target and origin are the same, or up points along the view");
+  return t;
+}
+
+std::optional<Transform> read_matrix(const Element& e, Report& report) {
+  const auto numbers = parse_numbers(e.get("value"), 16);
+  if (!numbers || (numbers->size() != 9 && numbers->size() != 16)) {
+    report.error(value_place(e, "value"), "<matrix> wants 9 or 16 numbers, row by row");
+    return std::nullopt;
+  }
+  Transform t;
+  const std::size_t n = numbers->size() == 16 ? 4 : 3;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) t.m[4 * i + j] = (*numbers)[n * i + j];
+  if (t.m[12] != 0 || t.m[13] != 0 || t.m[14] != 0 || t.m[15] != 1) {
+    report.error(value_place(e, "value"),
+                 "the last row of a <matrix> must be 0 0 0 1: perspective is no placement");
+    return std::nullopt;
+  }
+  return t;
+}
+
+std::optional<Transform> read_rotate(const Element& e, Report& report) {
+  const auto axis = read_xyz(e, 0, report);
+  const auto angle = parse_number(e.get("angle"));
+  if (!angle)
+    report.error(value_place(e, "angle"),
+                 fmt::format("'angle' of <rotate> wants a number of degrees, not \"{}\"", e.get("angle")));
+  if (!axis || !angle) return std::nullopt;
+  if (is_zero(*axis)) {
+    report.error(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
+    return std::nullopt;
+  }
+  // Mitsuba 3 uses the numbers unnormalised, so that the step shears; that is never intended.
+  const double length = std::sqrt(dot(*axis, *axis));
+  if (std::abs(length - 1) > kUnitSlack)
+    report.warning(e.at, fmt::format("this axis has the length {:.4g}: only its direction is used. Mitsuba 3 "
+                                     "shears unless the length is 1",
+                                     length));
+  return rotation(*axis, *angle);
+}
+
+std::optional<Transform> read_step(const Element& e, Report& report) {
+  if (e.tag == "lookat") return read_lookat(e, report);
+  if (e.tag == "matrix") return read_matrix(e, report);
+  if (e.tag == "rotate") return read_rotate(e, report);
+  const bool scales = e.tag == "scale";
+  const auto v = read_xyz(e, scales ? 1 : 0, report);
+  if (!v) return std::nullopt;
+  return scales ? scaling(*v) : translation(*v);
+}
+
+}  // namespace
+
+Transform multiply(const Transform& a, const Transform& b) {
+  Transform out;
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = 0; j < 4; ++j) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 4; ++k) sum += a.m[4 * i + k] * b.m[4 * k + j];
+      out.m[4 * i + j] = sum;
+    }
+  return out;
+}
+
+Vec3 transform_vector(const Transform& t, const Vec3& v) {
+  Vec3 out;
+  for (std::size_t i = 0; i < 3; ++i)
+    out[i] = t.m[4 * i] * v[0] + t.m[4 * i + 1] * v[1] + t.m[4 * i + 2] * v[2];
+  return out;
+}
+
+Vec3 transform_point(const Transform& t, const Vec3& p) {
+  const Vec3 v = transform_vector(t, p);
+  return {v[0] + t.m[3], v[1] + t.m[7], v[2] + t.m[11]};
+}
+
+double determinant3(const Transform& t) {
+  const Vec3 a{t.m[0], t.m[4], t.m[8]}, b{t.m[1], t.m[5], t.m[9]}, c{t.m[2], t.m[6], t.m[10]};
+  return dot(a, cross(b, c));
+}
+
+bool invertible(const Transform& t) {
+  // The inverse's determinant is 1/det: not finite if det is subnormal.
+  return std::all_of(t.m.begin(), t.m.end(), [](double x) { return std::isfinite(x); }) &&
+         std::isnormal(determinant3(t));
+}
+
+// M transpose(M) = 1.
+bool is_rigid(const Transform& t) {
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = i; j < 3; ++j) {
+      double product = 0;
+      for (std::size_t k = 0; k < 3; ++k) product += t.m[4 * i + k] * t.m[4 * j + k];
+      if (!(std::abs(product - (i == j ? 1 : 0)) <= kUnitSlack)) return false;
+    }
+  return true;
+}
+
+bool is_similarity(const Transform& t) {
+  const Vec3 columns[3] = {{t.m[0], t.m[4], t.m[8]}, {t.m[1], t.m[5], t.m[9]}, {t.m[2], t.m[6], t.m[10]}};
+  const double size = dot(columns[0], columns[0]);
+  // Files often have six digits: squares then differ by a few 1e-6.
+  const double slack = 1e-5 * size;
+  return std::abs(dot(columns[1], columns[1]) - size) <= slack &&
+         std::abs(dot(columns[2], columns[2]) - size) <= slack &&
+         std::abs(dot(columns[0], columns[1])) <= slack && std::abs(dot(columns[0], columns[2])) <= slack &&
+         std::abs(dot(columns[1], columns[2])) <= slack;
+}
+
+UvTransform uv_part(const Transform& t) {
+  return {{t.m[0], t.m[1], t.m[3], t.m[4], t.m[5], t.m[7], 0, 0, 1}};
+}
+
+Transform read_transform(const Element& e, Report& report) {
+  Transform t;
+  for (const Element& step : e.children) {
+    const auto s = read_step(step, report);
+    if (!s) continue;
+    t = multiply(*s, t);
+    if (std::any_of(t.m.begin(), t.m.end(), [](double x) { return !std::isfinite(x); })) {
+      report.error(step.at, "with this step the transform leaves the range of numbers");
+      return {};
+    }
+  }
+  return t;
+}
+
+std::optional<Vec3> read_xyz(const Element& e, double missing, Report& report) {
+  static constexpr std::string_view kAxes[] = {"x", "y", "z"};
+  if (e.find("value")) {
+    if (e.find("x") || e.find("y") || e.find("z")) {
+      report.error(e.at, fmt::format("<{}> gives both value and x, y, z", e.tag));
+      return std::nullopt;
+    }
+    const auto numbers = parse_numbers(e.get("value"), 3);
+    if (numbers && numbers->size() == 1) return Vec3{(*numbers)[0], (*numbers)[0], (*numbers)[0]};
+    if (numbers && numbers->size() == 3) return Vec3{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+    report.error(value_place(e, "value"),
+                 fmt::format("<{}> wants one or three numbers, not \"{}\"", e.tag, e.get("value")));
+    return std::nullopt;
+  }
+  Vec3 v{missing, missing, missing};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!e.find(kAxes[i])) continue;
+    const auto x = parse_number(e.get(kAxes[i]));
+    if (!x) {
+      report.error(value_place(e, kAxes[i]),
+                   fmt::format("'{}' of <{}> wants a number, not \"{}\"", kAxes[i], e.tag, e.get(kAxes[i])));
+      return std::nullopt;
+    }
+    v[i] = *x;
+  }
+  return v;
+}
+
+Span value_place(const Element& e, std::string_view attribute) {
+  const Attribute* a = e.find(attribute);
+  if (!a) return e.at;
+  Span s = a->value_at;
+  if (s.length == 0) s.length = 1;
+  return s;
+}
+
+}  // namespace ls::scene

@@ -1,0 +1,36 @@
+// The machine that a race runs on, and the cores that every racer may use.
+#pragma once
+
+#include <sys/resource.h>
+
+#include "common/base/error.h"
+#include "compare/results.h"
+
+namespace ls::race {
+
+// Restricts this process, its threads and the programs it starts to this many of its cores. Call before any
+// thread is created. resource_exhausted: there are fewer.
+Result<void> use_cores(int count);
+
+// "AMD EPYC 7B13, 2 of 8 cores".
+std::string machine_words(int cores);
+double cpu_seconds(const rusage& usage);  // user and system
+double load_average();                    // the kernel's one-minute average; negative: unknown
+
+// Measures the load of other processes since its construction.
+class Others {
+ public:
+  Others() : start_(taken()) {}
+  // Share of the time of all cores used neither by this process nor by the programs it waited for. Negative:
+  // unknown.
+  double share() const;
+
+ private:
+  struct Times {
+    double total = 0, busy = 0, own = 0;  // seconds; total 0: unknown
+  };
+  static Times taken();
+  Times start_;
+};
+
+}  // namespace ls::race

@@ -1,0 +1,200 @@
+#include "compare/render_racer.h"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <mutex>
+#include <thread>
+
+#include "common/image/film/film.h"
+#include "compare/picture.h"
+
+namespace ls::race {
+namespace {
+
+// Wall time of a turn, unless the round ends earlier: long enough that waiting for the last tile is a small
+// part, short enough that changes of the machine's speed affect all racers.
+constexpr double kTurnSeconds = 1;
+
+double thread_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// Runs `work` on this many threads; returns their total CPU seconds.
+template <class Work>
+double on_threads(int threads, const Work& work) {
+  std::mutex mutex;
+  double cpu = 0;
+  const auto timed = [&] {
+    const double start = thread_cpu_seconds();
+    work();
+    const double used = thread_cpu_seconds() - start;
+    const std::lock_guard lock(mutex);
+    cpu += used;
+  };
+  std::vector<std::jthread> team;
+  for (int i = 1; i < threads; ++i) team.emplace_back(timed);
+  timed();
+  team.clear();
+  return cpu;
+}
+
+class RenderRacer final : public Racer {
+ public:
+  RenderRacer(RenderEntry entry, const Conditions& conditions, const Clock& clock)
+      : entry_(std::move(entry)),
+        conditions_(conditions),
+        clock_(clock),
+        film_(entry_.grid),
+        sums_(2 * values(), 0.),
+        range_(next_range(0, 0, conditions.time, conditions.most_spp)) {
+    std::atomic<TileIndex> next{0};
+    const auto tiles = std::min<TileIndex>(entry_.grid.count(), static_cast<TileIndex>(conditions_.threads));
+    on_threads(conditions_.threads, [&] {
+      for (TileIndex t = next++; t < tiles; t = next++)
+        (void)render::render_tile(*entry_.world, entry_.grid.rect(t), {0, 2}, nullptr, nullptr);
+    });
+  }
+
+  Turn next() const override {
+    if (!range_) return {true, used(), 0};
+    const double round = seconds_per_sample_ * static_cast<double>(range_->count());
+    const double rest =
+        round * (1 - static_cast<double>(next_tile_) / static_cast<double>(entry_.grid.count()));
+    return {false, used(), std::min(rest, kTurnSeconds)};
+  }
+
+  Result<void> take_turn(const std::atomic<bool>& stop) override {
+    const TimePoint begin = clock_.now();
+    std::atomic<bool> ended{false};
+    const double cpu = on_threads(conditions_.threads, [&] {
+      while (!ended && !stop) {
+        const auto ok = one_tile(stop);
+        if (!ok || *ok || seconds(clock_.now() - begin) >= kTurnSeconds) ended = true;
+      }
+    });
+    cost_ = cost_ + Cost{seconds(clock_.now() - begin), cpu};
+    if (trouble_) return tl::unexpected(*trouble_);
+    if (stop) return fail(Errc::failed_precondition, "told to stop");
+    if (next_tile_ < entry_.grid.count()) return {};
+    return end_round();
+  }
+
+  std::vector<Checkpoint> checkpoints() const override { return points_; }
+  std::vector<std::filesystem::path> halves() const override { return {file("a"), file("b")}; }
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> out;
+    for (const auto& [cause, entry] : health_.causes) out.push_back(sentence(cause, entry.count));
+    return out;
+  }
+
+ private:
+  std::size_t values() const {
+    return 3 * static_cast<std::size_t>(entry_.grid.frame.width) *
+           static_cast<std::size_t>(entry_.grid.frame.height);
+  }
+  double used() const { return conditions_.seconds(cost_); }
+  std::filesystem::path file(const std::string& what) const {
+    return entry_.folder / fmt::format("{}.{}", entry_.name, what);
+  }
+
+  // Renders and folds the next tile of the round; true: it was the last, or none was left.
+  std::optional<bool> one_tile(const std::atomic<bool>& stop) {
+    TileIndex tile;
+    {
+      const std::lock_guard lock(mutex_);
+      if (trouble_ || next_tile_ >= entry_.grid.count()) return true;
+      tile = next_tile_++;
+    }
+    Partial partial;
+    partial.header.tile = entry_.grid.rect(tile);
+    partial.header.samples = *range_;
+    auto rendered = render::render_tile(*entry_.world, partial.header.tile, *range_, &stop, nullptr);
+    if (rendered.stopped) return true;
+    partial.sums = std::move(rendered.sums);
+    const Digest digest;  // the chain of digests is not needed, as nothing is sent
+    const std::lock_guard lock(mutex_);
+    const auto folded = film_.fold(tile, round_, partial, digest);
+    if (!folded) {
+      trouble_ = folded.error();
+      return std::nullopt;
+    }
+    health_.merge(rendered.health);
+    add(partial);
+    return tile + 1 == entry_.grid.count();
+  }
+
+  // Accumulates the sums of each half, which the film does not provide.
+  void add(const Partial& partial) {
+    const PixelRect& rect = partial.header.tile;
+    const auto pixels = static_cast<std::size_t>(rect.pixels());
+    std::size_t p = 0;
+    for (int y = rect.y0; y < rect.y1; ++y)
+      for (int x = rect.x0; x < rect.x1; ++x, ++p)
+        for (std::size_t c = 0; c < 6; ++c)
+          sums_[c / 3 * values() + 3 * index(x, y) + c % 3] +=
+              static_cast<double>(partial.sums[c * pixels + p]);
+  }
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(entry_.grid.frame.width) +
+           static_cast<std::size_t>(x);
+  }
+
+  Result<void> end_round() {
+    const std::uint64_t spp = range_->s1;
+    const bool cut = *range_ != round_range(round_);
+    seconds_per_sample_ = used() / static_cast<double>(spp);
+    next_tile_ = 0;
+    ++round_;
+    range_ = cut ? std::nullopt
+                 : next_range(round_, seconds_per_sample_, conditions_.time - used(), conditions_.most_spp);
+    Checkpoint point{static_cast<double>(spp), cost_, !range_, image_error(film_.error()),
+                     file(std::to_string(spp))};
+    if (auto ok = keep(point.picture, means(0, 2, spp)); !ok) return ok;
+    points_.push_back(std::move(point));
+    if (range_) return {};
+    if (auto ok = keep(file("a"), means(0, 1, spp / 2)); !ok) return ok;
+    return keep(file("b"), means(1, 2, spp / 2));
+  }
+
+  // Means over the halves [from, to).
+  Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
+    Pixels out(values());
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      double sum = 0;
+      for (std::size_t h = from; h < to; ++h) sum += sums_[h * values() + i];
+      out[i] = static_cast<float>(sum / static_cast<double>(samples));
+    }
+    return out;
+  }
+
+  const RenderEntry entry_;
+  const Conditions conditions_;
+  const Clock& clock_;
+
+  // guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
+  std::mutex mutex_;
+  Film film_;
+  std::vector<double> sums_;  // of half A, then of half B; interleaved
+  Health health_;
+  TileIndex next_tile_ = 0;
+  std::optional<Error> trouble_;
+
+  RoundIndex round_ = 0;
+  std::optional<SampleRange> range_;  // of the current round; nullopt: it is over
+  double seconds_per_sample_ = 0;
+  Cost cost_;
+  std::vector<Checkpoint> points_;
+};
+
+}  // namespace
+
+std::unique_ptr<Racer> make_render_racer(RenderEntry entry, const Conditions& conditions,
+                                         const Clock& clock) {
+  return std::make_unique<RenderRacer>(std::move(entry), conditions, clock);
+}
+
+}  // namespace ls::race

@@ -1,0 +1,33 @@
+// Statistics over seeds. Errors, times and efficiencies are positive and vary by factors, so they are
+// averaged as logarithms: the mean is geometric, and its 95 % interval is Student's t over the seeds, which
+// are independent renders.
+#pragma once
+
+#include <optional>
+#include <span>
+
+namespace ls::race {
+
+struct Estimate {
+  double value = 0, lo = 0, hi = 0;  // 95 % interval; unbounded for a single value
+};
+
+// Geometric mean of positive values; the interval of a single value is (0, infinity). nullopt: no values, or
+// one is not a positive finite number.
+std::optional<Estimate> geometric_mean(std::span<const double> values);
+
+// Geometric mean of a[i] / b[i]. Effects common to both at the same i (the machine's speed at that time)
+// cancel. nullopt: the counts differ, or as above.
+std::optional<Estimate> geometric_ratio(std::span<const double> a, std::span<const double> b);
+
+// Arithmetic mean; the interval of a single value is (-infinity, infinity).
+std::optional<Estimate> mean(std::span<const double> values);
+
+struct TimeError {
+  double seconds = 0, error = 0;
+};
+// s in error ~ seconds^-s, by least squares through the logarithms; 1 for independent samples. nullopt: fewer
+// than three points with both positive, or all at the same time.
+std::optional<double> log_slope(std::span<const TimeError> points);
+
+}  // namespace ls::race

@@ -1,0 +1,98 @@
+#include "compare/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace ls::race {
+namespace {
+
+std::vector<const JudgedLane*> lanes_of(const Race& race, std::size_t entrant) {
+  std::vector<const JudgedLane*> out;
+  for (const JudgedLane& lane : race.lanes)
+    if (lane.entrant == entrant && !lane.points.empty()) out.push_back(&lane);
+  return out;
+}
+
+// One value per lane, from its last point.
+template <class Value>
+std::vector<double> at_end(const std::vector<const JudgedLane*>& lanes, const Value& value) {
+  std::vector<double> out;
+  for (const JudgedLane* lane : lanes) out.push_back(value(lane->points.back()));
+  return out;
+}
+
+double efficiency(const JudgedPoint& p) { return 1 / (p.relmse * p.seconds); }
+
+// Points from the last one back, each with at most half the samples of the one after it.
+std::vector<TimeError> doublings(const JudgedLane& lane) {
+  std::vector<TimeError> out;
+  double next = std::numeric_limits<double>::infinity();
+  for (std::size_t i = lane.points.size(); i-- > 0;) {
+    const JudgedPoint& p = lane.points[i];
+    if (2 * p.spp > next) continue;
+    next = p.spp;
+    out.push_back({p.seconds, p.relmse});
+  }
+  return out;
+}
+
+std::optional<Estimate> slope_of(const std::vector<const JudgedLane*>& lanes) {
+  std::vector<double> slopes;
+  for (const JudgedLane* lane : lanes)
+    if (const auto slope = log_slope(doublings(*lane))) slopes.push_back(*slope);
+  return slopes.size() == lanes.size() ? mean(slopes) : std::nullopt;
+}
+
+double spread_of(const std::vector<double>& errors) {
+  const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+  return *least > 0 ? *most / *least : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+std::vector<Row> rows_of(const Race& race) {
+  std::vector<Row> rows;
+  std::vector<double> first;
+  for (std::size_t e = 0; e < race.entrants.size(); ++e) {
+    const auto lanes = lanes_of(race, e);
+    if (lanes.empty()) continue;
+    const auto spp = at_end(lanes, [](const JudgedPoint& p) { return p.spp; });
+    const auto seconds = at_end(lanes, [](const JudgedPoint& p) { return p.seconds; });
+    const auto errors = at_end(lanes, [](const JudgedPoint& p) { return p.relmse; });
+    const auto efficiencies = at_end(lanes, efficiency);
+    Row row{e, lanes.size()};
+    row.spp = geometric_mean(spp).value_or(Estimate{}).value;
+    row.seconds = geometric_mean(seconds).value_or(Estimate{}).value;
+    row.relmse = geometric_mean(errors);
+    row.efficiency = geometric_mean(efficiencies);
+    row.slope = slope_of(lanes);
+    row.spread = spread_of(errors);
+    if (e == 0) first = efficiencies;
+    if (e != 0 && !first.empty()) row.ratio = geometric_ratio(first, efficiencies);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant) {
+  const auto lanes = lanes_of(race, entrant);
+  const double end =
+      std::numeric_limits<double>::infinity();  // key for the final points, whose samples differ
+  std::map<double, std::vector<const JudgedPoint*>> groups;
+  for (const JudgedLane* lane : lanes)
+    for (const JudgedPoint& p : lane->points) groups[p.last ? end : p.spp].push_back(&p);
+  std::vector<CurveAt> out;
+  for (const auto& [key, points] : groups) {
+    if (2 * points.size() < lanes.size()) continue;
+    std::vector<double> spp, seconds, errors;
+    for (const JudgedPoint* p : points)
+      spp.push_back(p->spp), seconds.push_back(p->seconds), errors.push_back(p->relmse);
+    const auto x = geometric_mean(seconds), y = geometric_mean(errors), n = geometric_mean(spp);
+    if (x && y && n) out.push_back({n->value, x->value, *y});
+  }
+  return out;
+}
+
+}  // namespace ls::race

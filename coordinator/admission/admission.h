@@ -1,0 +1,46 @@
+// Admission: turns a submission into a job that can be rendered. The scene is read and checked, and all
+// defaults are resolved.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/image/reference/reference.h"
+#include "coordinator/domain/farm/farm.h"
+#include "coordinator/store/blobs/blob_store.h"
+#include "coordinator/store/jobs/job_store.h"
+#include "coordinator/views/submit_request.h"
+
+namespace ls::coordinator {
+
+struct Admission {
+  StoredJob job;               // without id and time
+  std::string scene_json;      // canonical; its digest is job.scene
+  std::size_t text_bytes = 0;  // of all scene files read
+};
+
+// Reads the scene with the request's assets as its only files, so a scene can never reach a path on this
+// machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
+// `frame`: number of a frame of a sequence. The scene is read for this frame, and its seed is the job's plus
+// this number: frames have independent noise, and a frame rendered alone has the same pixels.
+tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
+                                        std::optional<std::uint32_t> frame = {});
+
+// Admits all frames of spec.frames, or returns their errors; limits.h bounds their total size.
+tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
+                                                              const BlobStore& blobs);
+
+// The reference that the job asks for, for an image of this size. failed_precondition: its blob is missing;
+// invalid_argument: it is not a suitable picture.
+Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
+
+// The command that renders one of the job's samples again: common/job/replay_command.h.
+std::string replay_of(const StoredJob& job);
+
+// The least bytes of memory that a worker needs for the job.
+std::uint64_t memory_need(const StoredJob& job);
+
+// The stored job as the farm's plan.
+JobPlan plan_of(const StoredJob& job);
+
+}  // namespace ls::coordinator

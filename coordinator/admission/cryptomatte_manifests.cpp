@@ -1,0 +1,23 @@
+#include "coordinator/admission/cryptomatte_manifests.h"
+
+#include "common/image/aov/cryptomatte.h"
+
+namespace ls::coordinator {
+
+bool wants_labels(const RenderSettings& settings) { return aovs_of(settings).any_of(aovs_of(AovKind::ids)); }
+
+CryptomatteManifests manifests_of(const Scene& scene, AovSet aovs) {
+  CryptomatteManifests out;
+  std::vector<std::string> shapes, materials;
+  for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {
+    // The shapes of a group appear as its instances.
+    if (!scene.shapes[i].group) shapes.push_back(scene.shape_labels[i].name);
+    materials.push_back(scene.shape_labels[i].material);
+  }
+  for (const Label& l : scene.instance_labels) shapes.push_back(l.name);
+  if (aovs.has(Aov::shape_id)) out.shapes = cryptomatte_manifest(std::move(shapes));
+  if (aovs.has(Aov::material_id)) out.materials = cryptomatte_manifest(std::move(materials));
+  return out;
+}
+
+}  // namespace ls::coordinator

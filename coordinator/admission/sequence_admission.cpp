@@ -1,0 +1,108 @@
+// Admission of sequences: one scene, read once per frame; all frames or none.
+#include <fmt/format.h>
+
+#include <set>
+
+#include "common/job/frame_diagnostics.h"
+#include "coordinator/admission/admission.h"
+#include "coordinator/base/limits.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr std::uint32_t kMostBadFrames = 64;  // reading stops after this many frames with errors
+
+// The limits on all frames together.
+class Budget {
+ public:
+  explicit Budget(std::uint32_t frames) : frames_(frames) {}
+
+  // Call scene() before the text is read, and frame() for every frame.
+  Result<void> scene(std::size_t bytes) const {
+    if (bytes <= limits::kMaxSequenceText / frames_) return {};
+    return too_much("bytes of scene text", limits::kMaxSequenceText);
+  }
+  Result<void> frame(const Admission& admission) {
+    text_ += admission.text_bytes;
+    kept_ += admission.scene_json.size();
+    files_ += admission.job.assets.size();
+    tiles_ += TileGrid{admission.job.settings.size, admission.job.settings.tile}.count();
+    if (text_ > limits::kMaxSequenceText || kept_ > limits::kMaxSequenceText)
+      return too_much("bytes of scene text", limits::kMaxSequenceText);
+    if (files_ > limits::kMaxSequenceFiles) return too_much("files", limits::kMaxSequenceFiles);
+    if (tiles_ > limits::kMaxSequenceTiles) return too_much("tiles", limits::kMaxSequenceTiles);
+    return {};
+  }
+
+ private:
+  tl::unexpected<Error> too_much(std::string_view what, std::uint64_t most) const {
+    return fail(Errc::invalid_argument,
+                fmt::format("{} frames have more than {} {} together: make several jobs of them", frames_,
+                            most, what));
+  }
+
+  std::uint32_t frames_;
+  std::uint64_t text_ = 0, kept_ = 0, files_ = 0, tiles_ = 0;
+};
+
+tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}) {
+  return tl::unexpected(Rejected{std::move(error), std::move(found)});
+}
+
+// Drops warnings that an earlier frame has.
+void merge_warnings(std::vector<Admission>& frames) {
+  std::set<std::string> told;
+  for (Admission& f : frames)
+    std::erase_if(f.job.warnings, [&](const std::string& w) { return !told.insert(w).second; });
+}
+
+void note_if_all_are_one(std::vector<Admission>& frames) {
+  if (frames.size() < 2) return;
+  for (const Admission& f : frames)
+    if (f.job.scene != frames.front().job.scene) return;
+  frames.front().job.warnings.push_back(fmt::format(
+      "{}: warning: all {} frames are the same scene, but for their noise: nothing in it asks for "
+      "$frame or has # in the name of a file",
+      frames.front().job.name, frames.size()));
+}
+
+}  // namespace
+
+tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
+                                                              const BlobStore& blobs) {
+  const auto numbers = request.spec.frames.value().frames();
+  Budget budget(static_cast<std::uint32_t>(numbers.size()));
+  if (auto fits = budget.scene(request.scene_text.size()); !fits) return refused(fits.error());
+  std::vector<Admission> frames;
+  FrameDiagnostics found;
+  std::uint32_t bad = 0;
+  for (const std::uint32_t frame : numbers) {
+    auto taken = admit(request, blobs, frame);
+    if (!taken && taken.error().diagnostics.empty()) {
+      if (frame != numbers.front())
+        taken.error().error.message = fmt::format("frame {}: {}", frame, taken.error().error.message);
+      return refused(std::move(taken.error().error));
+    }
+    if (!taken) {
+      found.add(frame, taken.error().diagnostics);
+      frames.clear();
+      if (++bad == kMostBadFrames || found.full()) break;
+      continue;
+    }
+    found.add(frame, {});
+    if (bad > 0) continue;
+    if (auto fits = budget.frame(*taken); !fits) return refused(fits.error());
+    frames.push_back(std::move(*taken));
+  }
+  if (bad > 0)
+    return refused(
+        {Errc::invalid_argument,
+         fmt::format("the scene {} cannot be read for {} of its {} frames{}", request.scene_name, bad,
+                     numbers.size(), bad == kMostBadFrames || found.full() ? " at least" : "")},
+        found.take());
+  merge_warnings(frames);
+  note_if_all_are_one(frames);
+  return frames;
+}
+
+}  // namespace ls::coordinator

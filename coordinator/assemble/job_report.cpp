@@ -1,0 +1,275 @@
+#include "coordinator/assemble/job_report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/image/exr/final_image.h"
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
+json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
+
+// 64 rather than 64.0 if all pixels have the same number of samples.
+json spp_value(double spp) {
+  if (spp == std::floor(spp) && spp >= 0 && spp < 1e15) return static_cast<std::uint64_t>(spp);
+  return number(spp);
+}
+
+// true_rmse, true_relmse, true_flip, and whether the first two are below the reference's noise.
+void put_reference_error(json& object, const ReferenceError& reference_error) {
+  object["true_rmse"] = number(reference_error.rmse);
+  object["true_relmse"] = number(reference_error.relmse);
+  object["true_flip"] = number(reference_error.flip);
+  object["true_rmse_below_noise"] = reference_error.rmse_below_noise();
+  object["true_relmse_below_noise"] = reference_error.relmse_below_noise();
+}
+
+json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>& reference_error) {
+  if (!facts.job.spec.reference) return {};
+  const auto& noise = facts.reference_noise;
+  return {{"digest", facts.job.spec.reference->hex()},
+          {"rmse", reference_error ? number(reference_error->rmse) : json()},
+          {"relmse", reference_error ? number(reference_error->relmse) : json()},
+          {"flip", reference_error && reference_error->flip ? number(*reference_error->flip) : json()},
+          {"same_seed", facts.job.reference_same_seed},
+          // The difference to the reference is within the reference's own noise, so it cannot show the
+          // image's error.
+          {"below_noise", reference_error && reference_error->relmse_below_noise()},
+          {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
+          {"mse_stderr", reference_error ? number(reference_error->mse_stderr) : json()},
+          {"relmse_stderr", reference_error ? number(reference_error->relmse_stderr) : json()},
+          {"noise_rmse", noise ? number(std::sqrt(noise->mse)) : json()},
+          {"noise_relmse", noise ? number(noise->relmse) : json()}};
+}
+
+// The forecast of the time to the target at each checkpoint, so that its reliability can be judged
+// afterwards.
+void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
+  const std::vector<ErrorPoint> all = error_points(points);
+  // At doubling samples only: points in between add little, and each forecast evaluates all points
+  double next = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].spp < next) continue;
+    const auto forecast = forecast_of(std::span(all).first(i + 1), target);
+    if (!forecast || forecast->core_seconds == 0) continue;
+    next = 2 * all[i].spp;
+    curve[i]["forecast"] = {
+        {"core_seconds", number(forecast->core_seconds)},
+        {"core_seconds_ci95", {number(forecast->core_seconds_lo), number(forecast->core_seconds_hi)}},
+        {"spp", number(forecast->spp)}};
+  }
+}
+
+json split_json(const TimeSplit& t) {
+  json j;
+  for (const TimePart& part : kTimeParts) j[part.name] = number(t.*part.seconds);
+  return j;
+}
+
+json point(const ConvergencePoint& p) {
+  json j{{"seconds", number(p.seconds)},
+         {"core_seconds", number(p.core_seconds)},
+         {"spp", spp_value(p.spp)},
+         {"rmse", number(p.error.rmse)},
+         {"relmse", number(p.error.relmse)},
+         {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
+  if (p.error.rmse_hi > 0) j["rmse_ci95"] = {number(p.error.rmse_lo), number(p.error.rmse_hi)};
+  if (p.reference_error) put_reference_error(j, *p.reference_error);
+  return j;
+}
+
+// The cost of reaching the job's target or, if there is none left to reach, half of the error.
+json forecast(const ReportFacts& facts) {
+  if (facts.convergence.empty()) return {};
+  const double now = facts.convergence.back().error.relmse;
+  const auto& asked = facts.job.spec.target_error;
+  const bool goes_on = asked && *asked < now;
+  const double target = goes_on ? *asked : now / 2;
+  const auto f = forecast_of(error_points(facts.convergence), target);
+  if (!f) return {};
+  return {{"target", number(target)},
+          {"asked", goes_on},
+          {"spp", spp_value(f->spp)},
+          {"core_seconds", number(f->core_seconds)},
+          {"core_seconds_ci95", {number(f->core_seconds_lo), number(f->core_seconds_hi)}}};
+}
+
+}  // namespace
+
+std::string note_on(StopReason stopped) {
+  if (stopped == StopReason::error)
+    return "stopped at a target error: each tile has as many samples as its own error asked for, so the "
+           "image "
+           "carries a small bias, below the error told; images by samples carry none";
+  if (stopped == StopReason::time)
+    return "stopped by time: another run may end with other samples, so its pixels may differ";
+  return "";
+}
+
+TimeSplit split_of(const JobTotals& totals) {
+  TimeSplit split = totals.time;
+  split.render = totals.core_seconds;
+  return split;
+}
+
+ErrorFigures figures_of(const ImageError& e) {
+  return {e.rmse, e.relmse, e.relmse_lo, e.relmse_hi, e.rmse_lo, e.rmse_hi};
+}
+
+std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points, bool with_reference_error) {
+  std::vector<ErrorPoint> out;
+  out.reserve(points.size());
+  for (const ConvergencePoint& p : points) {
+    out.push_back({p.spp, p.core_seconds, p.error.relmse, p.error.relmse_lo, p.error.relmse_hi});
+    if (!p.reference_error || !with_reference_error) continue;
+    out.back().true_relmse = p.reference_error->relmse;
+    out.back().true_stderr = p.reference_error->relmse_stderr;
+  }
+  return out;
+}
+
+std::optional<ReferenceError> last_reference_error(const std::vector<ConvergencePoint>& points) {
+  std::optional<ReferenceError> out;
+  for (auto p = points.rbegin(); p != points.rend() && !out; ++p) out = p->reference_error;
+  return out;
+}
+
+void put_film(ReportFacts& facts, const Film& film) {
+  const FrameSize& size = film.grid().frame;
+  facts.samples = film.samples();
+  facts.pixels_without_samples = film.pixels_without_samples();
+  facts.job.totals.spp_done =
+      static_cast<double>(facts.samples) / static_cast<double>(std::int64_t{size.width} * size.height);
+  facts.error.reset();
+  if (facts.samples > 0) facts.error = image_error(film.error());
+}
+
+ConvergenceStatus convergence_status_of(const ReportFacts& facts) {
+  if (!facts.error) return {ConvergenceStatus::Kind::early, "no sample yet", false};
+  if (facts.pixels_without_samples > 0)
+    return {ConvergenceStatus::Kind::early,
+            fmt::format("don't trust yet: {} pixels have no sample; the figures are of the others",
+                        facts.pixels_without_samples),
+            false};
+  return judge(error_points(facts.convergence, !facts.job.reference_same_seed), facts.error->verdict);
+}
+
+// 1 / error per second of wall-clock time; per core second for comparisons between farms.
+Efficiency efficiency_of(const ReportFacts& facts) {
+  const auto over = [&](double seconds) -> std::optional<double> {
+    const double cost = facts.error ? facts.error->relmse * seconds : 0;
+    return cost > 0 ? std::optional(1 / cost) : std::nullopt;
+  };
+  return {over(facts.job.totals.render_seconds), over(facts.job.totals.core_seconds)};
+}
+
+std::map<std::string, double> header_figures(const ReportFacts& facts) {
+  std::map<std::string, double> figures;
+  const auto put = [&](const char* name, std::optional<double> value) {
+    if (value && std::isfinite(*value)) figures[name] = *value;
+  };
+  const Efficiency efficiency = efficiency_of(facts);
+  put("efficiency", efficiency.wall);
+  put("efficiency_per_core", efficiency.per_core);
+  put("target_error", facts.job.spec.target_error);
+  if (const auto trend = trend_of(error_points(facts.convergence))) put("slope", -trend->slope);
+  if (const auto reference_error = last_reference_error(facts.convergence)) {
+    put("true_rmse", reference_error->rmse);
+    put("true_relmse", reference_error->relmse);
+  }
+  return figures;
+}
+
+std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
+  std::map<std::string, std::string> notes;
+  if (facts.job.reference_same_seed) notes["reference_same_seed"] = kSameSeed;
+  if (facts.job.fake) notes["fake"] = kFakePixels;
+  const auto reference_error = last_reference_error(facts.convergence);
+  if (!reference_error) return notes;
+  std::string below = reference_error->rmse_below_noise() ? "rmse" : "";
+  if (reference_error->relmse_below_noise()) below += below.empty() ? "relmse" : " relmse";
+  if (!below.empty()) notes["true_below_noise"] = below;
+  return notes;
+}
+
+std::string report_json(const ReportFacts& facts) {
+  const StoredJob& job = facts.job;
+  const JobTotals& totals = job.totals;
+  json curve = json::array();
+  for (const auto& p : facts.convergence) curve.push_back(point(p));
+  if (job.spec.target_error) put_forecasts(curve, facts.convergence, *job.spec.target_error);
+  json j{{"job", job.id.value},
+         {"name", job.name},
+         {"submitted_unix", number(job.submitted_unix)},
+         {"target_error", job.spec.target_error ? number(*job.spec.target_error) : json()},
+         {"scene", job.scene.hex()},
+         {"state", to_string(job.state)},
+         {"size", {job.settings.size.width, job.settings.size.height}},
+         {"seed", job.settings.seed},
+         {"integrator", job.settings.integrator},
+         {"max_depth", job.settings.max_depth},
+         {"rr_depth", job.settings.rr_depth},
+         {"spp_asked", job.spp ? json(even_spp(*job.spp)) : json()},
+         {"time_asked", job.spec.time ? number(*job.spec.time) : json()},
+         {"spp", spp_value(totals.spp_done)},
+         {"samples", facts.samples},
+         {"load_seconds", number(totals.load_seconds)},
+         {"render_seconds", number(totals.render_seconds)},
+         {"core_seconds", number(totals.core_seconds)},
+         {"time", split_json(split_of(totals))},
+         {"peak_rss_bytes", totals.peak_rss_bytes},
+         {"nonfinite_samples", totals.health.nonfinite},
+         {"negative_samples", totals.health.negative},
+         {"majorant_violations", totals.health.majorant_violations},
+         {"health", json::parse(health_json(totals.health, health_notes(totals.health, facts.replay)))},
+         {"clamped_values", facts.clamped_values},
+         {"pixels_sha256", facts.pixels.hex()},
+         {"features_used", job.features_used},
+         {"features_left_out", job.features_left_out},
+         {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
+         {"build", job.build},
+         {"fake", job.fake},
+         {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
+         {"warnings", job.warnings},
+         {"convergence", std::move(curve)}};
+  // Both texts were written by this program; older records have none.
+  j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
+  j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
+  const bool known = facts.error.has_value();
+  const ImageError e = facts.error.value_or(ImageError{});
+  j["rmse"] = known ? number(e.rmse) : json();
+  j["rmse_ci95"] = known ? json{number(e.rmse_lo), number(e.rmse_hi)} : json();
+  j["relmse"] = known ? number(e.relmse) : json();
+  j["relmse_ci95"] = known ? json{number(e.relmse_lo), number(e.relmse_hi)} : json();
+  const auto reference_error = last_reference_error(facts.convergence);
+  if (reference_error) put_reference_error(j, *reference_error);
+  j["reference"] = reference_of(facts, reference_error);
+  j["few_hits_pixels"] = facts.error ? json(facts.error->few_hits) : json();
+  const auto trend = trend_of(error_points(facts.convergence));
+  j["slope"] = trend ? number(-trend->slope) : json();
+  j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
+  j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
+  j["forecast"] = forecast(facts);
+  const ConvergenceStatus convergence_status = convergence_status_of(facts);
+  j["trusted"] = convergence_status.trusted;
+  j["verdict"] = convergence_status.words;
+  j["verdict_kind"] = to_string(convergence_status.kind);
+  const Efficiency efficiency = efficiency_of(facts);
+  j["efficiency"] = number(efficiency.wall);
+  j["efficiency_per_core"] = number(efficiency.per_core);
+  j["threads"] = totals.render_seconds > 0 ? number(totals.core_seconds / totals.render_seconds) : json();
+  j["pixels_without_samples"] = facts.pixels_without_samples;
+  j["error"] = text_or_null(job.error);
+  j["adaptive"] = job.spec.target_error.has_value();
+  if (const std::string note = job.stopped ? note_on(*job.stopped) : ""; !note.empty()) j["note"] = note;
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,109 @@
+// Fair scheduling: the order in which jobs get leases. Higher priorities go first; within one priority, users
+// have equal shares, and so have the jobs of one user (a sequence counts as one job; its frames run in
+// order). Shares are measured in core seconds: those that results have reported plus those predicted for
+// leased units. The user or job with the smallest share goes next (start-time fair queueing, Goyal et al.
+// 1996, with measured instead of declared lengths).
+//
+// A user or job that arrives, or returns after a pause, starts at the share of the one served last: waiting
+// saves up no turns, and having used the farm alone costs none. So if two users both have work for all
+// workers all the time, their shares differ by at most one lease each, plus errors of prediction.
+//
+// Every operation costs O(log jobs).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "coordinator/domain/job.h"
+
+namespace ls::coordinator {
+
+class FairShare {
+ public:
+  // The job has units to lease. True if it had none before. withdraw(): it has none.
+  bool offer(Job& job);
+  void withdraw(Job& job);
+  bool empty() const { return ready_ == 0; }
+
+  // Core seconds that were leased (negative: no longer leased), and core seconds that a result reported.
+  void lend(Job& job, double seconds);
+  void spend(Job& job, double seconds);
+  // Forgets users and groups that have no work and are not ahead of the clock.
+  void tidy();
+  // Call before the job's priority changes; the caller offers it again afterwards.
+  void leave(Job& job);
+  void enter(Job& job);  // with its leased seconds
+
+  // Calls visit(job, lag) for the jobs in turn until it returns true; true if some visit did. lag: how many
+  // core seconds more the job's user has had than the first user, plus how many more the job's group has had
+  // than the user's first group; infinite below the highest priority that has jobs.
+  using Visit = std::function<bool(Job&, double lag)>;
+  bool in_turn(const Visit& visit) const;
+  // The job was chosen: later arrivals start at its share.
+  void served(const Job& job);
+
+  struct Figure {
+    std::string owner;
+    std::int64_t priority;
+    double seconds, lent;
+    bool waits;  // has units to lease
+  };
+  std::vector<Figure> figures() const;
+  std::size_t kept() const;  // number of priorities, users and groups remembered
+
+ private:
+  struct Share {
+    double spent = 0, out = 0;
+    std::uint32_t at_work = 0;  // jobs that are offered or leased
+    double had() const { return spent + out; }
+  };
+  template <class T>
+  struct Turn {
+    double had;
+    JobSeq first;  // waiting job: ties are decided by order of submission
+    T* who;
+    bool operator<(const Turn& o) const { return std::tie(had, first) < std::tie(o.had, o.first); }
+  };
+  struct Group {
+    Share share;
+    std::map<JobSeq, Job*> ready;
+  };
+  struct User {
+    Share share;
+    double clock = 0;  // the share of the group served last
+    std::map<std::string, Group> groups;
+    std::set<Turn<Group>> turns;  // groups with ready jobs
+    std::set<JobSeq> ready;
+  };
+  struct Level {
+    double clock = 0;
+    std::map<std::string, User> users;
+    std::set<Turn<User>> turns;
+  };
+  struct Place {
+    Level& level;
+    User& user;
+    Group& group;
+  };
+  Place place_of(const Job& job);
+  // Applies `change` to user and group, and updates the positions of both in the order.
+  template <class Change>
+  void change(Job& job, Change&& change);
+  static std::optional<Turn<User>> turn_of(User& user);  // nullopt: it has no ready job
+  static std::optional<Turn<Group>> turn_of(Group& group);
+  template <class T>
+  static void place(std::set<Turn<T>>& turns, const std::optional<Turn<T>>& before,
+                    const std::optional<Turn<T>>& after);
+
+  std::map<std::int64_t, Level> levels_;  // by -priority
+  std::size_t ready_ = 0;
+  std::set<JobSeq> at_work_;
+};
+
+}  // namespace ls::coordinator

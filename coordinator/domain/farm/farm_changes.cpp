@@ -1,0 +1,136 @@
+// Changes by the user: samples and target error of a job.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+
+Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
+  const std::string& id = job.plan.brief.job.value;
+  if (!(target_error > 0 && std::isfinite(target_error)))
+    return ls::fail(Errc::invalid_argument, "target_error must be positive");
+  if (job.state == JobState::failed || job.state == JobState::cancelled)
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
+                                id, to_string(job.state)));
+  if (!job.plan.target_error)
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("job {} has no target error, so its tiles' errors are not kept: it can't be "
+                                "given one; extend its samples (spp), or submit it again",
+                                id));
+  if (job.stopping && job.stopping != StopReason::error)
+    return ls::fail(
+        Errc::failed_precondition,
+        fmt::format("job {} is ended by its {}: its target error can no longer be changed; extend "
+                    "its samples (spp), or submit it again",
+                    id, job.stopping == StopReason::spp ? "samples" : to_string(*job.stopping)));
+  if (job.stopping && target_error >= *job.plan.target_error)
+    return ls::fail(
+        Errc::failed_precondition,
+        fmt::format("job {} has come down to its target error of {:g}: only a smaller one makes a "
+                    "difference",
+                    id, *job.plan.target_error));
+  return {};
+}
+
+Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
+  const std::string& id = job.plan.brief.job.value;
+  if (job.state == JobState::failed || job.state == JobState::cancelled)
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
+  // The current total: if the job's end is decided, what its tiles end with, else what was requested.
+  const RoundIndex rounds = job.queue.longest();
+  const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
+  const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;
+  const bool uneven = cut_short && job.adaptive;
+  if (even_spp(spp) < now_spp || (even_spp(spp) == now_spp && !uneven))
+    return ls::fail(Errc::invalid_argument,
+                    fmt::format("job {} has {} samples per pixel already{}; ask for a larger total", id,
+                                now_spp, uneven ? " in parts of the image" : ""));
+  if (job.adaptive_running() && job.adaptive->bound())
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("parts of job {} have all of its {} samples, and its target error was judged "
+                                "with them: extend it when it is done",
+                                id, job.spp));
+  JobPlan plan = job.plan;
+  plan.spp = even_spp(spp);
+  return check_plan(plan);
+}
+
+Result<void> Farm::may_retarget(const JobId& id, double target_error) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  return State::may_retarget(*job, target_error);
+}
+
+Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  return State::may_extend(*job, spp);
+}
+
+void Farm::State::on(const JobRetargeted& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !may_retarget(*job, event.target_error)) return;
+  job->plan.target_error = event.target_error;
+  job->level_seen = 0;
+  job->predicted_at = 0;
+  if (job->stopping) {
+    job->stopping.reset();
+    job->plan_all();
+    if (job->state == JobState::done) set_state(*job, JobState::running);
+  }
+  take_up_again(*job);
+}
+
+void Farm::State::on(const JobExtended& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !may_extend(*job, event.spp)) return;
+  const RoundIndex last = round_count(job->spp) - 1;
+  const std::uint64_t new_spp = even_spp(event.spp);
+  if (cut_range(last, job->spp) != cut_range(last, new_spp)) reopen(*job, last);
+  const auto limit = job->time_limit(now);
+  const bool by_time = job->stopping == StopReason::time && (job->frozen || job->ended());
+  if (by_time || (limit && now >= *limit)) job->plan.time.reset();
+  if (job->stopping) job->plan.target_error.reset();
+  job->plan.spp = new_spp;
+  job->spp = new_spp;
+  job->stopping.reset();
+  job->frozen = false;
+  if (job->plan.target_error) job->adaptive->extend(new_spp);
+  job->steer();
+  job->plan_all();
+  if (job->state == JobState::done) set_state(*job, JobState::running);
+  take_up_again(*job);
+}
+
+void Farm::State::reopen(Job& job, RoundIndex last) {
+  for (const LeaseSeq seq : leases_of(job)) {
+    const LeaseRecord& lease = *leases.find(seq);
+    const bool concerned = std::any_of(lease.units.begin(), lease.units.end(),
+                                       [&](UnitCode unit) { return round_of(unit) >= last; });
+    if (concerned) free_lease(seq, FreedCause::round_reopened, true);
+  }
+  close_audits(job, [&](UnitCode code, const Audit&) { return round_of(code) >= last; });
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) job.queue.rewind(t, last);
+  job.units.reopen(last);
+  effects.emplace_back(ReopenRound{job.plan.brief.job, last});
+}
+
+void Farm::State::take_up_again(Job& job) {
+  work_appeared = true;
+  // Results of quarantined workers were kept while the job was ended: its image stood. Now they are void.
+  for (const auto& [worker, why] : quarantined)
+    if (const WorkerIndex faulty = workers.index_of(worker); !job.units.tiles_of(faulty).empty())
+      void_results(job, faulty);
+  if (job.adaptive) judge(job);
+  job.move_windows(workers.threads());
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  finish_if_complete(job);
+  refresh(job);
+}
+
+}  // namespace ls::coordinator

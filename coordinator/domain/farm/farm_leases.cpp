@@ -1,0 +1,180 @@
+// Leasing units and taking them back: only here do leases, holders and a worker's load change.
+#include <algorithm>
+#include <limits>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+
+void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit) {
+  LeaseRecord lease;
+  lease.seq = leases.next_seq();
+  lease.job = &job;
+  lease.worker = &worker;
+  lease.issued = now;
+  lease.audit = audit;
+  lease.remaining = static_cast<std::uint32_t>(units.size());
+  double sum = 0, longest = 0;
+  AssignLease message{{leases.id_of(lease.seq), job.plan.brief.job, {}}, std::nullopt};
+  for (const UnitCode code : units) {
+    const double cost = job.predict(code);
+    sum += cost;
+    longest = std::max(longest, cost);
+    audit ? void(job.audits.at(code).lease = lease.seq) : job.out[code].add(lease.seq);
+    message.lease.units.push_back(
+        {tile_of(code), round_of(code), job.plan.grid.rect(tile_of(code)), job.range(code)});
+  }
+  lease.units = std::move(units);
+  lease.seconds_per_unit = sum / lease.remaining;
+  lease.charge_per_unit = job.cost.known() ? lease.seconds_per_unit : kAssumedUnitSeconds;
+  lease.predicted =
+      from_seconds(std::max(longest / worker.core_share.get(), (worker.seconds_out + sum) / worker.cores()));
+  lease.deadline = now + from_seconds(kDeadlineFactor * seconds(lease.predicted)) + kDeadlineSlack +
+                   (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
+
+  if (worker.units_out == 0) worker.progress_at = now;
+  worker.units_out += lease.remaining;
+  worker.seconds_out += sum;
+  worker.leases.insert(lease.seq);
+  workers.settle(worker);
+  job.lent += lease.remaining;
+  if (!audit) load(job, worker, lease.remaining);
+  shares.lend(job, lease.remaining * lease.charge_per_unit);
+  if (worker.briefed.insert(job.seq).second) message.brief = job.plan.brief;
+  leases.add(std::move(lease));
+  effects.emplace_back(Send{worker.id, std::move(message)});
+}
+
+bool Farm::State::detach(LeaseRecord& lease, UnitCode code) {
+  Job& job = *lease.job;
+  Worker& worker = *lease.worker;
+  bool last = false;
+  if (lease.audit) {
+    job.audits.at(code).lease = 0;
+  } else {
+    const auto it = job.out.find(code);
+    it->second.remove(lease.seq);
+    last = it->second.empty();
+    if (last) job.out.erase(it);
+  }
+  --job.lent;
+  if (!lease.audit) unload(job, 1);
+  shares.lend(job, -lease.charge_per_unit);
+  --lease.remaining;
+  --worker.units_out;
+  worker.seconds_out = worker.units_out == 0 ? 0 : std::max(0.0, worker.seconds_out - lease.seconds_per_unit);
+  return last;
+}
+
+bool Farm::State::has(const LeaseRecord& lease, UnitCode code) {
+  const Job& job = *lease.job;
+  if (lease.audit) {
+    const auto audit = job.audits.find(code);
+    return audit != job.audits.end() && audit->second.lease == lease.seq;
+  }
+  const auto it = job.out.find(code);
+  return it != job.out.end() && it->second.has(lease.seq);
+}
+
+void Farm::State::load(Job& job, const Worker& worker, std::uint32_t units) {
+  const auto add = [&](Load& load) {
+    load.units += units;
+    ++load.leases_at[worker.index];
+  };
+  add(job.load);
+  if (!job.plan.owner.empty()) add(users[job.plan.owner]);
+  if (!job.plan.group.empty()) add(groups[job.plan.group]);
+}
+
+void Farm::State::unload(Job& job, std::uint32_t units) {
+  job.load.units -= units;
+  if (!job.plan.owner.empty()) users[job.plan.owner].units -= units;
+  if (!job.plan.group.empty()) groups[job.plan.group].units -= units;
+  work_appeared |= limited(job);
+}
+
+void Farm::State::leave_load(Job& job, const Worker& worker) {
+  const auto leave = [&](Load& load) {
+    const auto at = load.leases_at.find(worker.index);
+    if (--at->second == 0) load.leases_at.erase(at);
+    return load.leases_at.empty();
+  };
+  leave(job.load);
+  if (!job.plan.owner.empty() && leave(users[job.plan.owner])) users.erase(job.plan.owner);
+  if (!job.plan.group.empty() && leave(groups[job.plan.group])) groups.erase(job.plan.group);
+}
+
+std::uint32_t tighter(std::uint32_t a, std::uint32_t b) { return a == 0 || b == 0 ? a + b : std::min(a, b); }
+
+bool Farm::State::limited(const Job& job) const {
+  const ShareLimits& l = options.limits;
+  return job.plan.max_units != 0 || job.plan.max_workers != 0 || l.units_per_job != 0 ||
+         l.workers_per_job != 0 ||
+         (!job.plan.owner.empty() && (l.units_per_user != 0 || l.workers_per_user != 0));
+}
+
+std::uint32_t Farm::State::room(const Job& job, const Worker& worker) const {
+  std::uint32_t room = std::numeric_limits<std::uint32_t>::max();
+  if (!limited(job)) return room;
+  const auto narrow = [&](const Load& load, std::uint32_t units, std::uint32_t workers_most) {
+    if (units != 0) room = std::min(room, units - std::min(units, load.units));
+    if (workers_most != 0 && load.leases_at.size() >= workers_most && !load.leases_at.contains(worker.index))
+      room = 0;
+  };
+  const ShareLimits& l = options.limits;
+  const auto group = groups.find(job.plan.group);
+  narrow(group != groups.end() ? group->second : job.load, tighter(job.plan.max_units, l.units_per_job),
+         tighter(job.plan.max_workers, l.workers_per_job));
+  if (job.plan.owner.empty()) return room;
+  const auto user = users.find(job.plan.owner);
+  narrow(user != users.end() ? user->second : Load{}, l.units_per_user, l.workers_per_user);
+  return room;
+}
+
+void Farm::State::settle_unit(Job& job, UnitCode code, const Worker* by) {
+  const auto it = job.out.find(code);
+  if (it == job.out.end()) return job.queue.forget(code);
+  const Holders holders = it->second;
+  for (const LeaseSeq seq : holders.lease) {
+    LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
+    if (lease == nullptr) continue;
+    if (lease->worker != by) job.voters.note(code, lease->worker->index);
+    detach(*lease, code);
+    touch(*lease->worker);
+    if (lease->remaining == 0) close(*lease, lease->worker != by);
+  }
+}
+
+void Farm::State::free_lease(LeaseSeq seq, FreedCause why, bool send_worker) {
+  if (LeaseRecord* lease = leases.find(seq))
+    free_units(*lease, why, send_worker, [](UnitCode) { return true; });
+}
+
+void Farm::State::close(LeaseRecord& lease, bool send_worker) {
+  Worker& worker = *lease.worker;
+  worker.leases.erase(lease.seq);
+  if (!lease.audit) leave_load(*lease.job, worker);
+  if (send_worker && worker.connected)
+    effects.emplace_back(Send{worker.id, CancelLease{leases.id_of(lease.seq)}});
+  touch(worker);
+  leases.erase(lease.seq);
+}
+
+std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
+  std::vector<LeaseSeq> found;
+  for (const auto& [seq, lease] : leases.all()) {
+    if (lease.job == &job) found.push_back(seq);
+  }
+  return found;
+}
+
+void Farm::State::renew(LeaseRecord& lease) {
+  const Worker& worker = *lease.worker;
+  const double left = std::max(lease.seconds_per_unit / worker.core_share.get(), worker.seconds_until_free());
+  const bool warm = worker.warmed_up.contains(lease.job->seq);
+  const TimePoint deadline = now + from_seconds(kDeadlineFactor * left) + kDeadlineSlack +
+                             (warm ? Duration{} : Duration{kLoadSlack});
+  leases.renew(lease, std::max(lease.deadline, deadline));
+}
+
+}  // namespace ls::coordinator

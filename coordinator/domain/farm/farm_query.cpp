@@ -1,0 +1,223 @@
+// Read-only queries.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+
+namespace {
+
+std::string in_words(std::uint64_t bytes) {
+  const double mebibytes = static_cast<double>(bytes) / (1 << 20);
+  return mebibytes < 1000 ? fmt::format("{:.0f} MiB", std::ceil(mebibytes))
+                          : fmt::format("{:.1f} GiB", mebibytes / 1024);
+}
+
+}  // namespace
+
+Result<void> check_plan(const JobPlan& plan) {
+  const TileGrid& grid = plan.grid;
+  if (plan.brief.job.empty()) return fail(Errc::invalid_argument, "a job needs an id");
+  if (grid.frame.width <= 0 || grid.frame.height <= 0 || grid.tile <= 0) {
+    return fail(Errc::invalid_argument, fmt::format("the frame of {} x {} in tiles of {} has no pixels",
+                                                    grid.frame.width, grid.frame.height, grid.tile));
+  }
+  const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
+  const std::uint64_t spp = plan.spp.value_or(kMaxSppWithoutLimit);
+  // Check the samples first: then the number of rounds fits 32 bits.
+  if (tiles > kMaxTiles || spp > kMaxUnits * 64 || tiles * round_count(spp) > kMaxUnits) {
+    return fail(Errc::invalid_argument,
+                fmt::format("{} tiles at {} spp are more than {} units; use larger tiles or fewer samples",
+                            tiles, spp, kMaxUnits));
+  }
+  if (plan.target_error && !(*plan.target_error > 0 && std::isfinite(*plan.target_error))) {
+    return fail(Errc::invalid_argument, "target_error must be positive");
+  }
+  if (plan.time && !(*plan.time > 0 && *plan.time < 1e9)) {
+    return fail(Errc::invalid_argument, "time must be positive, in seconds");
+  }
+  return {};
+}
+
+Wanted Farm::wanted(const UnitKey& unit) const {
+  const Job* job = state_->find(unit.job);
+  const auto no = [](std::string why) { return Wanted{.why = std::move(why)}; };
+  if (job == nullptr) return no("no such job");
+  if (job->state == JobState::failed || job->state == JobState::cancelled) return no("the job has ended");
+  const UnitCode code = unit_code(unit.round, unit.tile);
+  if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return no("not a unit of this job");
+  const auto verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;
+  return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class, ""};
+}
+
+std::vector<JobId> Farm::jobs() const {
+  std::vector<JobId> ids;
+  for (const auto& [seq, job] : state_->jobs) ids.push_back(job->plan.brief.job);
+  return ids;
+}
+
+std::optional<JobPlan> Farm::plan(const JobId& id) const {
+  const Job* job = state_->find(id);
+  return job == nullptr ? std::nullopt : std::optional(job->plan);
+}
+
+std::optional<JobFigures> Farm::job(const JobId& id) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr) return std::nullopt;
+  JobFigures f;
+  f.state = job->state;
+  if (job->state == JobState::done) f.stopped = job->stopping;
+  f.spp = job->spp;
+  f.units_total = job->queue.planned();
+  f.units_done = job->units.accepted_count();
+  f.units_leased = job->out.size();
+  f.units_queued = job->queued();
+  f.units_folded = job->units.folded_count();
+  f.rounds_complete = job->units.rounds_complete();
+  f.priority = job->plan.priority;
+  f.seconds_per_sample = job->cost.per_sample();
+  // A complete round covers every pixel; rounds in progress count by their share of units.
+  const RoundIndex rounds = job->queue.longest();
+  const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
+  const double left = static_cast<double>(job->units.tiles());
+  const auto samples_of_last = [&](std::uint64_t undone) {  // the missing units belong to the last rounds
+    double samples = 0;
+    for (RoundIndex r = rounds; undone > 0 && r-- > 0;) {
+      const std::uint64_t units = std::min<std::uint64_t>(undone, job->units.tiles());
+      samples +=
+          static_cast<double>(units) / left * pixels * static_cast<double>(cut_range(r, job->spp).count());
+      undone -= units;
+    }
+    return samples;
+  };
+  if (!job->ended()) {
+    const double planned = samples_of_last(f.units_total - f.units_done);
+    f.core_seconds_left = (job->adaptive_running() ? job->adaptive->samples_left().value_or(0) : planned) *
+                          f.seconds_per_sample;
+    f.core_seconds_to_limit =
+        (job->adaptive_running() ? job->adaptive->samples_to_limit() : planned) * f.seconds_per_sample;
+    f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
+  }
+  for (const auto& [index, leases] : job->load.leases_at) {
+    const Worker& w = *state_->workers.all().at(index);
+    f.cores += w.cores() * static_cast<double>(leases) /
+               static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
+  }
+  f.first_ray = job->first_ray;
+  f.numeric_class = job->numeric_class;
+  return f;
+}
+
+std::vector<WorkerId> Farm::workers() const {
+  std::vector<WorkerId> ids;
+  for (const auto& [index, worker] : state_->workers.all()) ids.push_back(worker->id);
+  return ids;
+}
+
+std::optional<WorkerFigures> Farm::worker(const WorkerId& id) const {
+  const Worker* worker = std::as_const(state_->workers).find(id);
+  if (worker == nullptr) return std::nullopt;
+  WorkerFigures f{worker->state(),   worker->threads,    static_cast<std::uint32_t>(worker->leases.size()),
+                  worker->units_out, worker->units_done, {}};
+  if (!worker->leases.empty()) f.job = state_->leases.find(*worker->leases.begin())->job->plan.brief.job;
+  return f;
+}
+
+std::optional<TileFigures> Farm::tile(const JobId& id, TileIndex tile) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr || tile >= job->units.tiles()) return std::nullopt;
+  const RoundIndex rounds = job->units.folded(tile);
+  return TileFigures{rounds, rounds == 0 ? 0 : cut_range(rounds - 1, job->spp).s1};
+}
+
+std::vector<WorkerId> Farm::tile_workers(const JobId& id, TileIndex tile) const {
+  std::vector<WorkerId> found;
+  const Job* job = state_->find(id);
+  if (job == nullptr) return found;
+  for (const auto& [code, holders] : job->out) {
+    if (tile_of(code) != tile) continue;
+    for (const LeaseSeq seq : holders.lease) {
+      if (seq == 0) continue;
+      const WorkerId& worker = state_->leases.find(seq)->worker->id;
+      if (std::find(found.begin(), found.end(), worker) == found.end()) found.push_back(worker);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::string Farm::why_waiting(const JobId& id) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr || !job->leasable()) return "";
+  std::string reasons;
+  std::uint32_t named = 0, connected = 0;
+  for (const auto& [index, worker] : state_->workers.all()) {
+    if (!worker->connected) continue;
+    ++connected;
+    std::string why;
+    if (job->numeric_class && *job->numeric_class != worker->numeric_class)
+      why = "is of another numeric class";
+    else if (worker->quarantined)
+      why = "is barred, since it rendered wrong pixels";
+    else if (worker->memory_bytes != 0 && job->plan.memory_bytes > worker->memory_bytes)
+      why = fmt::format("has {} of memory and the job needs at least {}", in_words(worker->memory_bytes),
+                        in_words(job->plan.memory_bytes));
+    else if (!fits(*job, *worker))
+      why = "lacks a tag that the job asks for";
+    else if (worker->unhealthy_since)
+      why = "is sick";
+    else if (worker->blocked(job->seq, state_->ticked))
+      why = "failed too many of its units";
+    else if (worker->draining)
+      why = "drains";
+    else if (worker->pause != Pause::none)
+      why = "does not answer";
+    else
+      return "";
+    if (++named <= kMaxNamedWorkers)
+      reasons += fmt::format("{}{} {}", named > 1 ? "; " : "", worker->name, why);
+  }
+  if (connected == 0) return "no worker is connected";
+  if (named > kMaxNamedWorkers) reasons += fmt::format("; and {} more", named - kMaxNamedWorkers);
+  return reasons;
+}
+
+std::vector<Farm::Shares> Farm::shares() const {
+  std::vector<Shares> all;
+  for (const auto& f : state_->shares.figures())
+    all.push_back({f.owner, static_cast<int>(f.priority), f.seconds});
+  return all;
+}
+
+AuditFigures Farm::audits() const { return state_->audited; }
+std::vector<JobRestored::Audit> Farm::open_audits(const JobId& id) const {
+  std::vector<JobRestored::Audit> open;
+  const Job* job = state_->find(id);
+  if (job == nullptr) return open;
+  for (const auto& [code, audit] : job->audits) {
+    open.push_back({tile_of(code), round_of(code), std::nullopt});
+    if (audit.second)
+      open.back().second = {state_->workers.name_of(audit.second->first), audit.second->second};
+  }
+  return open;
+}
+
+std::vector<JobId> Farm::take_changed_audits() {
+  std::vector<JobId> changed(state_->audits_changed.begin(), state_->audits_changed.end());
+  state_->audits_changed.clear();
+  return changed;
+}
+
+bool Farm::quarantined(const WorkerId& worker) const { return state_->quarantined.contains(worker); }
+bool Farm::may_pin(const JobId& id, const WorkerId& worker) const {
+  const Job* job = state_->find(id);
+  const Worker* known = std::as_const(state_->workers).find(worker);
+  return job != nullptr && known != nullptr && state_->may_pin(*job, *known);
+}
+
+double Farm::cores_connected() const { return state_->workers.cores(); }
+int Farm::workers_connected() const { return state_->workers.connected(); }
+
+}  // namespace ls::coordinator

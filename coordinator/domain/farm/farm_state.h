@@ -1,0 +1,197 @@
+// The state of the farm. Handlers are grouped by subject into farm_jobs, farm_changes, farm_workers,
+// farm_units, farm_leases, schedule, farm_stop and farm_trust.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "coordinator/domain/fair_share.h"
+#include "coordinator/domain/farm/farm.h"
+#include "coordinator/domain/lease_table.h"
+
+namespace ls::coordinator {
+
+// The smaller of two limits, where 0 means no limit
+std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
+
+struct Farm::State {
+  explicit State(Options given) : options(std::move(given)), leases(options.lease_prefix) {}
+
+  const Options options;
+  LeaseTable leases;
+  WorkerTable workers;
+  std::map<JobSeq, std::unique_ptr<Job>> jobs;
+  std::unordered_map<JobId, Job*> by_id;
+  JobSeq last_job = 0;
+  FairShare shares;                    // the jobs with units to lease, and their order
+  std::map<std::string, Load> users;   // by owner; without the administrator
+  std::map<std::string, Load> groups;  // by group
+  std::map<WorkerId, std::string> quarantined;
+  AuditFigures audited;
+  std::set<JobId> audits_changed;
+
+  // State of the event being handled
+  TimePoint now{};
+  TimePoint ticked{};  // time of the last Tick: blocks are forgiven at ticks, when all workers are checked
+  std::vector<Effect> effects;
+  bool work_appeared = false;   // there may be new units for any worker
+  std::set<WorkerIndex> dirty;  // workers that may want more work
+
+  // farm_jobs.cpp, farm_changes.cpp
+  void on(const JobSubmitted& event);
+  void on(const JobRestored& event);
+  void on(const JobCancelled& event);
+  void on(const JobPaused& event);
+  void on(const JobResumed& event);
+  void on(const JobStopped& event);
+  void on(const JobPriority& event);
+  void on(const JobRetargeted& event);
+  void on(const JobExtended& event);
+  void on(const JobForgotten& event);
+  static Result<void> may_retarget(const Job& job, double target_error);
+  static Result<void> may_extend(const Job& job, std::uint64_t spp);
+  void reopen(Job& job, RoundIndex last);  // renders the truncated last round again in full
+  void take_up_again(Job& job);            // resumes a job that had an end, with a new one
+  Job* find(const JobId& id) const;
+  Job& add(JobPlan plan);
+  void set_state(Job& job, JobState to);
+  void refresh(Job& job);  // offers or withdraws the job; call after any change of its queue, state or window
+  void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
+  void freeze(Job& job, StopReason reason);
+  void finish_if_complete(Job& job);
+  void fail(Job& job, std::string error, std::optional<UnitFailure> failure);
+  void end(Job& job);  // takes back all leases of a job that has ended
+
+  // farm_workers.cpp
+  void on(const WorkerJoined& event);
+  void on(const WorkerQuarantined& event);
+  void on(const WorkerLost& event);
+  void on(const WorkerDrains& event);
+  void on(const LeaseProgress& event);
+  void on(const ResultsWait& event);
+  void on(const LeaseCameBack& event);
+  void on(const Tick& event);
+  void lose(Worker& worker, FreedCause why);
+  void touch(Worker& worker);
+  void note_progress(Worker& worker);  // the worker has finished a unit
+  void expire_leases();
+  void forgive_and_forget();
+  void forget_names();  // of workers that are gone and that no job refers to
+
+  // farm_units.cpp
+  void on(const UnitAccepted& event);
+  void on(const UnitFolded& event);
+  void on(const UnitFailed& event);
+  void charge(Job& job, double cpu_seconds);  // to its owner's share
+  void issue_folds(Job& job, TileIndex tile);
+  void checkpoint(Job& job, RoundIndex round);
+
+  // farm_trust.cpp: audits and faulty workers
+  void compare(Job& job, UnitCode code, const UnitAccepted& event);  // with the accepted result
+  void restore_audits(Job& job, const JobRestored& event);
+  void consider_audit(Job& job, UnitCode code, WorkerIndex first);
+  // The audit that this worker may do; nullopt if there is none.
+  std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
+  bool audit_from(Job& job, Worker& worker);
+  // True if the worker's result of this unit counts as a vote.
+  bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;
+  void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
+  void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
+  void claimed(Job& job, UnitCode code, const UnitAccepted& by);
+  void undecided(Job& job, UnitCode code);
+  enum class Deciders { none, away, there };
+  Deciders deciders(const Job& job, const Audit& audit) const;
+  void settle_audits(Job& job);  // drops or decides the audits that no worker can do
+  void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
+  void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
+  void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
+  void bar(const WorkerId& id, const std::string& why);  // the worker is in `quarantined` already
+  void void_results(Job& job, WorkerIndex faulty);
+  void void_tile(Job& job, TileIndex tile);
+  static void steer_anew(Job& job);
+
+  // farm_stop.cpp
+
+  // Passes the error of a folded round to the stop rule and acts on its decision.
+  void steer(Job& job, TileIndex tile, RoundIndex round);
+  void judge(Job& job);  // at every level that all groups have reached
+  void mark_level(Job& job, bool last);
+  void take_marks(Job& job);  // emits checkpoints for the marks that are folded
+  void stop_at_level(Job& job);
+  // Shortly before the time limit: decides the last round of each tile from measured unit costs.
+  void plan_end(Job& job, TimePoint limit);
+  void give_back_beyond(Job& job);  // takes back units leased beyond the tiles' ends
+  // The lease under which the worker holds the unit; null: none
+  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
+  void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
+
+  // farm_leases.cpp
+  void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
+  void load(Job& job, const Worker& worker, std::uint32_t units);
+  void unload(Job& job, std::uint32_t units);
+  void leave_load(Job& job, const Worker& worker);  // one lease less
+  // Number of the job's units that the limits still allow the worker. Audits are exempt: the farm orders
+  // them, not the user, and an audit that waited for the user's other work would delay the end of a finished
+  // job.
+  std::uint32_t room(const Job& job, const Worker& worker) const;
+  bool limited(const Job& job) const;
+  static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
+  // Removes the unit from the lease without queueing it. True if no other lease holds it.
+  bool detach(LeaseRecord& lease, UnitCode code);
+  // Removes the unit from all leases because its result arrived (from `by`).
+  void settle_unit(Job& job, UnitCode code, const Worker* by);
+  // Queues the lease's units for which `which` is true again; an empty lease ends.
+  template <class Which>
+  void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
+  void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
+  void close(LeaseRecord& lease, bool send_worker);
+  std::vector<LeaseSeq> leases_of(const Job& job) const;
+  void renew(LeaseRecord& lease);
+
+  // schedule.cpp
+  void dispatch();
+  void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
+  bool assign(Worker& worker, bool only_held);
+  Job* choose(const Worker& worker);  // the next job for this worker
+  enum class Takes { nothing, later, now };
+  Takes takes(Job& job, const Worker& worker);
+  bool may_pin(const Job& job, const Worker& worker) const;
+  bool lease_from(Job& job, Worker& worker);
+  std::optional<UnitCode> next_for(Job& job, const Worker& worker);
+  // True if a speculative unit should wait: the worker, with `units` and `cost` more than it holds, is not
+  // nearly idle.
+  bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
+  bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
+  // At a job's tail: moves units that wait behind other work of their worker to an idle one. True if units
+  // were queued again.
+  bool take_back_for_idle();
+  bool untouched(const LeaseRecord& lease) const;  // its worker is busy with earlier leases
+  double waits_behind_others(const LeaseRecord& lease) const;
+  LeaseRecord* longest_waiting_for(const Worker& idle);
+  void copy_overdue(Worker& worker);  // speculative copies at the tail
+};
+
+template <class Which>
+void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which) {
+  Job& job = *lease.job;
+  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why};
+  for (const UnitCode code : lease.units) {
+    if (!has(lease, code) || !which(code)) continue;
+    if (!lease.audit) freed.units.push_back(job.key(code));
+    if (!lease.audit) job.voters.note(code, lease.worker->index);
+    work_appeared |= lease.audit;
+    if (!detach(lease, code)) continue;
+    job.queue.put_back(code);
+    work_appeared = true;
+  }
+  if (!freed.units.empty()) effects.emplace_back(std::move(freed));
+  if (lease.remaining == 0) close(lease, send_worker);
+  refresh(job);
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,112 @@
+// Stopping by target error (feeds the stop rule, judges its levels, takes their checkpoints) and by time
+// limit.
+#include <algorithm>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+
+void Farm::State::steer(Job& job, TileIndex tile, RoundIndex round) {
+  AdaptiveStop& rule = *job.adaptive;
+  const std::uint64_t seen = rule.rounds_seen();
+  rule.folded(tile, round, job.units.error(round, tile));
+  for (LevelMark& mark : job.marks) mark.missing -= mark.rounds[tile] == round + 1;
+  take_marks(job);
+  if (rule.rounds_seen() == seen || !job.adaptive_running()) return;
+  for (const TileIndex t : rule.neighbours(tile)) {
+    issue_folds(job, t);
+    job.move_window(t, workers.threads());
+  }
+  judge(job);
+  if (rule.rounds_seen() >= job.predicted_at + rule.groups() / 2) job.move_windows(workers.threads());
+  refresh(job);
+}
+
+void Farm::State::judge(Job& job) {
+  AdaptiveStop& rule = *job.adaptive;
+  bool lower = false;
+  while (job.adaptive_running() && rule.settled() && rule.level() != job.level_seen) {
+    const auto verdict = rule.exhausted() ? AdaptiveStop::Verdict::no : rule.judge(*job.plan.target_error);
+    if (verdict == AdaptiveStop::Verdict::unknown) break;
+    job.level_seen = rule.level();
+    mark_level(job, verdict == AdaptiveStop::Verdict::yes || rule.exhausted());
+    if (rule.exhausted()) break;
+    if (verdict == AdaptiveStop::Verdict::yes) return stop_at_level(job);
+    rule.lower();
+    lower = true;
+  }
+  if (!lower) return;
+  job.move_windows(workers.threads());
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+}
+
+void Farm::State::mark_level(Job& job, bool last) {
+  const double spp = job.adaptive->mean_spp();
+  if (!(spp >= job.marked_spp * (last ? 1 : kCheckpointGrowth)) || spp == job.marked_spp) return;
+  LevelMark mark{job.adaptive->ends(), spp, 0};
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) mark.missing += job.units.folded(t) < mark.rounds[t];
+  job.marked_spp = spp;
+  job.marks.push_back(std::move(mark));
+  take_marks(job);
+}
+
+void Farm::State::take_marks(Job& job) {
+  while (!job.marks.empty() && job.marks.front().missing == 0) {
+    LevelMark& mark = job.marks.front();
+    effects.emplace_back(Checkpoint{job.plan.brief.job, std::move(mark.rounds), mark.spp});
+    job.marks.pop_front();
+  }
+}
+
+void Farm::State::stop_at_level(Job& job) {
+  // Folds issued so far cannot be taken back: they may be more than the level needs if the target was raised.
+  std::vector<RoundIndex> ends = job.adaptive->ends();
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
+  job.cut_off(ends, StopReason::error);
+  give_back_beyond(job);
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+}
+
+// Decides which units are still rendered before the time limit. Units wait in the order of rounds; as many
+// are kept as their predicted cost fits into the time of all cores that leased units leave. A unit is kept if
+// at least half of it fits, so the job ends as often before the limit as after it. Leased units stay leased,
+// however long they take: dropping slow units would bias the image. Repeated until the limit, since
+// predictions improve.
+void Farm::State::plan_end(Job& job, TimePoint limit) {
+  if (job.adaptive_running() || !job.cost.known()) return;
+  if (job.stopping == StopReason::time) {
+    job.stopping.reset();
+    job.plan_all();
+  }
+  double cores = 0;
+  for (const auto& [index, worker] : workers.all())
+    cores += worker->available() && fits(job, *worker) ? worker->cores() : 0;
+  double room = seconds(limit - now) * cores;
+  for (const auto& [code, holders] : job.out) room -= job.predict(code);
+  std::vector<RoundIndex> ends(job.units.tiles());
+  RoundIndex round = job.queue.longest();
+  for (TileIndex t = 0; t < ends.size(); ++t) {
+    ends[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
+    round = std::min(round, ends[t]);
+  }
+  for (const RoundIndex last = job.queue.longest(); round < last && room > 0; ++round) {
+    for (TileIndex t = 0; t < ends.size() && room > 0; ++t) {
+      if (ends[t] != round || round >= job.queue.end(t)) continue;
+      const double cost = job.predict(unit_code(round, t));
+      if (2 * room >= cost) ends[t] = round + 1;
+      room -= cost;
+    }
+  }
+  job.cut_off(ends, StopReason::time);
+  finish_if_complete(job);
+  refresh(job);
+}
+
+void Farm::State::give_back_beyond(Job& job) {
+  for (const LeaseSeq seq : leases_of(job))
+    free_units(*leases.find(seq), FreedCause::not_wanted, true,
+               [&](UnitCode code) { return !job.queue.plans(code); });
+  close_audits(job, [&](UnitCode code, const Audit&) { return !job.queue.plans(code); });
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,310 @@
+// Audits: detection of faulty workers. A random share of the results is rendered again by another worker;
+// copies of slow units are compared, too. Only workers that held a lease on a unit may vote on it
+// (voter_table.h). If two results of a unit differ, a third worker decides, and the outvoted one is
+// quarantined: every tile that it has contributed to, in any running job, is folded again from round 0.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+namespace {
+
+// A pseudo-random 64-bit number (splitmix64, Steele et al. 2014).
+std::uint64_t mixed(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+}  // namespace
+
+Farm::State::Deciders Farm::State::deciders(const Job& job, const Audit& audit) const {
+  Deciders found = Deciders::none;
+  for (const auto& [index, worker] : workers.all()) {
+    if (!worker->connected || worker->draining || worker->unhealthy_since || !audit.asks(index) ||
+        !fits(job, *worker) || worker->blocked(job.seq, ticked))
+      continue;
+    if (worker->available()) return Deciders::there;
+    found = Deciders::away;
+  }
+  return found;
+}
+
+void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
+  const double draw = static_cast<double>(mixed(mixed(options.audit_seed ^ job.seq) ^ code) >> 11) * 0x1p-53;
+  if (!(draw < options.audit_rate) || job.audits.size() >= kMaxAuditsOpen) return;
+  Audit audit;
+  audit.first = first;
+  if (deciders(job, audit) != Deciders::there) {
+    ++job.audits_missed;
+    ++audited.missed;
+    return;
+  }
+  job.audits.emplace(code, std::move(audit));
+  ++audited.asked;
+  audits_changed.insert(job.plan.brief.job);
+  work_appeared = true;
+}
+
+// Audits that were open at the restart continue. No worker is connected yet, so workers get some time to come
+// back.
+void Farm::State::restore_audits(Job& job, const JobRestored& event) {
+  for (const JobRestored::Audit& open : event.audits) {
+    const UnitCode code = unit_code(open.round, open.tile);
+    if (open.tile >= job.units.tiles() || !job.queue.plans(code) || !job.units.accepted(code)) continue;
+    if (job.audits.size() >= kMaxAuditsOpen || (open.second && quarantined.contains(open.second->first)))
+      continue;
+    Audit audit;
+    audit.first = job.units.find(code)->worker;
+    audit.since = now;
+    audit.restored = true;
+    if (open.second) audit.second = {workers.index_of(open.second->first), open.second->second};
+    audited.asked += job.audits.emplace(code, std::move(audit)).second;
+  }
+  audits_changed.insert(job.plan.brief.job);
+}
+
+std::optional<UnitCode> Farm::State::audit_for(const Job& job, const Worker& worker) const {
+  for (const auto& [code, audit] : job.audits)
+    if (audit.lease == 0 && audit.asks(worker.index)) return code;
+  return std::nullopt;
+}
+
+bool Farm::State::audit_from(Job& job, Worker& worker) {
+  const auto code = audit_for(job, worker);
+  if (!code) return false;
+  grant(job, worker, {*code}, true);
+  refresh(job);
+  return true;
+}
+
+void Farm::State::close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which) {
+  std::vector<UnitCode> closed;
+  for (const auto& [code, audit] : job.audits)
+    if (which(code, audit)) closed.push_back(code);
+  if (!closed.empty()) audits_changed.insert(job.plan.brief.job);
+  for (const UnitCode code : closed) {
+    free_lease(job.audits.at(code).lease, FreedCause::not_wanted, true);
+    job.audits.erase(code);
+    ++audited.dropped;
+  }
+}
+
+void Farm::State::settle_audits(Job& job) {
+  std::vector<UnitCode> stuck;
+  for (const auto& [code, audit] : job.audits) {
+    if (audit.lease != 0) continue;
+    const Deciders who = deciders(job, audit);
+    const Duration patience = audit.second ? kNoGrowthLimit : kAuditAfterRestart;
+    const bool patient =
+        (audit.restored || (audit.second && who == Deciders::away)) && now - audit.since < patience;
+    if (who != Deciders::there && !patient) stuck.push_back(code);
+  }
+  for (const UnitCode code : stuck) {
+    if (job.audits.at(code).second) return undecided(job, code);
+    job.audits.erase(code);
+    audits_changed.insert(job.plan.brief.job);
+    ++audited.dropped;
+  }
+  finish_if_complete(job);
+  refresh(job);
+}
+
+void Farm::State::audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease) {
+  free_lease(lease.seq, FreedCause::failed, false);
+  job.audits.at(code).tried.push_back(worker.index);
+  settle_audits(job);
+}
+
+bool Farm::State::was_asked(const Job& job, UnitCode code, WorkerIndex worker) const {
+  if (job.voters.has(code, worker)) return true;
+  const auto audit = job.audits.find(code);
+  if (audit == job.audits.end() || audit->second.lease == 0) return false;
+  return leases.all().at(audit->second.lease).worker->index == worker;
+}
+
+void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
+  const UnitTable::Result first = *job.units.find(code);
+  const bool asked = was_asked(job, code, workers.index_of(event.worker));
+  const auto audit = job.audits.find(code);
+  if (audit != job.audits.end() && audit->second.lease != 0) {
+    LeaseRecord* lease = leases.find(audit->second.lease);
+    if (lease->worker->id == event.worker) {
+      charge(job, event.cpu_seconds);
+      detach(*lease, code);
+      close(*lease, false);
+    }
+  }
+  const bool equal = first.digest == event.digest || first.digest == Digest{};
+  if (equal)
+    effects.emplace_back(DropDuplicate{event.unit, event.worker});
+  else
+    effects.emplace_back(
+        DigestMismatch{event.unit, first.digest, event.digest, workers.name_of(first.worker), event.worker});
+  if (job.ended()) return;
+  equal ? agreed(job, code, event, asked) : disagreed(job, code, event, asked);
+}
+
+namespace {
+std::string contradiction(const UnitAccepted& now, const Digest& before) {
+  return fmt::format("it rendered tile {} round {} of job {} first to {}, then to {}", now.unit.tile,
+                     now.unit.round, now.unit.job.value, before.hex(), now.digest.hex());
+}
+std::string outvoted(const UnitKey& unit, const Digest& said, const WorkerId& one, const WorkerId& other,
+                     const Digest& agreed) {
+  return fmt::format("it rendered tile {} round {} of job {} to {}; {} and {} both rendered it to {}",
+                     unit.tile, unit.round, unit.job.value, said.hex(), one.value, other.value, agreed.hex());
+}
+}  // namespace
+
+void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked) {
+  const auto found = job.audits.find(code);
+  const UnitTable::Result first = *job.units.find(code);
+  const WorkerIndex by = workers.index_of(with.worker);
+  if (found == job.audits.end() || by == first.worker) return;
+  const Audit audit = found->second;
+  // The worker has delivered another digest before.
+  for (const auto& before : {audit.second, audit.claim})
+    if (before && by == before->first)
+      return found_faulty(with.unit, by, contradiction(with, before->second));
+  if (!asked) return;
+  free_lease(audit.lease, FreedCause::not_wanted, true);
+  job.audits.erase(code);
+  audits_changed.insert(job.plan.brief.job);
+  if (!audit.second) ++audited.equal;
+  for (const auto& alone : {audit.second, audit.claim})
+    if (alone)
+      found_faulty(
+          with.unit, alone->first,
+          outvoted(with.unit, alone->second, workers.name_of(first.worker), with.worker, with.digest));
+  finish_if_complete(job);
+  refresh(job);
+}
+
+void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked) {
+  const UnitTable::Result first = *job.units.find(code);
+  const WorkerIndex by = workers.index_of(with.worker);
+  if (by == first.worker) return found_faulty(with.unit, by, contradiction(with, first.digest));
+  if (const auto found = job.audits.find(code); found != job.audits.end()) {
+    const auto second = found->second.second;
+    if (second && by == second->first) {
+      if (second->second != with.digest) found_faulty(with.unit, by, contradiction(with, second->second));
+      return;
+    }
+  }
+  if (!asked) return claimed(job, code, with);
+  Audit& audit = job.audits[code];
+  audit.first = first.worker;
+  audits_changed.insert(job.plan.brief.job);
+  if (!audit.second) {
+    ++audited.differ;
+    audit.second = {by, with.digest};
+    audit.since = now;
+    work_appeared = true;
+    if (deciders(job, audit) == Deciders::none) return undecided(job, code);
+    return refresh(job);
+  }
+  const auto [second, said] = *audit.second;
+  if (with.digest != said) return undecided(job, code);
+  found_faulty(with.unit, first.worker,
+               outvoted(with.unit, first.digest, workers.name_of(second), with.worker, said));
+}
+
+// A worker that delivers a differing result without having been asked has chosen the unit itself, so its
+// result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the
+// claimant is faulty.
+void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
+  const std::pair said{workers.index_of(by.worker), by.digest};
+  if (const auto open = job.audits.find(code); open != job.audits.end()) {
+    if (!open->second.claim) open->second.claim = said;
+    return;
+  }
+  Audit audit;
+  audit.first = job.units.find(code)->worker;
+  audit.claim = said;
+  if (job.audits.size() >= kMaxAuditsOpen || deciders(job, audit) != Deciders::there) return;
+  job.audits.emplace(code, std::move(audit));
+  audits_changed.insert(job.plan.brief.job);
+  ++audited.asked;
+  work_appeared = true;
+  refresh(job);
+}
+
+void Farm::State::undecided(Job& job, UnitCode code) {
+  const UnitTable::Result first = *job.units.find(code);
+  const auto second = *job.audits.at(code).second;
+  fail(job,
+       fmt::format(
+           "two workers rendered tile {} round {} to different bits though they are of one numeric "
+           "class: {} to {}, {} to {}, and no third one agrees with either. One of them has bad memory or "
+           "is not what it says: let each render the scene alone with `lightshaft render`, take the one "
+           "whose pixels_sha256 is not the others' off the farm, and submit the job again",
+           tile_of(code), round_of(code), workers.name_of(first.worker).value, first.digest.hex(),
+           workers.name_of(second.first).value, second.second.hex()),
+       std::nullopt);
+}
+
+void Farm::State::found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence) {
+  const WorkerId id = workers.name_of(faulty);
+  if (!quarantined.try_emplace(id, evidence).second) return;
+  ++audited.workers_quarantined;
+  effects.emplace_back(WorkerFoundFaulty{id, unit, evidence});
+  bar(id, evidence);
+}
+
+void Farm::State::bar(const WorkerId& id, const std::string& why) {
+  if (Worker* worker = workers.find(id)) {
+    workers.quarantine(*worker);
+    while (!worker->leases.empty()) free_lease(*worker->leases.begin(), FreedCause::worker_quarantined, true);
+    workers.settle(*worker);
+    effects.emplace_back(WorkerStateChanged{id, worker->state(), "barred: " + why});
+  }
+  const WorkerIndex faulty = workers.index_of(id);
+  for (const auto& [seq, job] : jobs)
+    if (!job->ended()) void_results(*job, faulty);
+  work_appeared = true;
+}
+
+void Farm::State::void_results(Job& job, WorkerIndex faulty) {
+  std::vector<TileIndex> tiles = job.units.tiles_of(faulty);
+  // In an adaptive job one tile's errors affect where all others end.
+  const bool by_error = job.adaptive && (!job.stopping || *job.stopping == StopReason::error);
+  if (!tiles.empty() && by_error) {
+    tiles.resize(job.units.tiles());
+    for (TileIndex t = 0; t < tiles.size(); ++t) tiles[t] = t;
+    job.stopping.reset();
+    job.plan_all();
+  }
+  close_audits(job, [&](UnitCode code, const Audit& audit) {
+    return std::binary_search(tiles.begin(), tiles.end(), tile_of(code)) ||
+           (audit.second && audit.second->first == faulty);
+  });
+  for (auto& [code, audit] : job.audits)
+    if (audit.claim && audit.claim->first == faulty) audit.claim.reset();
+  for (const TileIndex tile : tiles) void_tile(job, tile);
+  if (!tiles.empty()) job.checkpoint_spp = 0;  // earlier checkpoints were of an image with wrong pixels
+  if (!tiles.empty() && job.adaptive) steer_anew(job);
+  if (!tiles.empty()) job.move_windows(workers.threads());
+  finish_if_complete(job);
+  refresh(job);
+}
+
+// Rebuilds the stop rule from what is still folded.
+void Farm::State::steer_anew(Job& job) {
+  job.adaptive.reset();
+  job.steer();
+  job.predicted_at = 0;
+  for (TileIndex t = 0; t < job.units.tiles(); ++t)
+    for (RoundIndex k = 0; k < job.units.folded(t); ++k) job.adaptive->folded(t, k, job.units.error(k, t));
+}
+
+void Farm::State::void_tile(Job& job, TileIndex tile) {
+  for (const UnitCode code : job.units.void_tile(tile)) job.queue.put_back(code);
+  ++audited.tiles_discarded;
+  effects.emplace_back(TileDiscarded{job.plan.brief.job, tile});
+}
+
+}  // namespace ls::coordinator

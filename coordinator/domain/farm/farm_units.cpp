@@ -1,0 +1,158 @@
+// Results and failures of units, folding, and the end of a job.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+
+void Farm::State::on(const UnitAccepted& event) {
+  const auto unwanted = [&](std::string why) {
+    effects.emplace_back(DropUnwanted{event.unit, event.worker, std::move(why)});
+  };
+  Worker* worker = workers.find(event.worker);
+  if (worker != nullptr && worker->connected) note_progress(*worker);
+  Job* found = find(event.unit.job);
+  if (found == nullptr) return unwanted("no such job");
+  Job& job = *found;
+  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (job.state == JobState::failed || job.state == JobState::cancelled) return unwanted("the job has ended");
+  if (quarantined.contains(event.worker)) return unwanted("the worker is barred");
+  if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
+    return unwanted("not a unit of this job");
+  if (event.samples != job.range(code)) return unwanted("another sample range is wanted");
+  if (worker != nullptr && job.numeric_class && *job.numeric_class != worker->numeric_class) {
+    return unwanted("another numeric class");
+  }
+  if (job.units.accepted(code)) return compare(job, code, event);
+
+  if (worker != nullptr && !job.numeric_class) {  // the service has checked may_pin()
+    job.numeric_class = worker->numeric_class;
+    effects.emplace_back(JobPinned{event.unit.job, worker->numeric_class});
+  }
+  if (job.state == JobState::queued) set_state(job, JobState::running);
+  if (!job.first_ray) job.first_ray = now - from_seconds(std::clamp(event.cpu_seconds, 0.0, 3600.0));
+  effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
+  settle_unit(job, code, worker);
+  job.units.accept(code, {event.digest, workers.index_of(event.worker)});
+  job.failures.accepted(code);
+  job.cost.measured(event.unit.tile, job.pixel_samples(code), event.cpu_seconds);
+  charge(job, event.cpu_seconds);
+  if (worker != nullptr) {
+    ++worker->units_done;
+    workers.measured(*worker, event.cpu_seconds, event.wait_seconds);
+    if (worker->connected) worker->warmed_up.insert(job.seq);
+  }
+  consider_audit(job, code, workers.index_of(event.worker));
+  issue_folds(job, event.unit.tile);
+  refresh(job);
+}
+
+void Farm::State::charge(Job& job, double cpu_seconds) {
+  if (cpu_seconds > 0 && cpu_seconds <= kMostUnitSeconds) shares.spend(job, cpu_seconds);
+}
+
+void Farm::State::issue_folds(Job& job, TileIndex tile) {
+  while (const auto round = job.units.issue_fold(tile, job.last_foldable(tile), job.queue.end(tile))) {
+    const UnitCode code = unit_code(*round, tile);
+    effects.emplace_back(Fold{job.key(code), job.range(code)});
+  }
+}
+
+void Farm::State::on(const UnitFolded& event) {
+  Job* job = find(event.unit.job);
+  if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
+  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (event.samples != job->range(code)) return;  // a truncated round that was reopened since
+  const RoundIndex before = job->units.rounds_complete();
+  if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
+  for (RoundIndex r = before; r < job->units.rounds_complete(); ++r) checkpoint(*job, r);
+  if (job->adaptive) steer(*job, event.unit.tile, event.unit.round);
+  finish_if_complete(*job);
+  if (job->units.rounds_complete() != before) refresh(*job);
+}
+
+// In an adaptive job, checkpoints are taken after the rounds that all tiles get; after these, at levels.
+void Farm::State::checkpoint(Job& job, RoundIndex round) {
+  const double spp = static_cast<double>(cut_range(round, job.spp).s1);
+  // A round that is folded a second time (a truncated one, reopened) makes no further checkpoint.
+  if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
+      spp > job.checkpoint_spp) {
+    job.checkpoint_spp = spp;
+    effects.emplace_back(
+        Checkpoint{job.plan.brief.job, std::vector<RoundIndex>(job.units.tiles(), round + 1), spp});
+  }
+  if (!job.adaptive) job.move_windows(workers.threads());
+}
+
+LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) {
+  const auto audit = job.audits.find(code);
+  if (audit != job.audits.end() && audit->second.lease != 0) {
+    LeaseRecord* lease = leases.find(audit->second.lease);
+    return lease->worker == &worker ? lease : nullptr;
+  }
+  const auto it = job.out.find(code);
+  if (it == job.out.end()) return nullptr;
+  for (const LeaseSeq seq : it->second.lease) {
+    LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
+    if (lease != nullptr && lease->worker == &worker) return lease;
+  }
+  return nullptr;
+}
+
+void Farm::State::on(const UnitFailed& event) {
+  Worker* worker = workers.find(event.worker);
+  Job* job = find(event.failure.unit.job);
+  if (worker == nullptr || job == nullptr || job->ended()) return;
+  note_progress(*worker);
+  const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
+  if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
+  // Only a worker that holds the unit can fail at it; a unit taken back from it is rendered elsewhere.
+  LeaseRecord* lease = lease_of(*job, code, *worker);
+  if (lease == nullptr) return;
+  if (lease->audit) return audit_failed(*job, code, *worker, *lease);
+  free_units(*lease, FreedCause::failed, false, [&](UnitCode unit) { return unit == code; });
+  count_failure(*job, code, *worker, event.failure);
+}
+
+void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure) {
+  job.failures.add(code, {worker.index, worker.name, failure});
+  WorkerFailures& record = worker.failures[job.seq];
+  const bool was_blocked = record.blocked_at(now);
+  record.add(now);
+  work_appeared = true;  // the set of workers that may take it has changed
+  std::size_t known = 0, willing = 0;
+  for (const auto& [index, other] : workers.all()) {
+    if (!other->connected || !fits(job, *other)) continue;
+    ++known;
+    if (!other->blocked(job.seq, now)) ++willing;
+  }
+  const auto report = [&](const std::string& head) {
+    const PixelRect rect = job.plan.grid.rect(tile_of(code));
+    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
+         failure);
+  };
+  // "The scene is at fault" is only one worker's claim, too: its memory may be bad, or it lies.
+  const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
+  if (job.failures.exhausted(code, known)) return report(at_fault);
+  if (known > 0 && willing == 0) {
+    return report(fmt::format(
+        "{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
+        kWorkerFailuresPerJob));
+  }
+  if (was_blocked || !record.blocked_at(now)) return;
+  effects.emplace_back(
+      WorkerBlocked{worker.id, job.plan.brief.job,
+                    fmt::format("failed {} of its units: {}", record.count, failure.reason)});
+  const auto blocks = std::count_if(worker.failures.begin(), worker.failures.end(),
+                                    [&](const auto& entry) { return entry.second.blocked_at(now); });
+  if (blocks < kUnhealthyJobs || worker.unhealthy_since) return;
+  worker.unhealthy_since = now;
+  workers.settle(worker);
+  effects.emplace_back(WorkerStateChanged{
+      worker.id, worker.state(),
+      fmt::format("failed in {} jobs that others render; last: {}", blocks, failure.reason)});
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,194 @@
+// Workers: joining, reporting, leaving, and the passage of time.
+#include <algorithm>
+#include <span>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+namespace {
+constexpr int kMaxThreads = 4096;
+}
+
+void Farm::State::touch(Worker& worker) {
+  workers.settle(worker);
+  dirty.insert(worker.index);
+}
+
+void Farm::State::on(const WorkerJoined& event) {
+  Worker& worker = workers.get(event.worker);
+  if (worker.connected) {
+    if (event.epoch <= worker.epoch) return;  // a late message of an older stream
+    lose(worker, FreedCause::newer_stream);
+  }
+  worker.epoch = event.epoch;
+  worker.name = event.name.empty() ? event.worker.value : event.name;
+  worker.numeric_class = event.numeric_class;
+  worker.threads = std::clamp(event.threads, 1, kMaxThreads);
+  worker.tags = event.tags;
+  std::sort(worker.tags.begin(), worker.tags.end());
+  worker.memory_bytes = event.memory_bytes;
+  worker.blobs.clear();
+  for (const Digest& blob :
+       std::span(event.blobs_held).first(std::min(event.blobs_held.size(), kBlobsRemembered)))
+    worker.blobs.push_back(head_of(blob));
+  std::sort(worker.blobs.begin(), worker.blobs.end());
+  const auto known = quarantined.find(event.worker);
+  worker.quarantined = known != quarantined.end();
+  worker.draining = false;
+  worker.pause = Pause::none;
+  worker.briefed.clear();
+  worker.warmed_up.clear();
+  workers.connected(worker, true);
+  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(),
+                                          worker.quarantined ? "barred: " + known->second : "joined"});
+  for (const auto& [seq, job] : jobs) {
+    if (!job->leasable() || !job->plan.target_error) continue;
+    job->move_windows(workers.threads());
+    refresh(*job);
+  }
+  touch(worker);
+}
+
+void Farm::State::on(const WorkerQuarantined& event) {
+  if (quarantined.try_emplace(event.worker, event.why).second) bar(event.worker, event.why);
+}
+
+void Farm::State::on(const WorkerLost& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected || worker->epoch != event.epoch) return;
+  lose(*worker, FreedCause::worker_lost);
+}
+
+void Farm::State::lose(Worker& worker, FreedCause why) {
+  workers.connected(worker, false);
+  worker.lost_at = now;
+  while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
+  workers.settle(worker);
+  effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
+  work_appeared = true;  // units that were kept for this worker
+}
+
+void Farm::State::on(const WorkerDrains& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected || worker->draining) return;
+  worker->draining = true;
+  workers.settle(*worker);
+  effects.emplace_back(WorkerStateChanged{worker->id, worker->state(), "drains"});
+  work_appeared = true;
+}
+
+void Farm::State::note_progress(Worker& worker) {
+  worker.progress_at = now;
+  if (worker.pause == Pause::silent || worker.pause == Pause::stuck) worker.pause = Pause::none;
+  touch(worker);
+}
+
+void Farm::State::on(const LeaseProgress& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected) return;
+  if (worker->pause == Pause::silent || (worker->pause == Pause::stuck && event.leases.empty())) {
+    worker->pause = Pause::none;
+    touch(*worker);
+  }
+  for (const WorkerProgress::Entry& entry : event.leases) {
+    LeaseRecord* lease = leases.find(entry.lease);
+    if (lease == nullptr || lease->worker != worker) continue;
+    if (entry.units_done > lease->reported) {
+      lease->reported = entry.units_done;
+      note_progress(*worker);
+    }
+    if (now - worker->progress_at < kNoGrowthLimit) renew(*lease);
+  }
+}
+
+void Farm::State::on(const ResultsWait& event) {
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected) return;
+  note_progress(*worker);
+  for (const LeaseSeq seq : worker->leases) renew(*leases.find(seq));
+}
+
+void Farm::State::on(const LeaseCameBack& event) {
+  Worker* worker = workers.find(event.worker);
+  LeaseRecord* lease = leases.find(event.returned.lease);
+  if (worker == nullptr || lease == nullptr || lease->worker != worker) return;
+  if (!worker->draining) worker->pause = Pause::returned;
+  std::set<UnitCode> back;
+  for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
+  workers.settle(*worker);
+  work_appeared = true;  // including units that were left for this worker
+  free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
+}
+
+void Farm::State::on(const Tick&) {
+  ticked = now;
+  expire_leases();
+  forgive_and_forget();
+  shares.tidy();
+  for (const auto& [seq, job] : jobs)
+    if (!job->audits.empty()) settle_audits(*job);
+  for (const auto& [seq, job] : jobs) {
+    if (!job->leasable() || job->frozen) continue;
+    const auto limit = job->time_limit(now);
+    if (limit && now >= *limit)
+      freeze(*job, StopReason::time);
+    else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)  // well before leases extend to the limit
+      plan_end(*job, *limit);
+  }
+  work_appeared = true;
+  for (const WorkerIndex index : workers.wanting_work()) {
+    if (!workers.at(index).saturated()) dirty.insert(index);  // may copy overdue units
+  }
+}
+
+void Farm::State::expire_leases() {
+  while (LeaseRecord* lease = leases.expired(now)) {
+    Worker& worker = *lease->worker;
+    worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
+    workers.settle(worker);
+    // The worker is not notified: if it recovers and finishes before the others, its results are welcome.
+    free_lease(lease->seq, FreedCause::deadline_passed, false);
+  }
+}
+
+void Farm::State::forgive_and_forget() {
+  std::vector<Worker*> gone;
+  for (const auto& [index, worker] : workers.all()) {
+    std::erase_if(worker->failures, [&](const auto& of_job) { return of_job.second.forgiven_at(now); });
+    if (worker->pause == Pause::returned) {
+      worker->pause = Pause::none;
+      touch(*worker);
+    }
+    if (worker->unhealthy_since && now - *worker->unhealthy_since >= kForgiveAfter) {
+      worker->unhealthy_since.reset();
+      worker->failures.clear();
+      effects.emplace_back(WorkerStateChanged{worker->id, worker->state(), "its failures are long ago"});
+      touch(*worker);
+    }
+    if (!worker->connected && now - worker->lost_at >= kForgetWorkerAfter) gone.push_back(worker.get());
+  }
+  for (Worker* worker : gone) {
+    effects.emplace_back(WorkerForgotten{worker->id});
+    dirty.erase(worker->index);
+    workers.forget(*worker);
+  }
+  if (workers.has_many_names()) forget_names();
+}
+
+void Farm::State::forget_names() {
+  std::vector<bool> used = workers.no_index();
+  for (const auto& [seq, job] : jobs) {
+    job->units.mark_workers(used);
+    job->failures.mark_workers(used);
+    job->voters.mark_workers(used);
+    for (const auto& [code, audit] : job->audits) {
+      used[audit.first] = true;
+      if (audit.second) used[audit.second->first] = true;
+      if (audit.claim) used[audit.claim->first] = true;
+      for (const WorkerIndex tried : audit.tried) used[tried] = true;
+    }
+  }
+  workers.keep_names(std::move(used));
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,259 @@
+// Which worker gets which units next. Higher priorities first, equal shares within one (fair_share.h),
+// previews first (the order of unit codes). Idle workers go before busy ones, and among them those that hold
+// the world; leases shrink at a job's tail.
+#include <algorithm>
+#include <limits>
+
+#include "coordinator/domain/farm/farm_state.h"
+
+namespace ls::coordinator {
+namespace {
+
+struct LeaseSize {
+  std::uint64_t units = 1;
+  double seconds = 0;  // CPU seconds; reaching them completes the lease
+};
+
+// Seconds until the job's time limit, minus the time that the worker needs for the leases it holds.
+double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
+  const auto limit = job.time_limit(now);
+  if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
+  return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
+}
+
+// Guided self-scheduling: a thread gets half of an even split of the waiting units, so that all threads end
+// at about the same time. Under a time budget a lease ends with the first unit that reaches `seconds`.
+LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
+  const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
+  const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
+  const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
+  // With single units a worker with many threads would reach kMaxLeasesPerWorker before all threads have
+  // work.
+  const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
+  const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
+  const std::uint64_t most =
+      job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
+  const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
+  return {std::min(share, most), lasts * worker.cores()};
+}
+
+// A job with a time budget leases nothing after its limit, and nothing ahead that would only begin after it.
+// Every tile gets its first round.
+bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
+  const auto limit = job.time_limit(now);
+  if (!limit || job.frozen || round_of(code) == 0) return false;
+  if (now >= *limit) return true;
+  return worker.saturated() && now + from_seconds(worker.seconds_until_free()) >= *limit;
+}
+
+}  // namespace
+
+void Farm::State::dispatch() {
+  do {
+    std::vector<Worker*> candidates;
+    for (const WorkerIndex index : work_appeared ? workers.wanting_work() : dirty) {
+      if (workers.wanting_work().contains(index)) candidates.push_back(&workers.at(index));
+    }
+    const bool choice = candidates.size() > 1;
+    for (const bool only_uncovered : {true, false}) {
+      if (choice) serve(candidates, only_uncovered, true);
+      serve(candidates, only_uncovered, false);
+    }
+  } while (take_back_for_idle());
+  for (const WorkerIndex index : dirty) {
+    if (workers.wanting_work().contains(index)) copy_overdue(workers.at(index));
+  }
+}
+
+bool Farm::State::take_back_for_idle() {
+  for (const WorkerIndex index : dirty) {
+    if (!workers.wanting_work().contains(index)) continue;
+    const Worker& idle = workers.at(index);
+    if (!idle.available() || idle.saturated()) continue;
+    if (LeaseRecord* lease = longest_waiting_for(idle)) {
+      free_lease(lease->seq, FreedCause::moved, true);
+      return true;
+    }
+  }
+  return false;
+}
+
+// A worker processes its leases in order: this one has not begun as long as earlier ones keep all threads
+// busy.
+bool Farm::State::untouched(const LeaseRecord& lease) const {
+  std::uint32_t units = 0;
+  for (const LeaseSeq seq : lease.worker->leases) {
+    if (seq >= lease.seq) break;
+    units += leases.all().at(seq).remaining;
+  }
+  return lease.reported == 0 && units >= static_cast<std::uint32_t>(lease.worker->threads);
+}
+
+// Seconds until the worker begins the lease; 0 if it may have begun.
+double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
+  if (!untouched(lease)) return 0;
+  double before = 0;
+  for (const LeaseSeq seq : lease.worker->leases) {
+    if (seq >= lease.seq) break;
+    const LeaseRecord& earlier = leases.all().at(seq);
+    // Predicted now: when the first leases were granted, nothing was measured
+    before += earlier.remaining * earlier.job->predict(earlier.units.front());
+  }
+  return before / lease.worker->cores();
+}
+
+LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
+  LeaseRecord* found = nullptr;
+  double longest = seconds(kTakeBackAfter);
+  std::uint32_t looked_at = 0;
+  for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
+    LeaseRecord& lease = it->second;
+    const Job& job = *lease.job;
+    // The idle worker must be able to begin at once: it has the world, and nothing keeps it from the units.
+    if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
+        !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
+      continue;
+    const bool excluded = std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode code) {
+      return job.failures.failed_on(code, idle.index) || out_of_time(job, idle, code, now);
+    });
+    const double wait = excluded ? 0 : waits_behind_others(lease);
+    if (wait > longest) found = &lease, longest = wait;
+  }
+  return found;
+}
+
+void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders) {
+  bool served = true;
+  while (served && !shares.empty()) {
+    served = false;
+    for (Worker* worker : candidates) {
+      if (shares.empty()) return;
+      if (!worker->wants_more() || (only_uncovered && worker->saturated())) continue;
+      served |= assign(*worker, only_holders);
+    }
+  }
+}
+
+Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
+  if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return Takes::nothing;
+  if (audit_for(job, worker)) return Takes::now;
+  const auto code = room(job, worker) > 0 ? next_for(job, worker) : std::nullopt;
+  if (!code) return Takes::nothing;
+  return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
+}
+
+// Nobody can audit a worker that is alone in its class, so a job is pinned to a class with several workers if
+// there is one. Without audits it does not matter.
+bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
+  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
+  std::map<Digest, int> others;
+  for (const auto& [index, other] : workers.all()) {
+    const bool there = other->connected && !other->draining && !other->unhealthy_since &&
+                       other->pause != Pause::silent && other->pause != Pause::stuck &&
+                       other->numeric_class != worker.numeric_class;
+    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1)
+      return false;
+  }
+  return true;
+}
+
+// The next job for this worker: the first in turn, or one whose world the worker holds, unless that has had
+// much more than its share (loading a world costs time). A job that no worker renders is not passed over in
+// this way. Null also if the first job will take the worker later: another job's leases in between would
+// prevent that.
+Job* Farm::State::choose(const Worker& worker) {
+  Job* fair = nullptr;
+  Job* chosen = nullptr;
+  double least = 0;
+  std::uint32_t looked_at = 0;
+  const double slack = kLocalitySeconds * workers.threads();
+  shares.in_turn([&](Job& job, double lag) {
+    if (fair != nullptr && ++looked_at > kJobsLookedAt) return true;
+    if (fair != nullptr && (lag - least > slack || !holds(job, worker))) return false;
+    const Takes when = takes(job, worker);
+    if (when != Takes::now) return when == Takes::later && fair == nullptr;
+    if (fair == nullptr) fair = &job, least = lag;
+    if (!holds(job, worker) && job.load.units > 0) return false;
+    chosen = &job;
+    return true;
+  });
+  return chosen != nullptr ? chosen : fair;
+}
+
+bool Farm::State::assign(Worker& worker, bool only_held) {
+  Job* job = choose(worker);
+  return job != nullptr && (!only_held || holds(*job, worker)) && lease_from(*job, worker);
+}
+
+std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
+  const auto excluded = [&](UnitCode code) {
+    return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
+  };
+  const auto code = job.queue.front(job.units, excluded);
+  return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
+}
+
+// Leased early, a speculative unit would delay units that turn out to be needed, and would more likely be
+// dropped.
+bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
+                            double cost) const {
+  return !job.queue.wanted(code) &&
+         worker.units_out + units >= kUnitsAThread * static_cast<std::size_t>(worker.threads) &&
+         worker.seconds_until_free() + cost / worker.cores() >= kSpeculativeSeconds;
+}
+
+bool Farm::State::lease_from(Job& job, Worker& worker) {
+  if (audit_from(job, worker)) return true;
+  LeaseSize size = lease_size(job, worker, workers.threads(), now);
+  size.units = std::min<std::uint64_t>(size.units, room(job, worker));
+  std::vector<UnitCode> units;
+  double cost = 0;
+  while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
+    const auto code = next_for(job, worker);
+    if (!code || too_early(job, worker, *code, units.size(), cost)) break;
+    job.queue.pop(*code);
+    units.push_back(*code);
+    cost += job.predict(*code);
+  }
+  if (units.empty()) return false;
+  if (!job.numeric_class) {
+    job.numeric_class = worker.numeric_class;
+    effects.emplace_back(JobPinned{job.plan.brief.job, worker.numeric_class});
+  }
+  if (job.state == JobState::queued) set_state(job, JobState::running);
+  shares.served(job);
+  grant(job, worker, std::move(units));
+  refresh(job);
+  return true;
+}
+
+bool Farm::State::others_may_take(const Job& job, UnitCode code, const Worker& but) const {
+  return std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
+    const Worker& other = *entry.second;
+    return other.index != but.index && may_serve(job, other, ticked) &&
+           !job.failures.failed_on(code, other.index);
+  });
+}
+
+void Farm::State::copy_overdue(Worker& worker) {
+  std::uint32_t looked_at = 0;
+  for (auto& [seq, lease] : leases.all()) {
+    if (!worker.available() || worker.saturated() || ++looked_at > kSpeculationScan) return;
+    Job& job = *lease.job;
+    const Duration due = from_seconds(kSpeculateAfter * seconds(lease.predicted)) + kSpeculateSlack;
+    if (lease.worker == &worker || now < lease.issued + due) continue;
+    if (!job.leasable() || !may_serve(job, worker, ticked)) continue;
+    std::vector<UnitCode> units;
+    const std::uint32_t most = room(job, worker);
+    for (const UnitCode code : lease.units) {
+      if (units.size() >= most) break;
+      if (worker.units_out + units.size() >= static_cast<std::uint32_t>(worker.threads)) break;
+      const auto it = job.out.find(code);
+      if (it == job.out.end() || !it->second.has(seq) || it->second.full()) continue;
+      if (!job.failures.failed_on(code, worker.index)) units.push_back(code);
+    }
+    if (!units.empty()) grant(job, worker, std::move(units));
+  }
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,33 @@
+// Workers that once held a lease on a unit but did not deliver its accepted result. Only they may vote when
+// results differ (farm_trust.cpp). Bounded: beyond kMaxVoters the entries of the earliest rounds are dropped,
+// and later results of those units are mere claims.
+#pragma once
+
+#include <cstddef>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "coordinator/domain/limits.h"
+#include "coordinator/domain/unit_table.h"
+
+namespace ls::coordinator {
+
+class VoterTable {
+ public:
+  void note(UnitCode unit, WorkerIndex worker) {
+    held_.emplace(unit, worker);
+    if (held_.size() > kMaxVoters) held_.erase(held_.begin());
+  }
+  bool has(UnitCode unit, WorkerIndex worker) const { return held_.contains({unit, worker}); }
+  void clear() { held_.clear(); }
+  std::size_t size() const { return held_.size(); }
+  void mark_workers(std::vector<bool>& used) const {
+    for (const auto& [unit, worker] : held_) used[worker] = true;
+  }
+
+ private:
+  std::set<std::pair<UnitCode, WorkerIndex>> held_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,225 @@
+#include <fmt/format.h>
+
+#include "coordinator/http/api/api.h"
+#include "coordinator/http/api/handlers.h"
+#include "coordinator/http/message/content_range.h"
+#include "coordinator/http/message/json_read.h"
+#include "coordinator/http/message/problem.h"
+
+namespace ls::http {
+namespace {
+
+using coordinator::BlobStore;
+
+Response stored(const Digest& digest, int status) {
+  Response response;
+  response.status = status;
+  response.headers.emplace_back("Location", "/api/v1/blobs/" + digest.hex());
+  return response;
+}
+
+std::optional<Response> over_limit(std::uint64_t received, std::uint64_t limit) {
+  if (received <= limit) return std::nullopt;
+  return problem(413, fmt::format("the blob has more than the {} bytes that are accepted", limit));
+}
+
+class StoreSink final : public BodySink {
+ public:
+  StoreSink(std::unique_ptr<BlobStore::Upload> upload, const Digest& digest, std::uint64_t limit)
+      : upload_(std::move(upload)), digest_(digest), limit_(limit) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    received_ += bytes.size();
+    if (auto refused = over_limit(received_, limit_)) return refused;
+    if (const auto done = upload_->append(bytes); !done) return problem(done.error());
+    return std::nullopt;
+  }
+  Response finish() override {
+    if (const auto done = upload_->finish(); !done) return problem(done.error());
+    return stored(digest_, 201);
+  }
+
+ private:
+  std::unique_ptr<BlobStore::Upload> upload_;
+  Digest digest_;
+  std::uint64_t limit_, received_ = 0;
+};
+
+// The blob exists already, undamaged: nothing is written, but a different body is still rejected.
+class CompareSink final : public BodySink {
+ public:
+  CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    received_ += bytes.size();
+    if (auto refused = over_limit(received_, limit_)) return refused;
+    sha_.update(bytes);
+    return std::nullopt;
+  }
+  Response finish() override {
+    const Digest got = sha_.finish();
+    if (got != digest_)
+      return problem(400,
+                     fmt::format("the body's SHA-256 is {}, the address says {}", got.hex(), digest_.hex()));
+    return stored(digest_, 204);
+  }
+
+ private:
+  Sha256 sha_;
+  Digest digest_;
+  std::uint64_t limit_, received_ = 0;
+};
+
+void send_offset(Response& response, std::uint64_t offset, bool complete) {
+  response.headers.emplace_back("Upload-Offset", std::to_string(offset));
+  response.headers.emplace_back("Upload-Complete", complete ? "?1" : "?0");
+}
+
+// A rejection with the offset from which to continue.
+Response refused_part(int status, std::string_view detail, std::uint64_t offset) {
+  Response response = problem(status, detail);
+  send_offset(response, offset, false);
+  return response;
+}
+
+// A part that exists already is read and ignored: answering in the middle would break the connection.
+class IgnoreSink final : public BodySink {
+ public:
+  IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    if (bytes.size() > left_) return problem(400, "the body is longer than its Content-Range says");
+    left_ -= bytes.size();
+    return std::nullopt;
+  }
+  Response finish() override { return stored(digest_, 204); }
+
+ private:
+  Digest digest_;
+  std::uint64_t left_;
+};
+
+class PartSink final : public BodySink {
+ public:
+  PartSink(BlobStore& blobs, std::unique_ptr<BlobStore::Upload> upload, const Digest& digest,
+           const ContentRange& range)
+      : blobs_(blobs), upload_(std::move(upload)), digest_(digest), range_(range) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    if (bytes.size() > range_.bytes - received_)
+      return refused_part(400, "the body is longer than its Content-Range says", blobs_.received(digest_));
+    if (const auto done = upload_->append(bytes); !done) return refused(done.error());
+    received_ += bytes.size();
+    return std::nullopt;
+  }
+  Response finish() override {
+    if (received_ != range_.bytes)
+      return refused_part(400, "the body is shorter than its Content-Range says; what came is kept",
+                          blobs_.received(digest_));
+    if (!range_.is_last()) {
+      Response response;
+      response.status = 202;
+      send_offset(response, range_.first + received_, false);
+      return response;
+    }
+    if (const auto done = upload_->finish(); !done) return refused(done.error());
+    return stored(digest_, 201);
+  }
+
+ private:
+  Response refused(const Error& error) const {
+    return refused_part(status_of(error.code), error.message, blobs_.received(digest_));
+  }
+
+  BlobStore& blobs_;
+  std::unique_ptr<BlobStore::Upload> upload_;
+  Digest digest_;
+  ContentRange range_;
+  std::uint64_t received_ = 0;
+};
+
+std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Request& request,
+                                                            const Digest& digest) {
+  auto& blobs = api.coordinator().blobs();
+  const auto range = parse_content_range(request.header("content-range"));
+  if (!range)
+    return problem(
+        400,
+        "Content-Range must be 'bytes FIRST-LAST/SIZE', or 'bytes */SIZE' with an empty body when all "
+        "was sent before");
+  if (blobs.prove(digest)) return std::make_unique<IgnoreSink>(digest, range->bytes);
+  const std::uint64_t there = blobs.received(digest);
+  if (auto refused = over_limit(range->size, api.limits().blob_bytes)) return *refused;
+  if (!range->possible)
+    return refused_part(416, "Content-Range names bytes that a blob of its size does not have", there);
+  if (request.content_length && *request.content_length != range->bytes)
+    return refused_part(
+        400,
+        fmt::format("Content-Range names {} bytes, the body has {}", range->bytes, *request.content_length),
+        there);
+  auto upload = blobs.resume_upload(digest, range->first);
+  if (!upload)
+    return refused_part(status_of(upload.error().code), upload.error().message, blobs.received(digest));
+  return std::make_unique<PartSink>(blobs, std::move(*upload), digest, *range);
+}
+
+}  // namespace
+
+std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Request& request,
+                                                            const Params& params) {
+  const auto digest = read_digest(std::string_view(params[0]), "the last part of the address");
+  if (!digest) return problem(digest.error());
+  if (!request.header("content-encoding").empty())
+    return problem(415, "send the blob as it is: Content-Encoding is not decoded");
+  if (!request.header("content-range").empty()) return open_part(api, request, *digest);
+  auto& blobs = api.coordinator().blobs();
+  if (blobs.prove(*digest)) {
+    // A client that waits for '100 Continue' has sent nothing yet and need not.
+    if (!request.header("expect").empty()) return stored(*digest, 204);
+    return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
+  }
+  auto upload = blobs.begin_upload(*digest);
+  if (!upload) return problem(upload.error());
+  return std::make_unique<StoreSink>(std::move(*upload), *digest, api.limits().blob_bytes);
+}
+
+Response head_blob(Api& api, const Request&, const Params& params) {
+  const auto digest = read_digest(std::string_view(params[0]), "the last part of the address");
+  if (!digest) return problem(digest.error());
+  auto& blobs = api.coordinator().blobs();
+  Response response;
+  std::uint64_t offset = 0;
+  const auto found = blobs.find(*digest);
+  if (!found) return problem(found.error());
+  const bool complete = *found;
+  if (complete) {
+    const auto size = blobs.size(*digest);
+    if (!size) return problem(size.error());
+    offset = *size;
+  } else {
+    offset = blobs.received(*digest);
+    response.status = 404;
+  }
+  send_offset(response, offset, complete);
+  return response;
+}
+
+Response post_blobs_missing(Api& api, const Request& request, const Params&) {
+  const auto body = read_object(request.body, {"digests"});
+  if (!body) return problem(body.error());
+  const auto list = body->find("digests");
+  if (list == body->end() || !list->is_array())
+    return problem(400, "the body must be {\"digests\": [SHA256, ...]}");
+  if (list->size() > kMaxDigests)
+    return problem(400, fmt::format("more than {} digests in one request", kMaxDigests));
+  auto missing = nlohmann::ordered_json::array();
+  for (const auto& item : *list) {
+    const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
+    if (!digest) return problem(digest.error());
+    const auto there = api.coordinator().blobs().find(*digest);
+    if (!there) return problem(there.error());  // unknown, which is not the same as missing
+    if (!*there) missing.push_back(digest->hex());
+  }
+  return json_response(200, write_json({{"missing", std::move(missing)}}));
+}
+
+}  // namespace ls::http

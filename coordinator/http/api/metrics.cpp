@@ -1,0 +1,199 @@
+#include "coordinator/http/api/metrics.h"
+
+#include <fmt/format.h>
+
+#include <iterator>
+
+#include "coordinator/http/api/process_figures.h"
+
+namespace ls::http {
+namespace {
+
+using coordinator::JobState;
+
+void head(std::string& out, std::string_view name, std::string_view type, std::string_view help) {
+  fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, type);
+}
+
+template <class Value>
+void single(std::string& out, std::string_view name, std::string_view type, std::string_view help,
+            Value value) {
+  head(out, name, type, help);
+  fmt::format_to(std::back_inserter(out), "{} {}\n", name, value);
+}
+
+bool unfinished(JobState state) {
+  return state == JobState::queued || state == JobState::running || state == JobState::paused;
+}
+
+void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
+  static constexpr JobState kStates[] = {JobState::queued, JobState::running, JobState::paused,
+                                         JobState::done,   JobState::failed,  JobState::cancelled};
+  std::map<JobState, std::uint64_t> by_state;
+  std::uint64_t done = 0, planned = 0;
+  double core_seconds = 0, eta = 0, queued = 0;
+  Health health;
+  for (const auto& job : jobs) {
+    ++by_state[job.state];
+    core_seconds += job.core_seconds;
+    health.nonfinite += job.health.nonfinite;
+    health.majorant_violations += job.health.majorant_violations;
+    if (!unfinished(job.state)) continue;
+    done += job.units_done;
+    planned += job.units_total;
+    eta += job.eta_seconds.value_or(0);
+    if (job.state != JobState::paused) queued += job.queued_core_seconds;
+  }
+  head(out, "lightshaft_jobs", "gauge", "Jobs by state.");
+  for (const JobState state : kStates)
+    fmt::format_to(std::back_inserter(out), "lightshaft_jobs{{state=\"{}\"}} {}\n", to_string(state),
+                   by_state[state]);
+  single(out, "lightshaft_units_planned", "gauge", "Units of unfinished jobs.", planned);
+  single(out, "lightshaft_units_done", "gauge", "Units of unfinished jobs that are folded.", done);
+  single(out, "lightshaft_queued_core_seconds", "gauge",
+         "Predicted CPU seconds of units that wait for a worker, of jobs that are not paused.", queued);
+  single(out, "lightshaft_eta_seconds", "gauge",
+         "Predicted wall seconds to finish all jobs whose rate is known.", eta);
+  single(out, "lightshaft_core_seconds", "gauge", "CPU seconds that workers spent on the jobs kept here.",
+         core_seconds);
+  single(out, "lightshaft_nonfinite_samples", "gauge", "Samples counted as non-finite; zero on healthy jobs.",
+         health.nonfinite);
+  single(out, "lightshaft_majorant_violations", "gauge", "Densities above their bound; zero on healthy jobs.",
+         health.majorant_violations);
+}
+
+void write_workers(std::string& out, std::span<const coordinator::WorkerView> workers) {
+  std::map<std::string, std::uint64_t> by_state{{"connected", 0}, {"draining", 0}, {"lost", 0}, {"sick", 0}};
+  std::uint64_t threads = 0, fake = 0;
+  for (const auto& worker : workers) {
+    ++by_state[worker.state];
+    if (worker.state != "connected") continue;
+    threads += static_cast<std::uint64_t>(worker.threads);
+    fake += worker.fake;
+  }
+  head(out, "lightshaft_workers", "gauge", "Workers by state.");
+  for (const auto& [state, count] : by_state)
+    fmt::format_to(std::back_inserter(out), "lightshaft_workers{{state=\"{}\"}} {}\n", state, count);
+  single(out, "lightshaft_worker_threads", "gauge", "Render threads of connected workers.", threads);
+  single(out, "lightshaft_workers_fake", "gauge", "Connected workers that make their pixels up.", fake);
+}
+
+void write_leases(std::string& out, const coordinator::FarmFigures& f) {
+  single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
+  single(out, "lightshaft_units_lent", "gauge", "Units of these leases.", f.units_lent_now);
+  single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
+  single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_lent);
+  head(out, "lightshaft_units_freed_total", "counter",
+       "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
+  // All causes, even with count 0, so that rates are defined from the first event on.
+  for (const auto& [cause, word] : coordinator::kFreedCauses) {
+    const auto count = f.units_freed.find(cause);
+    fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,
+                   count == f.units_freed.end() ? 0 : count->second);
+  }
+}
+
+void write_results(std::string& out, const coordinator::FarmFigures& f) {
+  head(out, "lightshaft_results_total", "counter",
+       "Results that workers handed in. equal, differing: a second one of a unit, against the first.");
+  const auto results = [&](std::string_view what, std::uint64_t count) {
+    fmt::format_to(std::back_inserter(out), "lightshaft_results_total{{verdict=\"{}\"}} {}\n", what, count);
+  };
+  results("accepted", f.accepted);
+  results("equal", f.equal);
+  results("differing", f.differing);
+  results("unwanted", f.unwanted);
+  results("refused", f.refused);
+  results("not_stored", f.not_stored);
+  single(out, "lightshaft_units_folded_total", "counter", "Units folded into images.", f.folded);
+  single(out, "lightshaft_fold_lag_seconds_total", "counter",
+         "Seconds from a result's arrival to its fold, summed over lightshaft_units_folded_total.",
+         f.fold_lag_seconds);
+  single(out, "lightshaft_results_arrived", "gauge", "Results that are being checked and stored.",
+         f.arrived_now);
+  single(out, "lightshaft_results_arrived_bytes", "gauge", "Memory that these take.", f.arrived_bytes);
+  single(out, "lightshaft_results_waiting", "gauge",
+         "Accepted results that wait for an earlier round of their tile.", f.waiting_now);
+  single(out, "lightshaft_chores", "gauge", "Writes that wait for the disk.", f.background_writes_now);
+  single(out, "lightshaft_result_bytes_total", "counter", "Bytes of results from workers.", f.result_bytes);
+  single(out, "lightshaft_blob_bytes_total", "counter", "Bytes of blobs sent to workers.", f.blob_bytes);
+}
+
+void write_audits(std::string& out, const coordinator::AuditFigures& a) {
+  head(out, "lightshaft_audits_total", "counter",
+       "Results chosen to be rendered again by another worker, and what came of it.");
+  for (const auto& [what, count] : {std::pair("asked", a.asked), std::pair("equal", a.equal),
+                                    std::pair("differ", a.differ), std::pair("dropped", a.dropped)})
+    fmt::format_to(std::back_inserter(out), "lightshaft_audits_total{{verdict=\"{}\"}} {}\n", what, count);
+  single(out, "lightshaft_workers_barred_total", "counter", "Workers found to render wrong pixels.",
+         a.workers_quarantined);
+  single(out, "lightshaft_tiles_discarded_total", "counter",
+         "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
+}
+
+void write_webhooks(std::string& out, const WebhookFigures& w) {
+  head(out, "lightshaft_webhook_sendings_total", "counter",
+       "Attempts to tell a receiver of a job's event; a failed one is tried again later.");
+  fmt::format_to(std::back_inserter(out),
+                 "lightshaft_webhook_sendings_total{{result=\"taken\"}} {}\n"
+                 "lightshaft_webhook_sendings_total{{result=\"failed\"}} {}\n",
+                 w.delivered, w.failed_attempts);
+  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.",
+         w.given_up);
+  single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
+}
+
+void write_process(std::string& out) {
+  const ProcessFigures p = process_figures();
+  single(out, "process_resident_memory_bytes", "gauge", "Memory of the coordinator.", p.resident_bytes);
+  single(out, "process_open_fds", "gauge", "Files and sockets that it has open.", p.open_files);
+  single(out, "process_threads", "gauge", "Its threads.", p.threads);
+  single(out, "process_cpu_seconds_total", "counter", "CPU time of it.", p.cpu_seconds);
+}
+
+}  // namespace
+
+void Counters::answered(Method method, int status) {
+  const std::lock_guard lock(mutex_);
+  ++requests_[{method, status}];
+}
+
+std::map<std::pair<Method, int>, std::uint64_t> Counters::requests() const {
+  const std::lock_guard lock(mutex_);
+  return requests_;
+}
+
+std::string metrics_text(std::span<const coordinator::JobView> jobs,
+                         std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
+                         const Counters& counters, const coordinator::StoreStatus& store,
+                         const coordinator::FarmFigures& farm, const coordinator::AuditFigures& audits,
+                         const std::optional<WebhookFigures>& webhooks) {
+  std::string out;
+  write_jobs(out, jobs);
+  write_workers(out, workers);
+  write_leases(out, farm);
+  write_results(out, farm);
+  write_audits(out, audits);
+  write_process(out);
+  single(out, "lightshaft_events_total", "counter", "Id of the last event.", last_event);
+  head(out, "lightshaft_http_requests_total", "counter", "Requests answered.");
+  for (const auto& [key, count] : counters.requests())
+    fmt::format_to(std::back_inserter(out),
+                   "lightshaft_http_requests_total{{method=\"{}\",code=\"{}\"}} {}\n", to_string(key.first),
+                   key.second, count);
+  single(out, "lightshaft_http_connections", "gauge", "Open HTTP connections.", counters.connections.load());
+  single(out, "lightshaft_http_event_streams", "gauge", "Open event streams.", counters.event_streams.load());
+  single(out, "lightshaft_http_slow_readers_total", "counter",
+         "Event streams closed because the reader was too slow.", counters.events_dropped.load());
+  single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
+         counters.body_bytes.load());
+  if (webhooks) write_webhooks(out, *webhooks);
+  if (!store.mirror.empty()) {
+    single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
+    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.",
+           store.behind);
+  }
+  return out;
+}
+
+}  // namespace ls::http

@@ -1,0 +1,114 @@
+#include "coordinator/http/api/spec_query.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace ls::http {
+namespace {
+
+using Json = nlohmann::json;
+
+tl::unexpected<Error> wrong(std::string_view key, std::string_view value, std::string_view expected) {
+  return fail(Errc::invalid_argument,
+              fmt::format("query parameter '{}' is '{}', expected {}", key, value, expected));
+}
+
+template <class T>
+std::optional<T> number(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+Result<Json> parse_size(std::string_view text) {
+  const std::size_t x = text.find('x');
+  if (x == std::string_view::npos) return wrong("size", text, "WIDTHxHEIGHT");
+  const auto width = number<int>(text.substr(0, x)), height = number<int>(text.substr(x + 1));
+  if (!width || !height) return wrong("size", text, "WIDTHxHEIGHT");
+  return Json::array({*width, *height});
+}
+
+Json parse_list(std::string_view text) {
+  Json list = Json::array();
+  while (!text.empty()) {
+    const std::size_t comma = text.find(',');
+    if (comma != 0) list.push_back(std::string(text.substr(0, comma)));
+    text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
+  }
+  return list;
+}
+
+template <class T>
+Result<Json> parse_number(std::string_view key, std::string_view text, std::string_view expected) {
+  if (const auto value = number<T>(text)) return Json(*value);
+  return wrong(key, text, expected);
+}
+
+// The JSON value of one key of the spec; nullopt if there is no such key.
+std::optional<Result<Json>> parse_value(std::string_view key, std::string_view text) {
+  if (key == "spp" || key == "seed" || key == "max_workers" || key == "max_units" || key == "memory")
+    return parse_number<std::uint64_t>(key, text, "a whole number");
+  if (key == "target_error" || key == "time") return parse_number<double>(key, text, "a number");
+  if (key == "priority") return parse_number<int>(key, text, "a whole number");
+  if (key == "size") return parse_size(text);
+  if (key == "integrator" || key == "frames" || key == "reference")
+    return Result<Json>(Json(std::string(text)));
+  if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
+  if (key == "float") {
+    if (text == "true" || text == "1") return Result<Json>(Json(true));
+    if (text == "false" || text == "0") return Result<Json>(Json(false));
+    return Result<Json>(wrong(key, text, "true or false"));
+  }
+  return std::nullopt;
+}
+
+Result<void> add_define(Json& defines, std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0) return wrong("define", text, "NAME=VALUE");
+  const std::string name(text.substr(0, equals));
+  if (defines.contains(name))
+    return fail(Errc::invalid_argument, fmt::format("query: define '{}' is given twice", name));
+  defines[name] = std::string(text.substr(equals + 1));
+  return {};
+}
+
+}  // namespace
+
+Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
+  auto whole = parse_spec_object(base);
+  if (!whole) return tl::unexpected(whole.error());
+  // Report errors in `base` even if the query overrides the key.
+  if (const auto alone = job_spec_of(*whole); !alone) return alone;
+  Json spec = Json::object();
+  Json defines = Json::object();
+  for (const auto& [key, text] : query) {
+    if (!also.empty() && key == also) continue;
+    if (key == "define") {
+      if (auto ok = add_define(defines, text); !ok) return tl::unexpected(ok.error());
+      continue;
+    }
+    if (spec.contains(key))
+      return fail(Errc::invalid_argument, fmt::format("query parameter '{}' is given twice", key));
+    auto value = parse_value(key, text);
+    if (!value)
+      return fail(
+          Errc::invalid_argument,
+          fmt::format(
+              "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
+              "aov, define, priority, float, tags, frames, max_workers, max_units, memory, "
+              "reference",
+              key, also, also.empty() ? "" : ", "));
+    if (!*value) return tl::unexpected(value->error());
+    spec[key] = std::move(**value);
+  }
+  if (!defines.empty()) (*whole)["defines"].update(defines);
+  whole->update(spec);
+  // Invalid UTF-8 is replaced on the way through text: no valid key or name contains it.
+  return parse_job_spec(whole->dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace ls::http

@@ -1,0 +1,42 @@
+// The dashboard's files, built into the executable. Requests match exact names only: no path ever reaches a
+// disk.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "coordinator/http/message/message.h"
+
+namespace ls::http {
+
+struct StaticFile {
+  std::string_view name;  // "app/main.js"
+  std::span<const std::byte> bytes;
+};
+
+class StaticFiles {
+ public:
+  explicit StaticFiles(std::span<const StaticFile> files);
+  // "/" is index.html. nullopt if there is no such file.
+  std::optional<Response> find(const Request& request) const;
+
+ private:
+  struct Entry {
+    std::span<const std::byte> bytes;
+    std::string_view content_type;
+    std::string etag;
+  };
+  std::map<std::string, Entry, std::less<>> entries_;
+};
+
+std::string_view content_type_of(std::string_view file_name);
+
+// Generated at build from web/static and coordinator/http/openapi.json.
+std::span<const StaticFile> embedded_files();
+std::string_view embedded_openapi();
+
+}  // namespace ls::http

@@ -1,0 +1,182 @@
+#include "coordinator/http/auth/auth.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
+#include <openssl/rand.h>
+
+#include <array>
+#include <charconv>
+#include <chrono>
+
+#include "common/base/check.h"
+#include "common/base/digest.h"
+#include "common/base/secret.h"
+#include "coordinator/http/message/limits.h"
+#include "coordinator/http/message/problem.h"
+
+namespace ls::http {
+namespace {
+
+bool iequals_prefix(std::string_view text, std::string_view lower_case_prefix) {
+  if (text.size() < lower_case_prefix.size()) return false;
+  for (std::size_t i = 0; i < lower_case_prefix.size(); ++i)
+    if ((text[i] | 0x20) != (lower_case_prefix[i] | 0x20)) return false;
+  return true;
+}
+
+bool unsafe(Method method) {
+  return method != Method::get && method != Method::head && method != Method::options;
+}
+
+}  // namespace
+
+UnixClock system_unix_clock() {
+  return [] {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return static_cast<std::int64_t>(std::chrono::duration_cast<std::chrono::seconds>(now).count());
+  };
+}
+
+Auth::Auth(const TokenRegistry& tokens, Options options, UnixClock now)
+    : tokens_(tokens),
+      options_(options),
+      cookie_name_("lightshaft_" + sha256("cookie name " + tokens.session_key()).hex().substr(0, 12)),
+      now_(std::move(now)),
+      throttle_(options.requests, options.failures) {}
+
+std::variant<Caller, Response> Auth::identify(const Request& request) {
+  const std::string_view authorization = request.header("authorization");
+  if (!authorization.empty()) {
+    constexpr std::string_view kWrong =
+        "the bearer token is none that this coordinator knows (the admin's is in its data folder, file "
+        "'token')";
+    std::string_view token = authorization;
+    if (!iequals_prefix(token, "bearer ")) return problem(401, kWrong);
+    token.remove_prefix(7);
+    while (token.starts_with(' ')) token.remove_prefix(1);
+    return caller_of_token(request, token, kWrong);
+  }
+  const std::string_view session = session_of(request);
+  if (session.empty())
+    return problem(
+        401,
+        "send 'Authorization: Bearer TOKEN' (the admin's: file 'token' in the coordinator's data folder), "
+        "or trade it for a session cookie at POST /api/v1/session");
+  auto caller = caller_of_session(session);
+  if (!caller) return problem(401, "the session has ended; log in again");
+  const bool same_site = !request.header("origin").empty() || !request.header("sec-fetch-site").empty();
+  if (unsafe(request.method) && (!same_site || cross_site(request)))
+    return problem(403,
+                   "a request that changes something counts with a session cookie only if it comes from this "
+                   "coordinator's own pages (Origin header); scripts use the bearer token");
+  return std::move(*caller);
+}
+
+std::variant<Caller, Response> Auth::caller_of_token(const Request& request, std::string_view token,
+                                                     std::string_view wrong) {
+  const std::string address = Throttle::group_of(request.peer);
+  const std::int64_t now = now_();
+  auto caller = tokens_.find(token);
+  if (const int wait = throttle_.may_try(address, caller ? caller->token_id : "", now); wait > 0)
+    return too_many(wait, "too many wrong tokens came from your address; wait, then try again");
+  if (!caller) {
+    throttle_.failed(address, now);
+    return problem(401, wrong);
+  }
+  throttle_.succeeded(address, caller->token_id, now);
+  if (caller->role == Role::join) return problem(403, "this is a worker's join token: it opens nothing here");
+  return std::move(*caller);
+}
+
+std::optional<Response> Auth::too_often(const Request& request, const Caller* caller) {
+  const std::string who = caller ? "token " + caller->token_id : Throttle::group_of(request.peer);
+  const int wait = throttle_.request(who, now_());
+  if (wait == 0) return std::nullopt;
+  return too_many(wait, fmt::format("more than {} requests a second; wait as long as Retry-After says",
+                                    options_.requests.per_second));
+}
+
+bool Auth::still_valid(const Caller& caller) const { return tokens_.by_id(caller.token_id).has_value(); }
+
+std::variant<std::string, Response> Auth::open_session(const Request& request, std::string_view token) {
+  auto caller = caller_of_token(
+      request, token,
+      "this is no token of this coordinator (the admin's is in its data folder, file 'token')");
+  if (auto* refused = std::get_if<Response>(&caller)) return std::move(*refused);
+  std::array<unsigned char, 16> nonce{};
+  CHECK(RAND_bytes(nonce.data(), static_cast<int>(nonce.size())) == 1, "the system's random numbers failed");
+  std::string text = fmt::format("{}.", now_() + kSessionSeconds);
+  for (const unsigned char byte : nonce) text += fmt::format("{:02x}", byte);
+  text += "." + std::get<Caller>(caller).token_id;
+  return cookie(text + "." + mac(text), kSessionSeconds);
+}
+
+std::string Auth::cookie(std::string_view value, std::int64_t seconds) const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", cookie_name_, value, seconds,
+                     options_.secure ? "; Secure" : "");
+}
+
+std::string Auth::close_session(const Request& request) {
+  const std::string session(session_of(request));
+  if (caller_of_session(session)) {
+    const std::lock_guard lock(mutex_);
+    const std::int64_t now = now_();
+    std::erase_if(revoked_, [now](const auto& entry) { return entry.second < now; });
+    if (revoked_.size() >= kMaxRevokedSessions) revoked_.erase(revoked_.begin());
+    revoked_.emplace(session, now + kSessionSeconds);
+  }
+  return cookie("", 0);
+}
+
+bool Auth::cross_site(const Request& request) {
+  const std::string_view site = request.header("sec-fetch-site");
+  if (site == "cross-site" || site == "same-site") return true;
+  const std::string_view origin = request.header("origin");
+  if (origin.empty()) return false;
+  // Compares only host and port: a proxy in front may use TLS where we do not.
+  const std::size_t scheme = origin.find("://");
+  return scheme == std::string_view::npos || origin.substr(scheme + 3) != request.header("host");
+}
+
+std::optional<Caller> Auth::caller_of_session(std::string_view session) const {
+  const std::size_t last = session.rfind('.');
+  if (last == std::string_view::npos) return std::nullopt;
+  const std::string_view text = session.substr(0, last);
+  if (!equal_secret(session.substr(last + 1), mac(text))) return std::nullopt;
+  std::int64_t expiry = 0;
+  std::from_chars(text.data(), text.data() + text.size(), expiry);
+  if (expiry <= now_()) return std::nullopt;
+  {
+    const std::lock_guard lock(mutex_);
+    if (revoked_.find(session) != revoked_.end()) return std::nullopt;
+  }
+  return tokens_.by_id(text.substr(text.rfind('.') + 1));
+}
+
+std::string_view Auth::session_of(const Request& request) const {
+  std::string_view rest = request.header("cookie");
+  while (!rest.empty()) {
+    const std::size_t end = rest.find(';');
+    std::string_view pair = rest.substr(0, end);
+    rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
+    while (pair.starts_with(' ')) pair.remove_prefix(1);
+    if (pair.size() > cookie_name_.size() && pair.starts_with(cookie_name_) &&
+        pair[cookie_name_.size()] == '=')
+      return pair.substr(cookie_name_.size() + 1);
+  }
+  return {};
+}
+
+std::string Auth::mac(std::string_view text) const {
+  Digest out;
+  unsigned size = 0;
+  const std::string& key = tokens_.session_key();
+  CHECK(HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
+             reinterpret_cast<const unsigned char*>(text.data()), text.size(), out.bytes.data(),
+             &size) != nullptr,
+        "HMAC failed");
+  return out.hex();
+}
+
+}  // namespace ls::http

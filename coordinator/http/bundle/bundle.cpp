@@ -1,0 +1,208 @@
+#include "coordinator/http/bundle/bundle.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+#include <vector>
+
+#include "common/base/plain_text.h"
+#include "common/scene/xml/source_text.h"
+#include "coordinator/http/bundle/bundle_layout.h"
+#include "coordinator/http/message/limits.h"
+
+namespace ls::http {
+namespace {
+
+tl::unexpected<Error> refused(const Error& error) {
+  return error.code == Errc::invalid_argument ? bad_bundle(error.message) : tl::unexpected(error);
+}
+
+// An error inside an archive, with the entry in which it occurred.
+tl::unexpected<Error> within(const Error& error, std::string_view name) {
+  if (error.code != Errc::invalid_argument) return tl::unexpected(error);
+  return bad_entry(name, error.message);
+}
+
+// The first pass: reads, counts and hashes everything; keeps only names, digests and job.json.
+class Survey {
+ public:
+  Survey(const BundleLimits& limits, std::uint64_t archive_bytes)
+      : limits_(limits),
+        most_(std::min(limits.total_bytes,
+                       kBundleSlack + std::min(archive_bytes, limits.total_bytes) * kMaxBundleRatio)) {}
+
+  Result<void> run(ArchiveReader& archive) {
+    while (true) {
+      const auto entry = archive.next();
+      if (!entry) return refused(entry.error());
+      if (!*entry) return {};
+      if (auto ok = look_at(**entry, archive); !ok) return ok;
+    }
+  }
+
+  BundleContents contents;
+
+ private:
+  Result<void> look_at(const ArchiveEntry& entry, ArchiveReader& archive) {
+    const auto name = normal_name(entry.name);
+    if (!name) return bad_entry(entry.name, name.error().message);
+    if (auto ok = allowed(entry, *name); !ok) return ok;
+    const bool folder = entry.kind == ArchiveEntry::Kind::folder;
+    if (!folder && !names_.insert(*name).second) return bad_entry(entry.name, "is in it twice");
+    if (++entries_ > kMaxBundleEntries)
+      return bad_bundle(fmt::format("it has more than {} entries", kMaxBundleEntries));
+    name_bytes_ += name->size();
+    if (name_bytes_ > kMaxBundleNames)
+      return bad_bundle(fmt::format("its names have more than {} bytes", kMaxBundleNames));
+    if (entry.bytes)
+      if (auto ok = room_for(entry.name, *entry.bytes, total_ + std::min(*entry.bytes, limits_.total_bytes));
+          !ok)
+        return ok;
+    return read_bytes(entry, *name, folder, archive);
+  }
+
+  static Result<void> allowed(const ArchiveEntry& entry, const std::string& name) {
+    using Kind = ArchiveEntry::Kind;
+    if (entry.kind == Kind::link) return bad_entry(entry.name, "is a link: put the file itself in");
+    if (entry.kind == Kind::other) return bad_entry(entry.name, "is neither a file nor a folder");
+    if (entry.encrypted) return bad_entry(entry.name, "is encrypted: pack it without a password");
+    if (entry.packed_oddly)
+      return bad_entry(entry.name, "is packed by an unusual method: pack it with deflate, or unpacked");
+    if (name.empty() && entry.kind == Kind::file) return bad_entry(entry.name, "is no name of a file");
+    return {};
+  }
+
+  Result<void> room_for(std::string_view name, std::uint64_t bytes, std::uint64_t total) const {
+    if (bytes > limits_.entry_bytes)
+      return bad_entry(name,
+                       fmt::format("has more than the {} bytes that one file may have", limits_.entry_bytes));
+    if (total > limits_.total_bytes)
+      return bad_entry(name, fmt::format("goes beyond the {} bytes that all files may have, unpacked",
+                                         limits_.total_bytes));
+    if (total > most_)
+      return bad_entry(
+          name,
+          fmt::format("unpacks to implausibly much: the files of this archive may have {} bytes, {} times "
+                      "its size and {}; upload the files as blobs instead",
+                      most_, kMaxBundleRatio, kBundleSlack));
+    return {};
+  }
+
+  Result<void> read_bytes(const ArchiveEntry& entry, const std::string& name, bool folder,
+                          ArchiveReader& archive) {
+    const bool keep = !folder && may_be_job_file(name);
+    std::string text;
+    Sha256 sha;
+    std::uint64_t bytes = 0;
+    while (true) {
+      const auto n = archive.read(buffer_);
+      if (!n) return within(n.error(), entry.name);
+      if (*n == 0) break;
+      if (folder) return bad_entry(entry.name, "is a folder with bytes of its own");
+      bytes += *n;
+      total_ += *n;
+      if (auto ok = room_for(entry.name, bytes, total_); !ok) return ok;
+      const auto part = std::span<const std::byte>(buffer_).first(*n);
+      sha.update(part);
+      if (keep && text.size() <= kMaxBundleJobJson)  // one that is too long is an error only if it is used
+        text.append(reinterpret_cast<const char*>(part.data()), part.size());
+    }
+    if (folder) return {};
+    contents.files.push_back({name, sha.finish()});
+    if (keep) contents.job_files.emplace(name, std::move(text));
+    return {};
+  }
+
+  // True at the top, or directly in the first folder that has one (which may turn out to be the top).
+  bool may_be_job_file(const std::string& name) const {
+    if (name == kBundleJobFile) return true;
+    const std::size_t slash = name.find('/');
+    return slash != std::string::npos && name.substr(slash + 1) == kBundleJobFile &&
+           contents.job_files.size() < 2;
+  }
+
+  const BundleLimits& limits_;
+  const std::uint64_t most_;
+  std::set<std::string> names_;
+  std::size_t entries_ = 0, name_bytes_ = 0;
+  std::uint64_t total_ = 0;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(kBodyChunk);
+};
+
+// The second pass: stores the files that the blob store lacks.
+Result<void> store(ArchiveReader& archive, const std::vector<BundleFile>& files,
+                   coordinator::BlobStore& blobs) {
+  std::vector<std::byte> buffer(kBodyChunk);
+  std::size_t next = 0;
+  while (true) {
+    const auto entry = archive.next();
+    if (!entry) return tl::unexpected(entry.error());
+    if (!*entry) return {};
+    const bool is_file = (*entry)->kind == ArchiveEntry::Kind::file;
+    if (is_file && next == files.size()) return fail(Errc::internal, "a bundle changed while it was read");
+    std::unique_ptr<coordinator::BlobStore::Upload> upload;
+    if (is_file && !blobs.prove(files[next].digest)) {
+      auto begun = blobs.begin_upload(files[next].digest);
+      if (!begun) return tl::unexpected(begun.error());
+      upload = std::move(*begun);
+    }
+    while (true) {
+      const auto n = archive.read(buffer);
+      if (!n) return within(n.error(), (*entry)->name);
+      if (*n == 0) break;
+      if (!upload) continue;
+      if (auto done = upload->append(std::span<const std::byte>(buffer).first(*n)); !done) return done;
+    }
+    if (upload)
+      if (auto done = upload->finish(); !done) return done;
+    next += is_file;
+  }
+}
+
+}  // namespace
+
+Result<std::string> normal_name(std::string_view name) {
+  const auto wrong = [](std::string_view why) { return fail(Errc::invalid_argument, std::string(why)); };
+  if (name.empty()) return wrong("is no name (or one in an unknown encoding: names are UTF-8)");
+  if (name.size() > kMaxAssetName)
+    return wrong(fmt::format("has a name of more than {} bytes", kMaxAssetName));
+  if (scene::find_invalid_utf8(name) != std::string_view::npos) return wrong("has a name that is not UTF-8");
+  if (scene::find_control(name) != std::string_view::npos ||
+      name.find_first_of("\t\r\n") != std::string_view::npos)
+    return wrong("has control characters in its name");
+  if (name.find('\\') != std::string_view::npos)
+    return wrong("has a backslash in its name: folders are separated by /");
+  const bool drive = name.size() > 1 && name[1] == ':' && std::isalpha(static_cast<unsigned char>(name[0]));
+  if (name.front() == '/' || drive)
+    return wrong("has an absolute name: names are relative to the bundle's top");
+  std::string out;
+  while (!name.empty()) {
+    const std::size_t slash = std::min(name.find('/'), name.size());
+    const std::string_view part = name.substr(0, slash);
+    name.remove_prefix(std::min(slash + 1, name.size()));
+    if (part == "..") return wrong("leads out of its folder by \"..\"");
+    if (part.empty() || part == ".") continue;
+    if (!out.empty()) out += '/';
+    out += part;
+  }
+  return out;
+}
+
+Result<Bundle> read_bundle(int fd, std::uint64_t archive_bytes, ArchiveKind kind, const BundleLimits& limits,
+                           coordinator::BlobStore& blobs, const std::stop_token& stop) {
+  if (archive_bytes == 0) return bad_bundle("the archive is empty");
+  auto first = ArchiveReader::open(fd, kind, stop);
+  if (!first) return refused(first.error());
+  Survey survey(limits, archive_bytes);
+  if (auto done = survey.run(*first); !done) return tl::unexpected(done.error());
+  auto bundle = sorted_out(survey.contents);
+  if (!bundle) return bundle;
+  auto second = ArchiveReader::open(fd, kind, stop);
+  if (!second) return tl::unexpected(second.error());
+  if (auto done = store(*second, survey.contents.files, blobs); !done) return tl::unexpected(done.error());
+  return bundle;
+}
+
+}  // namespace ls::http

@@ -1,0 +1,49 @@
+// A bundle: a scene with all its files in one archive. Decides what it may contain, which file is the scene,
+// and stores the files as blobs. The whole archive is checked first, so that nothing of a rejected archive is
+// stored.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <stop_token>
+#include <string>
+#include <string_view>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "coordinator/http/bundle/archive.h"
+#include "coordinator/store/blobs/blob_store.h"
+#include "coordinator/views/submit_request.h"
+
+namespace ls::http {
+
+struct BundleLimits {
+  std::uint64_t entry_bytes = std::uint64_t{64} << 30;  // of one file, unpacked
+  std::uint64_t total_bytes = std::uint64_t{64} << 30;  // of all files together
+};
+
+struct Bundle {
+  std::string scene;  // its name in the archive, for messages
+  Digest scene_digest;
+  // All other files by the names that the scene uses: relative to the scene's folder.
+  std::map<std::string, Digest> assets;
+  std::string spec = "{}";  // JSON: the keys of job.json except the scene
+};
+
+// The scene is the file that job.json names ({"scene": FILE, and the keys of the spec}), otherwise the only
+// .xml file at the top. If everything lies in one folder, that folder is the top. Names are normalised
+// ("./a//b" is "a/b").
+//
+// Rejected, naming the entry: names that are absolute, lead out by "..", are not UTF-8, or have control
+// characters or backslashes; links and devices; duplicate names; encrypted entries and unusual compression;
+// more entries or bytes than allowed; archives that unpack to more than kBundleSlack + kMaxBundleRatio times
+// their own size; damaged or truncated archives. All these are invalid_argument; otherwise the store's error,
+// or `unavailable` after a stop.
+Result<Bundle> read_bundle(int fd, std::uint64_t archive_bytes, ArchiveKind kind, const BundleLimits& limits,
+                           coordinator::BlobStore& blobs, const std::stop_token& stop);
+
+// Returns the normalised name of an entry; empty: the top folder itself. The error says what is wrong with
+// it.
+Result<std::string> normal_name(std::string_view name);
+
+}  // namespace ls::http

@@ -1,0 +1,21 @@
+// Content-Range of an upload in parts: "bytes FIRST-LAST/SIZE" (RFC 9110, 14.4), or "bytes */SIZE" with an
+// empty body if everything was sent before.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace ls::http {
+
+struct ContentRange {
+  std::uint64_t first = 0;
+  std::uint64_t bytes = 0;  // 0: "*"
+  std::uint64_t size = 0;   // of the whole
+  bool possible = true;     // false: FIRST-LAST does not lie within SIZE bytes
+  bool is_last() const { return first + bytes == size; }
+};
+// nullopt: neither of these forms.
+std::optional<ContentRange> parse_content_range(std::string_view value);
+
+}  // namespace ls::http

@@ -1,0 +1,25 @@
+// A body in a file: sent slice by slice, so that a slow reader does not keep it in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "common/base/error.h"
+
+namespace ls::http {
+
+struct FileBody {
+  std::shared_ptr<const int> fd;  // closed with the last copy; stays readable even if the file is removed
+  std::uint64_t size = 0;         // bytes
+};
+
+// not_found: there is no such file.
+Result<FileBody> open_file_body(const std::filesystem::path& path);
+
+// Reads bytes from `offset` on and returns their number; 0: the file has become shorter, or cannot be read.
+std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std::byte> into);
+
+}  // namespace ls::http

@@ -1,0 +1,54 @@
+#include "coordinator/http/message/json_read.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "coordinator/http/message/limits.h"
+
+namespace ls::http {
+
+Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known) {
+  using nlohmann::json;
+  json object;
+  bool too_deep = false;
+  const auto watch = [&](int depth, json::parse_event_t, const json&) {
+    too_deep |= depth > kMaxJsonDepth;
+    return !too_deep;
+  };
+  try {
+    object = json::parse(body, watch);
+  } catch (const json::exception& e) {
+    return fail(Errc::invalid_argument, fmt::format("the body is not JSON: {}", e.what()));
+  }
+  if (too_deep)
+    return fail(Errc::invalid_argument,
+                fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth));
+  if (!object.is_object()) return fail(Errc::invalid_argument, "the body must be a JSON object");
+  for (const auto& item : object.items())
+    if (std::find(known.begin(), known.end(), item.key()) == known.end())
+      return fail(Errc::invalid_argument, fmt::format("unknown key '{}' in the body; known: {}",
+                                                      item.key().substr(0, 100), fmt::join(known, ", ")));
+  return object;
+}
+
+Result<Digest> read_digest(std::string_view text, std::string_view what) {
+  std::string lower(text.substr(0, 65));
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c + 32) : c; });
+  if (const auto digest = Digest::parse(lower)) return *digest;
+  return fail(Errc::invalid_argument, fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
+}
+
+Result<Digest> read_digest(const nlohmann::json& value, std::string_view what) {
+  if (!value.is_string())
+    return fail(Errc::invalid_argument, fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
+  return read_digest(std::string_view(value.get_ref<const std::string&>()), what);
+}
+
+std::string write_json(const nlohmann::ordered_json& json) {
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace ls::http

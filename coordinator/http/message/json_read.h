@@ -1,0 +1,23 @@
+// Helpers that read request bodies: JSON objects in which unknown keys are errors.
+#pragma once
+
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+
+namespace ls::http {
+
+// The body as an object with no keys except `known`; the error says what is wrong.
+Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known);
+
+// A SHA-256 in hexadecimal (either case); `what` names it in the error.
+Result<Digest> read_digest(std::string_view text, std::string_view what);
+Result<Digest> read_digest(const nlohmann::json& value, std::string_view what);
+
+// Serialises to JSON; invalid UTF-8 is replaced.
+std::string write_json(const nlohmann::ordered_json& json);
+
+}  // namespace ls::http

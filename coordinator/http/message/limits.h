@@ -1,0 +1,84 @@
+// All limits of the HTTP server. Sizes in bytes, times in seconds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+#include "coordinator/base/limits.h"
+
+namespace ls::http {
+
+// Bodies, per route
+inline constexpr std::uint64_t kMaxSceneXml = 32u << 20;  // POST /jobs with application/xml
+inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
+inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
+inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
+inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
+
+// Contents of requests
+inline constexpr int kMaxJsonDepth = 16;             // values are printed recursively
+inline constexpr std::size_t kMaxDigests = 100'000;  // per POST /blobs/missing
+inline constexpr std::size_t kMaxAssetName = 1024;   // characters
+inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
+inline constexpr std::size_t kMaxQueryParameters = 256;
+inline constexpr std::size_t kMaxIdLength = 64;  // of a job's id
+inline constexpr double kMaxExposure = 32;       // stops, positive or negative
+
+// Bundles
+inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets;  // files and folders
+inline constexpr std::size_t kMaxBundleNames = 16u << 20;    // bytes of all names together
+inline constexpr std::size_t kMaxBundleJobJson = 1u << 20;   // job.json
+inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;  // a zip's directory, which is read as a whole
+inline constexpr std::uint64_t kMaxBundleRatio = 200;        // unpacked bytes per byte of the archive...
+// ...in addition to these bytes: empty grids compress well
+inline constexpr std::uint64_t kBundleSlack = 64u << 20;
+
+// Buffers
+inline constexpr std::size_t kReadBuffer = 64u << 10;   // per connection
+inline constexpr std::size_t kBodyChunk = 256u << 10;   // written to the disk at once
+inline constexpr std::size_t kWriteSlice = 256u << 10;  // between two checks of the clock
+// Request bodies in memory, over all connections
+inline constexpr std::uint64_t kMaxBuffered = 256u << 20;
+// Bodies of answers in memory, over all connections. A larger answer is sent when no other is; bodies in
+// files do not count.
+inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
+inline constexpr std::uint64_t kSmallAnswer = 64u << 10;  // never rejected and not counted
+inline constexpr std::uint64_t kLingerBytes = 16u << 20;  // read and discarded after an early rejection
+
+inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
+inline constexpr std::size_t kMaxRevokedSessions = 10'000;
+
+// Limits that tests and the operator's config file may change
+struct Limits {
+  std::uint64_t blob_bytes = std::uint64_t{64} << 30;      // PUT /blobs/SHA256, and each file of a bundle
+  std::uint64_t bundle_bytes = std::uint64_t{16} << 30;    // POST /jobs with an archive
+  std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
+  std::size_t header_bytes = 16u << 10;
+  std::size_t connections = 512;
+  std::size_t event_streams = 128;  // part of `connections`; the others stay free for requests
+  std::size_t event_queue = 4096;   // events waiting for one reader
+  std::size_t event_queue_bytes = 4u << 20;
+  double header_seconds = 10;  // from the first byte of a request to the end of its header
+  double idle_seconds = 60;    // of a kept connection between two requests
+  // A body (in either direction) is cut off when it is slower than this: allowed seconds = grace + bytes so
+  // far / min_rate. So it takes at most grace + length / min_rate, and one that stalls is cut off after
+  // grace, whatever length it announced.
+  double body_grace_seconds = 15;
+  double min_rate = 8u << 10;     // bytes per second
+  double heartbeat_seconds = 15;  // between comments on a silent event stream
+  double linger_seconds = 3;      // reading on after an early rejection, so that the answer arrives
+  // Requests per token, or per address without a token; 0: no limit. The burst is twice as large
+  double requests_per_second = 500;
+  double wrong_tokens_per_minute = 20;  // per address, with a burst of the same size; then 429; 0: no limit
+  double stop_seconds = 5;              // for open requests when the coordinator stops
+  int quick_threads = 2;                // for answers from memory
+  int remote_threads = 8;               // for requests to other machines: blob stores, other coordinators
+  int user_priority = 0;                // highest priority of jobs with a submit token
+  int slow_threads = 4;                 // for reading scenes, writing images and blobs
+  int bundle_threads = 2;               // for unpacking bundles, so that these never occupy all slow threads
+  // Folder for bundles while they are read; empty: the system's temporary folder
+  std::filesystem::path spool;
+};
+
+}  // namespace ls::http

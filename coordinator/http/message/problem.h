@@ -1,0 +1,24 @@
+// Errors as RFC 9457 problem details, and the only mapping from Errc to HTTP status.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/base/error.h"
+#include "common/scene/diagnostic.h"
+#include "coordinator/http/message/message.h"
+
+namespace ls::http {
+
+int status_of(Errc code);
+
+// {type, title, status, detail}; `detail` says what happened, where, and what to do.
+Response problem(int status, std::string_view detail);
+Response problem(const Error& error);
+// 429 with Retry-After.
+Response too_many(int wait_seconds, std::string_view detail);
+// For a rejected scene, with diagnostics: [{severity, file, line, column, text, source_line, length}].
+Response problem(const Error& error, std::span<const Diagnostic> diagnostics);
+
+}  // namespace ls::http

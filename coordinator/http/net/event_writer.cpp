@@ -1,0 +1,124 @@
+// A connection that serves an event stream.
+#include <fmt/format.h>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "coordinator/http/auth/visible.h"
+#include "coordinator/http/message/problem.h"
+#include "coordinator/http/net/connection.h"
+#include "coordinator/http/net/head_text.h"
+#include "coordinator/http/net/run_on.h"
+
+namespace ls::http {
+namespace {
+
+using boost::system::error_code;
+
+// Cleans up however the stream ends, even if the server is destroyed around it.
+struct Undo {
+  Shared& shared;
+  net::steady_timer*& events_wait;
+  std::shared_ptr<EventQueue> queue;
+  ~Undo() {
+    events_wait = nullptr;
+    queue->close();
+    --shared.event_streams;
+    --shared.api.counters().event_streams;
+  }
+};
+
+struct Start {
+  std::uint64_t after = 0;
+  bool reset = false;  // the reader's id was never published here: it is from another data folder
+};
+
+}  // namespace
+
+net::awaitable<void> Connection::stream_events(const Request& request, const Response& response) {
+  if (shared_.event_streams >= limits_.event_streams) {
+    co_await answer(request, problem(503, "too many event streams are open; close one or try again later"),
+                    false);
+    co_return;
+  }
+  const EventStream& wanted = *response.events;
+  auto& coordinator = shared_.api.coordinator();
+  auto find_start = [&coordinator, &wanted] {
+    const std::uint64_t last = coordinator.last_event_id();
+    const std::uint64_t after = wanted.after_id.value_or(last);
+    return after > last ? Start{last, true} : Start{after, false};
+  };
+  net::steady_timer wait(shared_.io);
+  ++shared_.event_streams;
+  ++shared_.api.counters().event_streams;
+  auto wake = [this, &io = shared_.io, alive = std::weak_ptr(alive_)] {
+    net::post(io, [this, alive] {
+      if (!alive.expired() && events_wait_ != nullptr) events_wait_->cancel();
+    });
+  };
+  const Start start = co_await run_on(shared_.quick, shared_.io, std::move(find_start));
+  const EventQueue::Bounds bounds{limits_.event_queue, limits_.event_queue_bytes};
+  auto queue = std::make_shared<EventQueue>(bounds, wanted.job, start.after, std::move(wake));
+  events_wait_ = &wait;
+  const Undo undo{shared_, events_wait_, queue};
+
+  shared_.api.counters().answered(request.method, response.status);
+  std::string head = head_text(response, {.streamed = true, .method = request.method}, system_unix_clock()());
+  if (request.method == Method::head) {
+    co_await write_all(head, {});
+    co_return;
+  }
+  // An id without data sets the id from which a reconnecting browser continues, without being an event.
+  head += fmt::format("retry: 1000\nid: {}\n\n", start.after);
+  if (start.reset)
+    head += fmt::format("event: reset\ndata: {{\"missed_from\":0,\"missed_to\":{}}}\n\n", start.after);
+  if (!co_await write_all(head, {})) co_return;
+
+  auto subscribe = [&coordinator, after = start.after, queue, reader = wanted.reader] {
+    return coordinator.subscribe(after, [queue, reader](const coordinator::StreamEvent& event) {
+      if (reader.role != Role::submit) return queue->push(event);
+      const auto shown = visible(event, reader);
+      queue->push(event, shown ? &*shown : nullptr);
+    });
+  };
+  auto subscription = co_await run_on(shared_.quick, shared_.io, std::move(subscribe));
+  watch_reader();
+  co_await write_events(*queue, wanted.reader);
+  queue->close();
+  auto unsubscribe = [handle = std::move(subscription)]() mutable {
+    handle.reset();  // on the pool: it may wait for a callback in progress
+    return true;
+  };
+  co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
+}
+
+net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& reader) {
+  while (!shared_.stopping && !reader_gone_ && shared_.api.auth().still_valid(reader)) {
+    const bool last = queue.overflowed();
+    const std::string text = queue.take();
+    if (!text.empty()) {
+      if (!co_await write_all(text, {})) co_return;
+      continue;
+    }
+    if (last) {
+      ++shared_.api.counters().events_dropped;
+      co_return;
+    }
+    error_code ec;
+    events_wait_->expires_after(steady_seconds(limits_.heartbeat_seconds));
+    co_await events_wait_->async_wait(net::redirect_error(net::use_awaitable, ec));
+    if (!ec && !co_await write_all(":\n\n", {})) co_return;
+  }
+}
+
+// Readers send nothing more: whatever arrives, most likely the close, ends the stream.
+void Connection::watch_reader() {
+  stream_.read_in_background(net::buffer(discard_), [this, alive = std::weak_ptr(alive_)] {
+    if (alive.expired()) return;
+    reader_gone_ = true;
+    if (events_wait_ != nullptr) events_wait_->cancel();
+  });
+}
+
+}  // namespace ls::http

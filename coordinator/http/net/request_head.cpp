@@ -1,0 +1,106 @@
+#include "coordinator/http/net/request_head.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "coordinator/http/message/problem.h"
+#include "coordinator/http/message/uri.h"
+
+namespace ls::http {
+namespace {
+
+namespace bhttp = beast::http;
+using boost::system::error_code;
+using Header = bhttp::request_header<bhttp::fields>;
+
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  return out;
+}
+
+// With two of these, two readers could interpret a request differently.
+constexpr std::string_view kOnce[] = {"host",           "authorization",     "content-type",
+                                      "content-length", "transfer-encoding", "origin",
+                                      "expect",         "content-range"};
+
+std::optional<Response> refuse_header(const Header& header) {
+  for (const std::string_view name : kOnce)
+    if (header.count(name) > 1)
+      return problem(400, fmt::format("the request has more than one '{}' header", name));
+  if (header.version() != 10 && header.version() != 11) return problem(505, "speak HTTP/1.1 or HTTP/1.0");
+  if (header.version() == 11 && header.count(bhttp::field::host) == 0)
+    return problem(400, "the request has no 'Host' header");
+  if (const auto coding = header[bhttp::field::transfer_encoding];
+      !coding.empty() && lower_case(coding) != "chunked")
+    return problem(501, "of the transfer codings only 'chunked' is understood");
+  if (const auto expect = header[bhttp::field::expect];
+      !expect.empty() && lower_case(expect) != "100-continue")
+    return problem(400, "of the expectations only '100-continue' is understood");
+  if (header.target().size() > kMaxTarget)
+    return problem(414, fmt::format("the request target has more than {} characters", kMaxTarget));
+  return std::nullopt;
+}
+
+bool broken(error_code ec) { return ec && ec != bhttp::error::need_more && ec != bhttp::error::need_buffer; }
+
+}  // namespace
+
+void prepare(Parser& parser, const Limits& limits) {
+  parser.header_limit(static_cast<std::uint32_t>(limits.header_bytes));
+  parser.body_limit(boost::none);  // limited per route, while the body is read
+}
+
+Parsed take_header(Parser& parser, beast::flat_buffer& buffer) {
+  error_code ec;
+  buffer.consume(parser.put(buffer.data(), ec));
+  if (ec == bhttp::error::header_limit) return Parsed::too_large;
+  if (broken(ec)) return Parsed::malformed;
+  return parser.is_header_done() ? Parsed::done : Parsed::more;
+}
+
+std::variant<Response, Request> to_request(const Parser& parser) {
+  const Header& header = parser.get();
+  if (auto refused = refuse_header(header)) return *refused;
+  Request request;
+  const auto method = parse_method(std::string_view(header.method_string()));
+  if (!method) return problem(501, "this method is not known here");
+  request.method = *method;
+  if (*method == Method::options && header.target() == "*") {
+    Response response;
+    response.status = 204;
+    return response;
+  }
+  auto target = parse_target(std::string_view(header.target()));
+  if (!target) return problem(target.error());
+  request.segments = std::move(target->segments);
+  request.query = std::move(target->query);
+  for (const auto& field : header)
+    request.headers.emplace_back(lower_case(std::string_view(field.name_string())),
+                                 std::string(field.value()));
+  if (const auto length = parser.content_length()) request.content_length = *length;
+  request.has_body = parser.chunked() || request.content_length.value_or(0) > 0;
+  return request;
+}
+
+Portion take_body(Parser& parser, beast::flat_buffer& buffer, std::string& into) {
+  const std::size_t old = into.size(), room = buffer.size();
+  into.resize(old + room);
+  auto& body = parser.get().body();
+  body.data = into.data() + old;
+  body.size = room;
+  body.more = true;
+  error_code ec;
+  Portion portion;
+  portion.consumed = parser.put(buffer.data(), ec);
+  portion.got = room - body.size;
+  portion.malformed = broken(ec);
+  buffer.consume(portion.consumed);
+  into.resize(old + portion.got);
+  return portion;
+}
+
+}  // namespace ls::http

@@ -1,0 +1,155 @@
+#include "coordinator/rpc/rpc_server.h"
+
+#include <fmt/format.h>
+#include <grpcpp/grpcpp.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "common/base/log.h"
+#include "common/protocol/limits.h"
+#include "coordinator/rpc/blob_stream.h"
+#include "coordinator/rpc/limits.h"
+#include "coordinator/rpc/read_pool.h"
+#include "coordinator/rpc/work_stream.h"
+
+namespace ls::coordinator {
+
+using rpc::BlobStream;
+using rpc::WorkStream;
+namespace pb = ::lightshaft::farm::v1;
+
+namespace {
+// A reactor that only rejects the call.
+template <class Reactor>
+class Refusal final : public Reactor {
+ public:
+  explicit Refusal(const grpc::Status& status) { this->Finish(status); }
+  void OnDone() override { delete this; }
+};
+
+std::shared_ptr<grpc::ServerCredentials> credentials(const std::optional<GrpcServer::Tls>& tls) {
+  if (!tls) return grpc::InsecureServerCredentials();
+  grpc::SslServerCredentialsOptions options(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+  options.pem_root_certs = tls->ca;
+  options.pem_key_cert_pairs.push_back({tls->key, tls->cert});
+  return grpc::SslServerCredentials(options);
+}
+}  // namespace
+
+struct GrpcServer::Impl final : pb::Farm::CallbackService {
+  Impl(Coordinator& c, JoinCheck check, JoinGuard g)
+      : coordinator(c), may_join(std::move(check)), guard(std::move(g)) {}
+
+  grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>* Work(grpc::CallbackServerContext* context) override {
+    const std::lock_guard lock(mutex);
+    if (stopping || streams.size() >= rpc::kWorkStreams)
+      return new Refusal<grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>>(
+          stopping ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down")
+                   : grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many workers are connected"));
+    const TimePoint deadline = clock.now() + std::chrono::seconds(rpc::kHelloSeconds);
+    auto* stream = new WorkStream(coordinator, context, guard, deadline, [this](WorkStream* gone) {
+      const std::lock_guard inner(mutex);
+      streams.erase(gone);
+    });
+    streams.insert(stream);
+    stream->begin();
+    return stream;
+  }
+
+  grpc::ServerWriteReactor<pb::BlobChunk>* FetchBlob(grpc::CallbackServerContext* context,
+                                                     const pb::FetchBlobRequest* request) override {
+    if (++fetches > rpc::kFetches) {
+      --fetches;
+      return new Refusal<grpc::ServerWriteReactor<pb::BlobChunk>>(
+          grpc::Status(grpc::StatusCode::UNAVAILABLE, "too many transfers at once; try again"));
+    }
+    auto* stream = new BlobStream(
+        coordinator, *request, may_join, [this](std::function<void()> read) { reads.run(std::move(read)); },
+        [this] { --fetches; });
+    stream->begin(guard, address_of_peer(context->peer()));
+    return stream;
+  }
+
+  // Disconnects streams that were opened but sent no hello.
+  void sweep(std::stop_token token) {
+    std::unique_lock lock(mutex);
+    while (!token.stop_requested()) {
+      changed.wait_for(lock, token, std::chrono::seconds(1), [] { return false; });
+      for (WorkStream* stream : streams)
+        if (stream->hello_overdue(clock.now())) stream->cut();
+    }
+  }
+
+  Coordinator& coordinator;
+  const JoinCheck may_join;
+  const JoinGuard guard;
+  const SystemClock clock;
+  std::unique_ptr<grpc::Server> server;
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  std::set<WorkStream*> streams;  // guarded by mutex
+  bool stopping = false;          // guarded by mutex
+  std::atomic<int> fetches{0};
+  rpc::ReadPool reads;  // stopped after the last stream
+  std::jthread sweeper;
+};
+
+GrpcServer::GrpcServer(Coordinator& coordinator, JoinCheck may_join, JoinGuard guard)
+    : impl_(std::make_unique<Impl>(coordinator, std::move(may_join), std::move(guard))) {}
+
+GrpcServer::~GrpcServer() { stop(); }
+
+Result<int> GrpcServer::start(const std::string& address, const std::optional<Tls>& tls) {
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(address, credentials(tls), &port);
+  builder.RegisterService(impl_.get());
+  builder.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
+  builder.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, rpc::kHandshakeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, rpc::kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, rpc::kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, rpc::kPingsNotOftenerMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
+  // Bounds the bytes received on a stream that is not read; gRPC would let them grow to megabytes per worker.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, rpc::kUnreadBytes);
+  impl_->server = builder.BuildAndStart();
+  if (!impl_->server || port == 0) {
+    impl_->server.reset();
+    return fail(
+        Errc::unavailable,
+        fmt::format(
+            "cannot listen for workers on {}: the port is taken (another coordinator?) or the address is "
+            "not this machine's; choose another with --grpc",
+            address));
+  }
+  impl_->reads.start(rpc::kReadThreads);
+  impl_->sweeper = std::jthread([this](std::stop_token token) { impl_->sweep(token); });
+  return port;
+}
+
+void GrpcServer::stop() {
+  if (!impl_->server) return;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->stopping = true;
+    for (WorkStream* stream : impl_->streams)
+      stream->end(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"));
+  }
+  impl_->sweeper.request_stop();
+  impl_->changed.notify_all();
+  // Streams that do not end by themselves within this time are cut off.
+  impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
+  impl_->server->Wait();
+  impl_->reads.stop();
+  impl_->server.reset();
+}
+
+}  // namespace ls::coordinator

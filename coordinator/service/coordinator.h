@@ -1,0 +1,121 @@
+// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/
+// put it on the network; `lightshaft render` uses it in process.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/error.h"
+#include "coordinator/domain/farm_figures.h"
+#include "coordinator/domain/figures.h"
+#include "coordinator/store/blobs/blob_store.h"
+#include "coordinator/store/jobs/job_store.h"
+#include "coordinator/views/job_view.h"
+#include "coordinator/views/submit_request.h"
+#include "coordinator/views/worker_session.h"
+
+namespace ls::coordinator {
+
+class Coordinator {
+ public:
+  struct Options {
+    std::filesystem::path data;  // empty: everything in memory, nothing survives (`lightshaft render`)
+    // Where jobs are stored: sqlite, or a redis:// address (store/redis/redis_link.h)
+    std::string store = "sqlite";
+    std::shared_ptr<JobStore> jobs;    // set by tests; null: opened as `store` says
+    std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened as `blobs_at` says
+    std::string blobs_at;              // empty: under `data`; else a folder, or an s3:// address
+    // How long a blob is kept that no job needs and nobody requests, and an interrupted upload that does not
+    // grow. nullopt: blobs are kept for good, interrupted uploads for a day.
+    std::optional<Duration> keep_unused = std::chrono::hours(24);
+    bool shared = false;      // other coordinators use the same store and blobs
+    std::string join_token;   // empty: any worker may join
+    JoinCheck may_join;       // if set, replaces the check of join_token
+    bool allow_fake = false;  // workers that invent their pixels may join
+    ShareLimits limits;
+    double audit_rate = 0.01;  // fraction of the results that another worker renders again
+    std::shared_ptr<const Clock> clock;
+    // Interval of Tick events, raised by a thread of the coordinator; nullopt: the caller calls tick()
+    std::optional<Duration> tick;
+  };
+  static Result<std::unique_ptr<Coordinator>> open(Options options);
+  virtual ~Coordinator() = default;
+
+  // Jobs
+
+  // With spec.frames the returned id is the sequence's. Functions that change or show a job also accept a
+  // sequence's id; functions on a single image need the id of a frame, frame_job().
+  virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
+  virtual std::vector<JobView> jobs() const = 0;  // a sequence counts as one job; its frames are not listed
+  virtual Result<JobView> job(const JobId& id) const = 0;
+  virtual Result<std::string> owner(const JobId& id) const {  // JobView::owner, at less cost
+    const auto view = job(id);
+    if (!view) return tl::unexpected(view.error());
+    return view->owner;
+  }
+  virtual Result<void> change(const JobId& id, const JobChange& change) = 0;
+  // Removes an ended job with all its results; a job that has not ended is cancelled and kept.
+  virtual Result<void> remove(const JobId& id) = 0;
+  virtual Result<void> cancel(const JobId& id) = 0;
+  virtual Result<void> pause(const JobId& id) = 0;
+  virtual Result<void> resume(const JobId& id) = 0;
+  virtual Result<void> set_priority(const JobId& id, int priority) = 0;
+  virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;  // `spp`: the new total
+  // The current image, or the final one
+  virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;
+  virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const = 0;
+  // False-colour maps of the error and of the samples (common/image/exr/maps.h).
+  virtual Result<std::vector<std::byte>> error_png(const JobId& id) const = 0;
+  virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
+  virtual Result<std::string> report_json(const JobId& id) const = 0;
+  virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
+  // Path of `name` (image.exr, report.json) of a done job; empty if there is no such file: then use the
+  // functions above.
+  virtual std::filesystem::path final_file(const JobId&, const std::string&) const { return {}; }
+  virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
+  virtual Result<std::string> job_log(const JobId& id) const = 0;
+  virtual Result<void> wait(const JobId& id) const = 0;  // until the job is done, failed or cancelled
+
+  // Workers
+  virtual std::vector<WorkerView> workers() const = 0;
+  virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello,
+                                                         std::shared_ptr<WorkerSink> sink) = 0;
+
+  // Events
+
+  // Calls `on_event` (on any thread, in order) for every event after `after_id` that is still kept, then for
+  // new ones. The subscription ends when the returned handle is destroyed. A reader that cannot keep up must
+  // itself drop events.
+  virtual std::shared_ptr<void> subscribe(std::uint64_t after_id,
+                                          std::function<void(const StreamEvent&)> on_event) = 0;
+  virtual std::uint64_t last_event_id() const = 0;
+
+  virtual BlobStore& blobs() = 0;
+  virtual bool ready(std::string* why_not) const = 0;
+  virtual StoreStatus store_status() const { return {}; }
+
+  // Other coordinators (Options::shared)
+
+  // Sets the addresses at which they, workers and clients reach this one: http://HOST:PORT and HOST:PORT.
+  virtual void announce(const std::string&, const std::string&) {}
+  // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
+  virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
+  virtual AuditFigures audits() const { return {}; }
+  virtual FarmFigures figures() const { return {}; }
+  // Reports that a blob that a worker requested is missing or damaged here: the jobs that need it are paused
+  // until it is available again.
+  virtual void blob_missing(const Digest&, const Error&) {}
+  virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // counts bytes sent to a worker
+  virtual void tick() = 0;
+  // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick
+  // the coordinator calls this itself.
+  virtual void collect() {}
+};
+
+}  // namespace ls::coordinator

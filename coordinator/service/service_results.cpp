@@ -1,0 +1,215 @@
+// The path of a result: verified on its own, made durable together with others, then reported to the farm and
+// acknowledged.
+#include <fmt/format.h>
+
+#include <set>
+#include <utility>
+
+#include "common/base/failpoint.h"
+#include "common/base/log.h"
+#include "common/base/overloaded.h"
+#include "coordinator/service/service_impl.h"
+
+namespace ls::coordinator {
+
+namespace {
+// Clamps the worker's numbers: their sums go into records that must be readable, so implausible values count
+// as 0. Values that are not numbers are rejected with the result (verify_result).
+void believe(UnitResult& result) {
+  if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
+  for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
+                       &result.times.wait})
+    *part = plausible_seconds(*part);
+}
+}  // namespace
+
+// Calls `next` when another message may come: this one was dropped, or there is room for it.
+void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult result,
+                             std::function<void()> next) {
+  failpoint("result-arrived");
+  Arrived arrived{from, std::move(result), nullptr, {}};
+  arrived.at = now();
+  believe(arrived.result);
+  {
+    const std::lock_guard lock(mutex_);
+    figures_.result_bytes += arrived.result.exr.size();
+    if (!from->open) return next();  // the worker sends it again over its newer stream
+    const UnitKey& unit = arrived.result.unit;
+    arrived.job = find_locked(unit.job);
+    const Wanted wanted = farm_.wanted(unit);
+    if (!arrived.job || wanted.verdict == Wanted::Verdict::no)
+      return acknowledge_locked(arrived, std::nullopt), next();
+    if (!wanted.numeric_class && !farm_.may_pin(unit.job, from->worker))
+      return acknowledge_locked(arrived, std::nullopt), next();
+    const Digest numeric_class = wanted.numeric_class.value_or(from->numeric_class);
+    if (numeric_class != from->numeric_class)
+      return acknowledge_locked(arrived,
+                                Error{Errc::failed_precondition,
+                                      "the job is pinned to another numeric class than this worker's"}),
+             next();
+    arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, numeric_class, wanted.rect,
+                        wanted.samples};
+    arrived.duplicate = wanted.verdict == Wanted::Verdict::duplicate;
+  }
+  // Bytes of the message and of its decoded floats. Without room only this stream is held back; no thread
+  // blocks.
+  arrived.bytes = 2 * arrived.result.exr.size();
+  const std::size_t bytes = arrived.bytes;
+  arrived.from->held_back = true;
+  budget_.ask(bytes, [this, waiting = std::make_shared<Arrived>(std::move(arrived)), next = std::move(next)] {
+    waiting->from->held_back = false;
+    arrived_.push(std::move(*waiting));
+    next();
+  });
+}
+
+void Service::verify_loop(const std::stop_token& token) {
+  while (!token.stop_requested())
+    for (Arrived& a : arrived_.pop(1, token)) {
+      const TimePoint begin = now();
+      Verified verified =
+          verify_result(a.result, a.expected, a.job->grid.frame, aovs_of(a.job->stored.settings));
+      failpoint("result-checked");
+      checked_.push({std::move(a), std::move(verified), seconds(now() - begin)});
+    }
+}
+
+void Service::commit_loop(const std::stop_token& token) {
+  while (!token.stop_requested()) {
+    if (!background_writes_.wait_for_room(kMaxBackgroundWrites, token)) return;
+    auto batch = checked_.pop(limits::kMaxCommitBatch, token);
+    if (!batch.empty()) commit(std::move(batch));
+  }
+}
+
+// All waiting results share one sync per file: under load a batch grows while the disk works, so a result
+// waits for at most two syncs.
+void Service::commit(std::vector<Checked> batch) {
+  struct Stored {
+    std::optional<PartialLog::Place> place;
+    std::optional<Error> error;
+  };
+  std::vector<Stored> stored(batch.size());
+  std::set<std::shared_ptr<PartialLog>> touched;
+  std::vector<std::shared_ptr<PartialLog>> logs(batch.size());
+  std::vector<double> at(batch.size());
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const Arrived& a = batch[i].arrived;
+      // A copy of a unit accepted meanwhile need not be stored; the farm compares its digest.
+      batch[i].arrived.duplicate = farm_.wanted(a.result.unit).verdict != Wanted::Verdict::yes;
+      batch[i].arrived.quarantined = farm_.quarantined(a.from->worker);
+      // Pinning to a fake worker's class marks the job as fake; this does so whatever class the worker names.
+      if (a.from->fake && !a.duplicate && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
+      at[i] = elapsed_locked(*a.job);
+      logs[i] = a.job->log;
+      if (const auto saved = save_pin_locked(*a.job); !saved) stored[i].error = saved.error();
+      if (const auto saved = save_quarantined_locked(); !saved) stored[i].error = saved.error();
+    }
+  }
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const Arrived& a = batch[i].arrived;
+    if (a.duplicate || a.quarantined || !logs[i] || stored[i].error ||
+        !std::holds_alternative<Partial>(batch[i].verified))
+      continue;
+    const UnitResult& r = a.result;
+    auto place = logs[i]->append({r.unit.tile, r.unit.round, a.expected.samples, r.digest, a.from->worker,
+                                  r.cpu_seconds, at[i], r.health},
+                                 r.exr);
+    if (place)
+      stored[i].place = *place, touched.insert(logs[i]);
+    else
+      stored[i].error = place.error();
+    failpoint("result-appended");
+  }
+  for (const auto& log : touched)
+    if (const auto synced = log->sync(); !synced)
+      for (std::size_t i = 0; i < batch.size(); ++i)
+        if (logs[i] == log && stored[i].place) stored[i].error = synced.error();
+
+  if (!touched.empty()) failpoint("result-durable");
+  std::unique_lock lock(mutex_);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    Checked& item = batch[i];
+    if (farm_.quarantined(item.arrived.from->worker))
+      acknowledge_locked(item.arrived,
+                         Error{Errc::failed_precondition, "this worker is barred: it rendered wrong pixels"});
+    else if (stored[i].error)
+      cannot_store_locked(item.arrived, *stored[i].error);
+    else if (const auto* bad = std::get_if<BadResult>(&item.verified))
+      refuse_locked(item.arrived, bad->error);
+    else if (std::holds_alternative<OtherRange>(item.verified))
+      acknowledge_locked(item.arrived, std::nullopt);
+    else
+      accept_locked(item, stored[i].place);
+  }
+  lock.unlock();  // requests granted now may continue at once, on this thread
+  for (const Checked& item : batch) budget_.release(item.arrived.bytes);
+}
+
+void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> place) {
+  const Arrived& a = item.arrived;
+  const UnitResult& r = a.result;
+  JobEntry& entry = *a.job;
+  store_trouble_.clear();
+  const Wanted wanted = farm_.wanted(r.unit);
+  if (wanted.verdict == Wanted::Verdict::yes && wanted.samples == a.expected.samples &&
+      (!entry.log || place)) {
+    ++figures_.accepted;
+    entry.stored.totals.core_seconds += r.cpu_seconds;
+    entry.stored.totals.time.add(
+        {r.times.load, r.times.build, 0, r.times.transfer, item.seconds, r.times.idle});
+    if (entry.assembly) {
+      entry.assembly->costs().add(r.unit.tile, r.unit.round, r.cpu_seconds);
+      entry.assembly->hold(
+          r.unit.tile, r.unit.round,
+          {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
+    }
+  }
+  // The farm compares duplicates it knows about. If a race left this copy unstored, just return the lease:
+  // the stored copy stands, and a further copy would be equal or evidence.
+  if (wanted.verdict == Wanted::Verdict::yes && entry.log && !place)
+    run_locked(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
+  else
+    run_locked(
+        UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds, r.times.wait});
+  acknowledge_locked(a, std::nullopt);
+}
+
+// Presumably the worker's fault: counts as a failure of the unit and the worker.
+void Service::refuse_locked(const Arrived& a, const Error& error) {
+  const UnitKey& unit = a.result.unit;
+  ++figures_.refused;
+  log_warn(fmt::format("job={} tile={} round={} worker={}", unit.job.value, unit.tile, unit.round,
+                       a.from->worker.value),
+           error.message);
+  log_job(unit.job, fmt::format("{} (worker {})", error.message, a.from->worker.value));
+  UnitFailure failure;
+  failure.unit = unit;
+  failure.lease = a.result.lease;
+  failure.reason = error.message;
+  run_locked(UnitFailed{a.from->worker, std::move(failure)});
+  acknowledge_locked(a, error);
+}
+
+// The coordinator's fault: the unit is returned and the job waits for a person, instead of rendering for a
+// full disk.
+void Service::cannot_store_locked(const Arrived& a, const Error& error) {
+  const UnitKey& unit = a.result.unit;
+  ++figures_.not_stored;
+  log_error(fmt::format("job={} tile={} round={}", unit.job.value, unit.tile, unit.round), error.message);
+  log_job(unit.job, "paused: " + error.message);
+  store_trouble_ = error.message;
+  a.job->trouble = error.message + "; then resume the job";
+  run_locked(JobPaused{unit.job});
+  run_locked(LeaseCameBack{a.from->worker, {a.result.lease, {unit}}});
+  acknowledge_locked(a, error);
+}
+
+void Service::acknowledge_locked(const Arrived& a, std::optional<Error> refused) {
+  if (a.from->open) a.from->sink->send(ResultAck{a.result.unit, std::move(refused)});
+  failpoint("result-acknowledged");
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,116 @@
+#include "coordinator/store/blobs/collected_blobs.h"
+
+#include <utility>
+
+namespace ls::coordinator {
+namespace {
+constexpr Duration kKeepUnfinished = std::chrono::hours(24);
+}
+
+void CollectedBlobs::asked_for(const Digest& digest) const {
+  std::unique_lock lock(mutex_);
+  gone_.wait(lock, [&] { return !going_.contains(digest); });
+  idle_.erase(digest);
+}
+
+bool CollectedBlobs::has(const Digest& digest) const {
+  asked_for(digest);
+  return inner_->has(digest);
+}
+Result<bool> CollectedBlobs::find(const Digest& digest) const {
+  asked_for(digest);
+  return inner_->find(digest);
+}
+Result<void> CollectedBlobs::prove(const Digest& digest, bool again) const {
+  asked_for(digest);
+  return inner_->prove(digest, again);
+}
+Result<std::uint64_t> CollectedBlobs::size(const Digest& digest) const {
+  asked_for(digest);
+  return inner_->size(digest);
+}
+Result<std::vector<std::byte>> CollectedBlobs::read(const Digest& digest, std::uint64_t offset,
+                                                    std::uint64_t length) const {
+  asked_for(digest);
+  return inner_->read(digest, offset, length);
+}
+Result<void> CollectedBlobs::put(const Digest& digest, std::span<const std::byte> bytes) {
+  asked_for(digest);
+  return inner_->put(digest, bytes);
+}
+Result<std::unique_ptr<BlobStore::Upload>> CollectedBlobs::begin_upload(const Digest& digest) {
+  asked_for(digest);
+  return inner_->begin_upload(digest);
+}
+Result<std::unique_ptr<BlobStore::Upload>> CollectedBlobs::resume_upload(const Digest& digest,
+                                                                         std::uint64_t offset) {
+  asked_for(digest);
+  return inner_->resume_upload(digest, offset);
+}
+
+Result<CollectedBlobs::Swept> CollectedBlobs::sweep_unfinished() {
+  const auto unfinished = inner_->list(true);
+  if (!unfinished) return tl::unexpected(unfinished.error());
+  return Swept{0, sweep_unfinished(*unfinished)};
+}
+
+Result<CollectedBlobs::Swept> CollectedBlobs::sweep(const std::set<Digest>& needed) {
+  auto swept = sweep_unfinished();
+  if (!swept || !keep_) return swept;
+  const auto blobs = inner_->list(false);
+  if (!blobs) return tl::unexpected(blobs.error());
+  for (const Digest& digest : idle_for_long(*blobs, needed)) {
+    {
+      const std::unique_lock nobody(using_, std::try_to_lock);
+      if (!nobody) break;  // continued by the next sweep
+      const std::lock_guard lock(mutex_);
+      if (idle_.erase(digest) == 0) continue;  // it was requested just now
+      going_.insert(digest);
+    }
+    const auto removed = inner_->remove(digest);
+    {
+      const std::lock_guard lock(mutex_);
+      going_.erase(digest);
+    }
+    gone_.notify_all();
+    if (!removed) return tl::unexpected(removed.error());
+    ++swept->blobs;
+  }
+  return swept;
+}
+
+std::vector<Digest> CollectedBlobs::idle_for_long(const std::vector<Digest>& there,
+                                                  const std::set<Digest>& needed) {
+  const TimePoint now = clock_->now();
+  const std::lock_guard lock(mutex_);
+  std::map<Digest, TimePoint> before = std::exchange(idle_, {});
+  std::vector<Digest> old;
+  for (const Digest& digest : there) {
+    if (needed.contains(digest)) continue;
+    const auto known = before.find(digest);
+    const TimePoint since = known == before.end() ? now : known->second;
+    idle_.emplace(digest, since);
+    if (now - since >= *keep_) old.push_back(digest);
+  }
+  return old;
+}
+
+std::uint64_t CollectedBlobs::sweep_unfinished(const std::vector<Digest>& there) {
+  const TimePoint now = clock_->now();
+  std::map<Digest, Unfinished> before = std::exchange(unfinished_, {});
+  std::uint64_t removed = 0;
+  for (const Digest& digest : there) {
+    Unfinished one{inner_->received(digest), now};
+    if (const auto known = before.find(digest); known != before.end() && known->second.bytes == one.bytes)
+      one.since = known->second.since;
+    if (now - one.since >= keep_.value_or(kKeepUnfinished)) {
+      inner_->remove_unfinished(digest);
+      ++removed;
+    } else {
+      unfinished_.emplace(digest, one);
+    }
+  }
+  return removed;
+}
+
+}  // namespace ls::coordinator

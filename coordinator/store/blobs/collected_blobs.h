@@ -1,0 +1,76 @@
+// A blob store that removes what no job needs: files of rejected bundles, of removed jobs, of interrupted
+// uploads. A blob is removed when no job has needed it and nobody has requested it for `keep`, an interrupted
+// upload when it has not grown for that time. Both times count while the coordinator runs: a restart begins
+// again. Thread-safe.
+//
+// A submission never loses its files: each check for a blob restarts its time atomically with respect to
+// removal, and while in_use() is held nothing is removed.
+#pragma once
+
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <shared_mutex>
+
+#include "common/base/clock.h"
+#include "coordinator/store/blobs/blob_store.h"
+
+namespace ls::coordinator {
+
+class CollectedBlobs final : public BlobStore {
+ public:
+  // keep = nullopt: blobs stay for good, and interrupted uploads, which only this coordinator uses, for a
+  // day.
+  CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
+                 std::optional<Duration> keep)
+      : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
+
+  struct Swept {
+    std::uint64_t blobs = 0, unfinished = 0;  // number removed
+  };
+  // `needed`: every blob that a job names. Error: the store could not be listed, or something could not be
+  // removed.
+  Result<Swept> sweep(const std::set<Digest>& needed);
+  Result<Swept> sweep_unfinished();
+  // Hold this from a submission's first check for a blob until its job counts as needing it.
+  std::shared_lock<std::shared_mutex> in_use() const { return std::shared_lock(using_); }
+
+  bool has(const Digest& digest) const override;
+  Result<bool> find(const Digest& digest) const override;
+  Result<void> answers() const override { return inner_->answers(); }
+  Result<void> prove(const Digest& digest, bool again = false) const override;
+  Result<std::uint64_t> size(const Digest& digest) const override;
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override;
+  Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override;
+  Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override;
+  std::uint64_t received(const Digest& digest) const override { return inner_->received(digest); }
+  Result<std::unique_ptr<Upload>> resume_upload(const Digest& digest, std::uint64_t offset) override;
+  Result<std::vector<Digest>> list(bool unfinished) const override { return inner_->list(unfinished); }
+  Result<void> remove(const Digest& digest) override { return inner_->remove(digest); }
+  void remove_unfinished(const Digest& digest) override { inner_->remove_unfinished(digest); }
+
+ private:
+  struct Unfinished {
+    std::uint64_t bytes = 0;
+    TimePoint since{};
+  };
+  void asked_for(const Digest& digest) const;
+  std::vector<Digest> idle_for_long(const std::vector<Digest>& there, const std::set<Digest>& needed);
+  std::uint64_t sweep_unfinished(const std::vector<Digest>& there);
+
+  std::shared_ptr<BlobStore> inner_;
+  std::shared_ptr<const Clock> clock_;
+  std::optional<Duration> keep_;
+  mutable std::shared_mutex using_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable gone_;
+  std::set<Digest> going_;                    // being removed, which may take a while: requests for them wait
+  mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, and since when
+  std::map<Digest, Unfinished> unfinished_;   // used by the sweeper only
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,282 @@
+#include "coordinator/store/blobs/s3_request.h"
+
+#include <curl/curl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <strings.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+
+#include "common/base/log.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr long kConnectSeconds = 10;
+constexpr long kStallSeconds = 30;              // without receiving a byte
+constexpr long kAnswerSeconds = 5;              // for answers(): a store that is slower counts as unavailable
+constexpr std::size_t kMaxText = 8u << 20;      // of an answer that is not an object: a list or an error
+constexpr std::size_t kShownText = 300;         // of such an answer, in a message
+constexpr std::size_t kMaxListed = 10'000'000;  // keys
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+struct FreeList {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+struct Cleanup {
+  void operator()(CURL* curl) const { curl_easy_cleanup(curl); }
+};
+using Headers = std::unique_ptr<curl_slist, FreeList>;
+
+// A number of bytes of a file, from its current position.
+struct Source {
+  std::FILE* file;
+  std::uint64_t left;
+
+  static std::size_t send(char* data, std::size_t size, std::size_t count, void* pointer) {
+    auto& self = *static_cast<Source*>(pointer);
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(size * count, self.left));
+    const std::size_t bytes = std::fread(data, 1, wanted, self.file);
+    self.left -= bytes;
+    return bytes;
+  }
+};
+
+bool may_pass(int status) { return status == 0 || status == 429 || status >= 500; }
+
+}  // namespace
+
+std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at) {
+  const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
+  const std::size_t begin = xml.find(open, at ? *at : 0);
+  const std::size_t end = begin == std::string_view::npos ? begin : xml.find(close, begin);
+  if (at) *at = end;
+  return end == std::string_view::npos
+             ? ""
+             : std::string(xml.substr(begin + open.size(), end - begin - open.size()));
+}
+
+std::string query_value(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    out += std::isalnum(c) || c == '-' || c == '_' || c == '.' || c == '~'
+               ? std::string(1, static_cast<char>(c))
+               : fmt::format("%{:02X}", c);
+  return out;
+}
+
+namespace {
+struct Receiver {
+  CURL* curl;
+  const S3Link::Sink* sink;
+  std::string* text;
+  std::optional<Error>* refused;
+
+  static std::size_t receive(char* data, std::size_t size, std::size_t count, void* pointer) {
+    auto& self = *static_cast<Receiver*>(pointer);
+    const std::size_t bytes = size * count;
+    long status = 0;
+    curl_easy_getinfo(self.curl, CURLINFO_RESPONSE_CODE, &status);
+    if (self.sink && status / 100 == 2) {
+      const auto taken = (*self.sink)(std::as_bytes(std::span(data, bytes)));
+      if (!taken) *self.refused = taken.error();
+      return taken ? bytes : 0;
+    }
+    if (self.text->size() + bytes > kMaxText) return 0;
+    self.text->append(data, bytes);
+    return bytes;
+  }
+};
+
+std::size_t receive_header(char* data, std::size_t size, std::size_t count, void* etag) {
+  constexpr std::string_view kName = "etag:";
+  const std::string_view line(data, size * count);
+  if (line.size() > kName.size() && ::strncasecmp(line.data(), kName.data(), kName.size()) == 0) {
+    const std::size_t begin = line.find_first_not_of(" \t", kName.size()),
+                      end = line.find_last_not_of(" \t\r\n");
+    if (begin <= end && end != std::string_view::npos)
+      *static_cast<std::string*>(etag) = line.substr(begin, end + 1 - begin);
+  }
+  return line.size();
+}
+}  // namespace
+
+S3Link::S3Link(S3Options options) : options_(std::move(options)) {
+  static std::once_flag once;
+  std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
+}
+
+std::string S3Link::url_of(const Request& request) const {
+  const S3Address& a = options_.address;
+  std::string url = a.endpoint + "/" + a.bucket;
+  if (!request.key.empty()) url += (a.prefix.empty() ? "/" : "/" + a.prefix + "/") + request.key;
+  return request.query.empty() ? url : url + "?" + request.query;
+}
+
+Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
+  const std::unique_ptr<CURL, Cleanup> curl(curl_easy_init());
+  if (!curl) return fail(Errc::internal, "libcurl cannot be started");
+  Headers headers;
+  const auto add = [&](const std::string& line) {
+    headers.reset(curl_slist_append(headers.release(), line.c_str()));
+  };
+  add("x-amz-content-sha256: " + request.payload);
+  if (!options_.keys.session.empty()) add("x-amz-security-token: " + options_.keys.session);
+  Answer answer;
+  Receiver receiver{curl.get(), request.sink, &answer.text, &answer.refused};
+  char problem[CURL_ERROR_SIZE] = "";
+  std::unique_ptr<std::FILE, CloseFile> file;
+  Source source{nullptr, request.bytes};
+  const std::string verb = request.method;
+  if (verb == "HEAD") curl_easy_setopt(curl.get(), CURLOPT_NOBODY, 1L);
+  if (verb == "DELETE") curl_easy_setopt(curl.get(), CURLOPT_CUSTOMREQUEST, "DELETE");
+  if (verb == "PUT") {
+    file.reset(std::fopen(request.file.c_str(), "rbe"));
+    if (!file || ::fseeko(file.get(), static_cast<off_t>(request.offset), SEEK_SET) != 0)
+      return fail(Errc::not_found, fmt::format("{} cannot be read", request.file.string()));
+    source.file = file.get();
+    add("Content-Type: application/octet-stream");
+    curl_easy_setopt(curl.get(), CURLOPT_UPLOAD, 1L);
+    curl_easy_setopt(curl.get(), CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(request.bytes));
+    curl_easy_setopt(curl.get(), CURLOPT_READFUNCTION, &Source::send);
+    curl_easy_setopt(curl.get(), CURLOPT_READDATA, &source);
+  }
+  if (verb == "POST") {
+    add("Content-Type: application/xml");
+    curl_easy_setopt(curl.get(), CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request.body.size()));
+    curl_easy_setopt(curl.get(), CURLOPT_POSTFIELDS, request.body.c_str());
+  }
+  const std::string url = url_of(request), login = options_.keys.id + ":" + options_.keys.secret;
+  curl_easy_setopt(curl.get(), CURLOPT_URL, url.c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_USERPWD, login.c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_AWS_SIGV4, ("aws:amz:" + options_.address.region + ":s3").c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_HTTPHEADER, headers.get());
+  curl_easy_setopt(curl.get(), CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(curl.get(), CURLOPT_PROTOCOLS_STR, "http,https");
+  curl_easy_setopt(curl.get(), CURLOPT_CONNECTTIMEOUT, kConnectSeconds);
+  curl_easy_setopt(curl.get(), CURLOPT_TIMEOUT, request.most_seconds);
+  curl_easy_setopt(curl.get(), CURLOPT_LOW_SPEED_LIMIT, 1L);
+  curl_easy_setopt(curl.get(), CURLOPT_LOW_SPEED_TIME, kStallSeconds);
+  curl_easy_setopt(curl.get(), CURLOPT_WRITEFUNCTION, &Receiver::receive);
+  curl_easy_setopt(curl.get(), CURLOPT_WRITEDATA, &receiver);
+  curl_easy_setopt(curl.get(), CURLOPT_HEADERFUNCTION, &receive_header);
+  curl_easy_setopt(curl.get(), CURLOPT_HEADERDATA, &answer.etag);
+  curl_easy_setopt(curl.get(), CURLOPT_ERRORBUFFER, problem);
+  const CURLcode code = curl_easy_perform(curl.get());
+  long status = 0;
+  curl_off_t length = 0;
+  curl_easy_getinfo(curl.get(), CURLINFO_RESPONSE_CODE, &status);
+  curl_easy_getinfo(curl.get(), CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+  answer.length = length < 0 ? 0 : static_cast<std::uint64_t>(length);
+  const bool told = code == CURLE_OK || (code == CURLE_SEND_ERROR && status >= 400);
+  answer.status = told ? static_cast<int>(status) : 0;
+  if (!told) answer.text = *problem ? problem : curl_easy_strerror(code);
+  return answer;
+}
+
+Result<S3Link::Answer> S3Link::ask(const Request& request) const {
+  Duration pause = options_.first_pause;
+  for (int attempt = 1;; ++attempt) {
+    if (request.restart)
+      if (auto ready = (*request.restart)(); !ready) return tl::unexpected(ready.error());
+    auto answer = ask_once(request);
+    if (!answer) return answer;
+    if (answer->refused) return tl::unexpected(*answer->refused);
+    if (!may_pass(answer->status)) return answer;
+    if (attempt == options_.attempts) return tl::unexpected(error_of(request, *answer));
+    log_warn("store=s3", error_of(request, *answer).message + "; it is tried again");
+    ::poll(nullptr, 0,
+           static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count()));
+    pause = std::min(pause * 2, options_.longest_pause);
+  }
+}
+
+Error S3Link::error_of(const Request& request, const Answer& answer) const {
+  const std::string what = fmt::format("{} {}", request.method, url_of(request));
+  if (answer.status == 0) return {Errc::unavailable, fmt::format("{}: no answer: {}", what, answer.text)};
+  const std::string code = xml_element(answer.text, "Code"), text = xml_element(answer.text, "Message");
+  const std::string said = fmt::format("{}: status {} {} {}", what, answer.status, code,
+                                       text.empty() ? answer.text.substr(0, kShownText) : text);
+  if (answer.status == 404 && code == "NoSuchBucket")
+    return {Errc::failed_precondition, said + "; make the bucket first, or correct --blobs"};
+  if (answer.status == 404) return {Errc::not_found, said};
+  if (answer.status == 401 || answer.status == 403)
+    return {Errc::permission_denied,
+            said +
+                "; check AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, what they allow, the region and this "
+                "machine's clock"};
+  if (answer.status == 507) return {Errc::resource_exhausted, said};
+  return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, said};
+}
+
+// Asks for an object that does not exist: 404 is an answer.
+Result<void> S3Link::answers() const {
+  const Request request{.method = "HEAD", .key = "answers", .most_seconds = kAnswerSeconds};
+  const auto answer = ask_once(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status != 200 && answer->status != 404) return tl::unexpected(error_of(request, *answer));
+  return {};
+}
+
+Result<S3Link::Object> S3Link::look_at(const std::string& key) const {
+  const Request request{.method = "HEAD", .key = key};
+  const auto answer = ask(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
+  return Object{answer->length, answer->etag};
+}
+
+Result<void> S3Link::get(const std::string& key, const std::function<Result<void>()>& restart,
+                         const Sink& sink) const {
+  const Request request{.key = key, .sink = &sink, .restart = &restart};
+  const auto answer = ask(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
+  return {};
+}
+
+Result<void> S3Link::put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
+                         const Digest& digest) const {
+  if (bytes > options_.address.part_bytes) return put_parts(key, file, bytes);
+  const Request request{.method = "PUT", .key = key, .file = file, .bytes = bytes, .payload = digest.hex()};
+  const auto answer = ask(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status / 100 != 2) return tl::unexpected(error_of(request, *answer));
+  return {};
+}
+
+Result<void> S3Link::remove(const std::string& key) const {
+  const Request request{.method = "DELETE", .key = key};
+  const auto answer = ask(request);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->status / 100 != 2 && answer->status != 404) return tl::unexpected(error_of(request, *answer));
+  return {};
+}
+
+Result<std::vector<std::string>> S3Link::list() const {
+  const std::string prefix = options_.address.prefix.empty() ? "" : options_.address.prefix + "/";
+  std::vector<std::string> keys;
+  for (std::string token; keys.size() < kMaxListed;) {
+    Request request;
+    if (!token.empty()) request.query = "continuation-token=" + query_value(token) + "&";
+    request.query += "list-type=2&prefix=" + query_value(prefix);
+    const auto answer = ask(request);
+    if (!answer) return tl::unexpected(answer.error());
+    if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
+    for (std::size_t at = 0;;) {
+      const std::string key = xml_element(answer->text, "Key", &at);
+      if (at == std::string::npos) break;
+      if (key.starts_with(prefix)) keys.push_back(key.substr(prefix.size()));
+    }
+    token = xml_element(answer->text, "NextContinuationToken");
+    if (token.empty()) break;
+  }
+  return keys;
+}
+
+}  // namespace ls::coordinator

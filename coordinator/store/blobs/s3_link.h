@@ -1,0 +1,87 @@
+// Objects in a bucket of an S3-compatible store; the coordinator's only user of libcurl, which signs the
+// requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe:
+// each request has its own connection.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/clock.h"
+#include "common/base/digest.h"
+#include "common/base/error.h"
+
+namespace ls::coordinator {
+
+// s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come from the
+// environment, as for other tools: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if they are short-lived,
+// AWS_SESSION_TOKEN; AWS_REGION if the address names none. Default endpoint: Amazon's for the region.
+struct S3Address {
+  std::string bucket, prefix;  // without slashes at its ends; may be empty
+  std::string endpoint, region;
+  // Larger files are sent in parts of this size; 5 MiB to 5 GiB
+  std::uint64_t part_bytes = std::uint64_t{64} << 20;
+  std::uint64_t copies_bytes = 0;  // most bytes of local copies; 0: no limit
+  std::string shown() const;       // for messages and logs
+};
+Result<S3Address> parse_s3_url(std::string_view url);
+
+struct S3Keys {
+  std::string id, secret, session;
+};
+// unauthenticated: names the missing variable.
+Result<S3Keys> s3_keys_from_environment();
+
+struct S3Options {
+  S3Address address;
+  S3Keys keys;
+  int attempts = 6;  // for failures that may pass: no answer, 429, 5xx
+  Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
+};
+
+class S3Link {
+ public:
+  explicit S3Link(S3Options options);
+
+  // Error if the store does not answer a single request within seconds.
+  Result<void> answers() const;
+  struct Object {
+    std::uint64_t bytes = 0;
+    std::string etag;  // changes with the object's bytes
+  };
+  Result<Object> look_at(const std::string& key) const;  // not_found
+  using Sink = std::function<Result<void>(std::span<const std::byte>)>;
+  // Reads the whole object, in order. `restart` is called if the bytes come from the start again.
+  Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
+                   const Sink& sink) const;
+  // Sends a file, whose digest the store checks: in one request or, if it is large, in parts (s3_parts.cpp).
+  Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
+                   const Digest& digest) const;
+  Result<void> remove(const std::string& key) const;  // succeeds for a missing object
+  Result<std::vector<std::string>> list() const;      // all keys under the prefix
+
+  std::string shown() const { return options_.address.shown(); }
+
+ private:
+  struct Request;
+  struct Answer;
+  Result<void> put_parts(const std::string& key, const std::filesystem::path& file,
+                         std::uint64_t bytes) const;
+  Result<std::string> begin_parts(const std::string& key) const;  // returns the upload's id
+  Result<void> send_parts(const std::string& key, const std::string& upload,
+                          const std::filesystem::path& file, std::uint64_t bytes) const;
+  void give_up_parts(const std::string& key, const std::string& upload) const;
+  Result<Answer> ask(const Request& request) const;
+  Result<Answer> ask_once(const Request& request) const;
+  Error error_of(const Request& request, const Answer& answer) const;
+  std::string url_of(const Request& request) const;
+
+  S3Options options_;
+};
+
+}  // namespace ls::coordinator

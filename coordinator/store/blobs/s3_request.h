@@ -1,0 +1,36 @@
+// Requests and answers of S3Link; used by s3_link.cpp and s3_parts.cpp only.
+#pragma once
+
+#include "coordinator/store/blobs/s3_link.h"
+
+namespace ls::coordinator {
+
+inline constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+
+struct S3Link::Request {
+  const char* method = "GET";
+  std::string key;                  // empty: the bucket itself
+  std::string query;                // sorted and escaped, as signed; every name with '='
+  std::filesystem::path file = {};  // for PUT: `bytes` of this file from `offset` on
+  std::uint64_t offset = 0, bytes = 0;
+  std::string body = {};           // for POST
+  std::string payload = kNoBytes;  // SHA-256 of the payload
+  long most_seconds = 0;           // for the whole request; 0: as long as bytes arrive
+  const Sink* sink = nullptr;
+  const std::function<Result<void>()>* restart = nullptr;
+};
+struct S3Link::Answer {
+  int status = 0;  // 0: no answer
+  std::uint64_t length = 0;
+  std::string etag;
+  std::string text;              // bytes not passed to a sink; without an answer: the reason
+  std::optional<Error> refused;  // the sink's error
+};
+
+// The text of the first element of this name from *at on; sets *at behind it (npos: not found). Understands
+// just enough XML for S3's answers.
+std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
+// Escapes the text as a value in a query.
+std::string query_value(std::string_view text);
+
+}  // namespace ls::coordinator

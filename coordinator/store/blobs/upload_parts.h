@@ -1,0 +1,44 @@
+// Blobs that arrive in parts: files FOLDER/<64 hex digits> that grow, over broken connections and restarts,
+// until they are complete. Thread-safe.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "coordinator/store/blobs/blob_store.h"
+
+namespace ls::coordinator {
+
+class UploadParts {
+ public:
+  // Moves a complete, verified file away from its path (renames it, or copies and removes it).
+  using Publish = std::function<Result<void>(const Digest&, const std::filesystem::path&)>;
+  static Result<std::unique_ptr<UploadParts>> open(std::filesystem::path folder, Publish publish);
+  ~UploadParts();
+
+  std::uint64_t received(const Digest& digest) const;
+  // As BlobStore::resume_upload(). Above limits::kMaxUnfinishedUploads the one that has not grown for the
+  // longest time is removed.
+  Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
+  void remove(const Digest& digest);  // an upload in progress continues, and is rejected at its next bytes
+  Result<std::vector<Digest>> list() const;
+
+ private:
+  struct Slot;
+  class Part;
+  UploadParts(std::filesystem::path folder, Publish publish);
+  std::filesystem::path path(const Digest& digest) const { return folder_ / digest.hex(); }
+  std::shared_ptr<Slot> slot(const Digest& digest);
+  void make_room();
+
+  std::filesystem::path folder_;
+  Publish publish_;
+  std::mutex mutex_;
+  std::map<Digest, std::weak_ptr<Slot>> slots_;  // of uploads in progress
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,158 @@
+// Stores everything about jobs except their pixels. Two basic implementations: SQLite, and memory
+// (`lightshaft render`). Thread-safe. With SQLite, what a put or add has stored survives kill -9 and power
+// loss.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/base/id.h"
+#include "common/job/settings.h"
+#include "common/protocol/messages.h"
+#include "coordinator/domain/job_state.h"
+#include "coordinator/views/job_view.h"
+
+namespace ls::coordinator {
+
+// State of the mirror (Redis) of a job store
+struct StoreStatus {
+  std::string mirror;        // its address; empty: no mirror
+  std::string trouble;       // why it cannot be updated now; empty: it can
+  std::uint64_t behind = 0;  // number of jobs not completely mirrored
+};
+
+// The coordinator that has a job, if several share a store
+struct JobLocation {
+  std::string http;    // http://HOST:PORT; empty: unknown
+  bool alive = false;  // false: the job will be taken over, or has ended there
+};
+
+// Checks the value of --store: sqlite, or a redis:// address.
+Result<void> check_store(const std::string& store);
+
+// Totals of a job; written when it ends, so that a restart need not read its partials.
+struct JobTotals {
+  double render_seconds = 0;  // first ray to last fold
+  double core_seconds = 0;
+  double load_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+  double spp_done = 0;
+  std::uint64_t units = 0;          // done
+  std::uint64_t units_planned = 0;  // 0: the same as `units`
+  Health health;
+  TimeSplit time;                         // without `render`, which is core_seconds
+  double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
+  // ImageError::verdict and few_hits at the last checkpoint; empty and nullopt if there was none.
+  std::string doubt;
+  std::optional<std::uint64_t> few_hits;
+  bool operator==(const JobTotals&) const = default;
+};
+
+struct StoredJob {
+  JobId id;
+  std::string name;   // scene file name
+  std::string owner;  // user name; empty: the administrator, or a record of an earlier version
+  double submitted_unix = 0;
+  Digest scene;  // digest of its blob
+  RenderSettings settings;
+  JobSpec spec;                      // as requested; spp as last extended
+  std::optional<std::uint64_t> spp;  // resolved; nullopt: until target or time
+  std::vector<BlobRef> assets;
+  std::vector<std::string> warnings;
+  bool reference_same_seed = false;  // same_noise() of its reference
+  std::vector<std::string> features_used, features_left_out;
+  std::string needs;  // canonical JSON (common/scene/analysis/needs.h); empty in records of earlier versions
+  std::string analysis;  // JSON: the renderer's features with reasons, and what was pruned; for the report
+  JobState state = JobState::queued;
+  std::optional<StopReason> stopped;
+  std::string error;
+  std::optional<Digest> numeric_class;
+  std::string build;  // of the worker whose class the job was pinned to
+  bool fake = false;  // pinned to a fake worker; then only fake workers may render its units
+  JobTotals totals;
+  // Quarantined workers in records of earlier versions; now JobStore::quarantined().
+  std::vector<WorkerId> distrusted;
+  // Missing or damaged blobs: the job is paused until they are available
+  std::set<Digest> missing_blobs;
+  std::uint64_t revision = 0;  // number of changes, in stores that count them (Redis)
+  std::uint64_t fence = 0;     // number of the ownership, if several coordinators share a store
+  bool damaged = false;        // its record cannot be read: only id, `failed` and `error` are known
+  bool operator==(const StoredJob&) const = default;
+};
+std::string to_json(const StoredJob& job);
+Result<StoredJob> parse_stored_job(std::string_view json);
+
+struct LogLine {
+  double unix_time = 0;
+  std::string text;
+};
+
+// A worker that rendered wrong pixels, with the evidence
+struct QuarantinedWorker {
+  WorkerId worker;
+  std::string evidence;
+  bool operator==(const QuarantinedWorker&) const = default;
+};
+
+class JobStore {
+ public:
+  virtual ~JobStore() = default;
+  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
+  // All or none.
+  virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
+  // In order of first put. A damaged record is returned with `damaged` set and does not affect others.
+  virtual Result<std::vector<StoredJob>> jobs() const = 0;
+  // Removes the job with its points and log; succeeds if the job is unknown.
+  virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
+  virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // all or none
+
+  virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
+  // Sets the reference error of the point with these samples, replacing an earlier one.
+  virtual Result<void> set_reference_error(const JobId& job, double spp,
+                                           const ReferenceError& reference_error) = 0;
+  virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
+  virtual Result<void> remove_points(const JobId& job) = 0;  // including their reference errors
+
+  // Drops the oldest lines beyond kLogLinesKept.
+  virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
+  virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
+
+  // Kept for good, even after the jobs that revealed it are removed; a known worker keeps its first evidence.
+  virtual Result<void> quarantine(const QuarantinedWorker& worker) = 0;
+  virtual Result<std::vector<QuarantinedWorker>> quarantined() const = 0;
+
+  // Durably adds `amount` to a named counter and returns its previous value. For ids that must never repeat.
+  virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
+
+  virtual StoreStatus status() const { return {}; }
+
+  // For a store that several coordinators share
+  struct Inherited {
+    StoredJob job;
+    std::string from;  // the coordinator that had it
+  };
+  struct Moved {
+    std::vector<QuarantinedWorker> quarantined;  // by another coordinator; apply these before the rest
+    std::vector<JobId> lost;  // taken over by another coordinator: nothing of them is stored here any more
+    std::vector<Inherited> inherited;  // from a coordinator that is gone; may include jobs lost before
+  };
+  virtual Moved moved() { return {}; }  // changes since the last call
+  // Sets the addresses at which this coordinator can be reached.
+  virtual void announce(const std::string&, const std::string&) {}
+  // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
+  virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
+};
+
+Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file);
+std::unique_ptr<JobStore> make_memory_job_store();
+
+}  // namespace ls::coordinator

@@ -1,0 +1,21 @@
+// Numbers in records. JSON has no infinity: it would be written as null, and the record could not be read
+// again.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace ls::coordinator {
+
+inline double finite(double value) { return std::isfinite(value) ? value : 0; }
+// null: written by a version without finite().
+inline double number_of(const nlohmann::json& j) { return j.is_null() ? 0 : j.get<double>(); }
+// Throws for anything but an integer from 0 to 2^64 - 1: the library would convert 1e20, which does not fit.
+inline std::uint64_t count_of(const nlohmann::json& j) {
+  if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
+  return j.get<std::uint64_t>();
+}
+
+}  // namespace ls::coordinator

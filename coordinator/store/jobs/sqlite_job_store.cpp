@@ -1,0 +1,361 @@
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <memory>
+#include <mutex>
+
+#include "coordinator/base/limits.h"
+#include "coordinator/store/jobs/job_store.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr int kSchemaVersion = 1;
+constexpr const char* kSchema = R"(
+CREATE TABLE IF NOT EXISTS jobs(ordinal INTEGER PRIMARY KEY, id TEXT UNIQUE NOT NULL, state TEXT NOT NULL, record TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS points(n INTEGER PRIMARY KEY, job TEXT NOT NULL, seconds REAL, core_seconds REAL, spp REAL,
+  rmse REAL, relmse REAL, relmse_lo REAL, relmse_hi REAL, rmse_lo REAL, rmse_hi REAL);
+CREATE INDEX IF NOT EXISTS points_of_job ON points(job);
+CREATE TABLE IF NOT EXISTS truths(job TEXT NOT NULL, spp REAL NOT NULL, rmse REAL, relmse REAL, flip REAL,
+  mse_stderr REAL, relmse_stderr REAL, PRIMARY KEY(job, spp));
+CREATE TABLE IF NOT EXISTS log(n INTEGER PRIMARY KEY, job TEXT NOT NULL, unix REAL, text TEXT);
+CREATE INDEX IF NOT EXISTS log_of_job ON log(job);
+CREATE TABLE IF NOT EXISTS barred(worker TEXT PRIMARY KEY, evidence TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS counters(name TEXT PRIMARY KEY, value INTEGER NOT NULL);
+)";
+
+struct CloseDb {
+  void operator()(sqlite3* db) const { sqlite3_close_v2(db); }
+};
+struct FinalizeStatement {
+  void operator()(sqlite3_stmt* s) const { sqlite3_finalize(s); }
+};
+using Db = std::unique_ptr<sqlite3, CloseDb>;
+
+Error db_error(sqlite3* db, std::string_view what) {
+  const int code = sqlite3_errcode(db);
+  if (code == SQLITE_FULL)
+    return {Errc::resource_exhausted,
+            fmt::format("the disk is full: cannot {} ({}); free some space and try again", what,
+                        sqlite3_errmsg(db))};
+  return {Errc::unavailable, fmt::format("cannot {}: {}", what, sqlite3_errmsg(db))};
+}
+
+// One statement; parameters are bound in order.
+class Statement {
+ public:
+  Statement(sqlite3* db, const char* sql) : db_(db) {
+    sqlite3_stmt* raw = nullptr;
+    sqlite3_prepare_v2(db, sql, -1, &raw, nullptr);
+    statement_.reset(raw);
+  }
+  Statement& bind(std::string_view text) {
+    sqlite3_bind_text(statement_.get(), ++bound_, text.data(), static_cast<int>(text.size()),
+                      SQLITE_TRANSIENT);
+    return *this;
+  }
+  Statement& bind(double value) {
+    sqlite3_bind_double(statement_.get(), ++bound_, value);
+    return *this;
+  }
+  Statement& bind(const std::optional<double>& value) {
+    if (value) return bind(*value);
+    ++bound_;  // an unbound parameter is null
+    return *this;
+  }
+  Statement& bind(std::int64_t value) {
+    sqlite3_bind_int64(statement_.get(), ++bound_, value);
+    return *this;
+  }
+  // True: a row is available; false: done.
+  Result<bool> step(std::string_view what) {
+    const int code = statement_ ? sqlite3_step(statement_.get()) : SQLITE_ERROR;
+    if (code == SQLITE_ROW) return true;
+    if (code == SQLITE_DONE) return false;
+    return tl::unexpected(db_error(db_, what));
+  }
+  Result<void> run(std::string_view what) {
+    auto stepped = step(what);
+    while (stepped && *stepped) stepped = step(what);
+    if (!stepped) return tl::unexpected(stepped.error());
+    return {};
+  }
+  std::string text(int column) const {
+    const auto* chars = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+    return chars
+               ? std::string(chars, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column)))
+               : "";
+  }
+  double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+  bool null(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
+  std::optional<double> known(int column) const {
+    return null(column) ? std::nullopt : std::optional(real(column));
+  }
+  std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+
+ private:
+  sqlite3* db_;
+  std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
+  int bound_ = 0;
+};
+
+Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
+  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
+    return tl::unexpected(db_error(db, what));
+  return {};
+}
+
+StoredJob damaged_job(std::string id, const Error& why) {
+  StoredJob job;
+  job.id.value = std::move(id);
+  job.state = JobState::failed;
+  job.error = why.message + "; take the database from a backup, or delete the job and submit it again";
+  job.damaged = true;
+  return job;
+}
+
+class SqliteJobStore final : public JobStore {
+ public:
+  explicit SqliteJobStore(Db db) : db_(std::move(db)) {}
+
+  Result<void> put_job(const StoredJob& job) override {
+    const std::lock_guard lock(mutex_);
+    return put_locked(job);
+  }
+
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    const std::lock_guard lock(mutex_);
+    return all_or_nothing("store jobs", [&]() -> Result<void> {
+      for (const StoredJob& job : jobs)
+        if (auto done = put_locked(job); !done) return done;
+      return {};
+    });
+  }
+
+  Result<std::vector<StoredJob>> jobs() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<StoredJob> all;
+    Statement rows(db_.get(), "SELECT record, id FROM jobs ORDER BY ordinal");
+    auto row = rows.step("read the jobs");
+    for (; row && *row; row = rows.step("read the jobs")) {
+      auto job = parse_stored_job(rows.text(0));
+      all.push_back(job ? std::move(*job) : damaged_job(rows.text(1), job.error()));
+    }
+    if (!row) return tl::unexpected(row.error());
+    return all;
+  }
+
+  Result<void> remove_jobs(std::span<const JobId> jobs) override {
+    const std::lock_guard lock(mutex_);
+    return all_or_nothing("remove a job", [&]() -> Result<void> {
+      for (const JobId& job : jobs)
+        for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
+                                "DELETE FROM truths WHERE job = ?", "DELETE FROM log WHERE job = ?"})
+          if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) return done;
+      return {};
+    });
+  }
+
+  Result<void> add_point(const JobId& job, const ConvergencePoint& p) override {
+    const std::lock_guard lock(mutex_);
+    return Statement(
+               db_.get(),
+               "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi, "
+               "rmse_lo, rmse_hi) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+        .bind(job.value)
+        .bind(p.seconds)
+        .bind(p.core_seconds)
+        .bind(p.spp)
+        .bind(p.error.rmse)
+        .bind(p.error.relmse)
+        .bind(p.error.relmse_lo)
+        .bind(p.error.relmse_hi)
+        .bind(p.error.rmse_lo)
+        .bind(p.error.rmse_hi)
+        .run("store a convergence point");
+  }
+
+  Result<void> set_reference_error(const JobId& job, double spp,
+                                   const ReferenceError& reference_error) override {
+    const std::lock_guard lock(mutex_);
+    Statement put(db_.get(),
+                  "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
+                  "VALUES(?, ?, ?, ?, ?, ?, ?)");
+    put.bind(job.value).bind(spp).bind(reference_error.rmse).bind(reference_error.relmse);
+    return put.bind(reference_error.flip)
+        .bind(reference_error.mse_stderr)
+        .bind(reference_error.relmse_stderr)
+        .run("store a comparison with the reference");
+  }
+
+  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<ConvergencePoint> all;
+    Statement rows(db_.get(),
+                   "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
+                   "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi, mse_stderr, relmse_stderr "
+                   "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
+    rows.bind(job.value);
+    auto row = rows.step("read the convergence");
+    for (; row && *row; row = rows.step("read the convergence")) {
+      all.push_back({rows.real(0),
+                     rows.real(1),
+                     rows.real(2),
+                     {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}});
+      if (!rows.null(7))
+        all.back().reference_error =
+            ReferenceError{rows.real(7), rows.real(8), rows.known(9), rows.known(12), rows.known(13)};
+    }
+    if (!row) return tl::unexpected(row.error());
+    return all;
+  }
+
+  Result<void> remove_points(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    return all_or_nothing("remove the convergence of a job", [&]() -> Result<void> {
+      for (const char* sql : {"DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?"})
+        if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove the convergence of a job");
+            !done)
+          return done;
+      return {};
+    });
+  }
+
+  Result<void> add_log(const JobId& job, const LogLine& line) override {
+    const std::lock_guard lock(mutex_);
+    if (auto done = Statement(db_.get(), "INSERT INTO log(job, unix, text) VALUES(?, ?, ?)")
+                        .bind(job.value)
+                        .bind(line.unix_time)
+                        .bind(line.text)
+                        .run("store a log line");
+        !done)
+      return done;
+    if (++log_lines_ % limits::kLogLinesKept != 0) return {};
+    return Statement(db_.get(),
+                     "DELETE FROM log WHERE job = ?1 AND n NOT IN "
+                     "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)")
+        .bind(job.value)
+        .bind(static_cast<std::int64_t>(limits::kLogLinesKept))
+        .run("shorten a log");
+  }
+
+  Result<std::vector<LogLine>> log(const JobId& job) const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<LogLine> all;
+    Statement rows(
+        db_.get(),
+        "SELECT unix, text FROM (SELECT n, unix, text FROM log WHERE job = ? ORDER BY n DESC LIMIT ?) "
+        "ORDER BY n");
+    rows.bind(job.value).bind(static_cast<std::int64_t>(limits::kLogLinesKept));
+    auto row = rows.step("read a log");
+    for (; row && *row; row = rows.step("read a log")) all.push_back({rows.real(0), rows.text(1)});
+    if (!row) return tl::unexpected(row.error());
+    return all;
+  }
+
+  Result<void> quarantine(const QuarantinedWorker& worker) override {
+    const std::lock_guard lock(mutex_);
+    return Statement(db_.get(), "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
+        .bind(worker.worker.value)
+        .bind(worker.evidence)
+        .run("store that a worker is barred");
+  }
+  Result<std::vector<QuarantinedWorker>> quarantined() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<QuarantinedWorker> all;
+    Statement rows(db_.get(), "SELECT worker, evidence FROM barred ORDER BY worker");
+    auto row = rows.step("read the barred workers");
+    for (; row && *row; row = rows.step("read the barred workers"))
+      all.push_back({{rows.text(0)}, rows.text(1)});
+    if (!row) return tl::unexpected(row.error());
+    return all;
+  }
+
+  Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
+    const std::lock_guard lock(mutex_);
+    Statement row(db_.get(),
+                  "INSERT INTO counters(name, value) VALUES(?1, ?2) "
+                  "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value");
+    row.bind(counter).bind(static_cast<std::int64_t>(amount));
+    const auto stepped = row.step("reserve ids");
+    if (!stepped) return tl::unexpected(stepped.error());
+    const auto value = static_cast<std::uint64_t>(row.integer(0));
+    if (auto done = row.run("reserve ids"); !done) return tl::unexpected(done.error());
+    return value - amount;
+  }
+
+ private:
+  Result<void> put_locked(const StoredJob& job) {
+    return Statement(db_.get(),
+                     "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
+                     "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
+        .bind(job.id.value)
+        .bind(to_string(job.state))
+        .bind(to_json(job))
+        .run("store a job");
+  }
+
+  // Runs `work` in one transaction: all of it or nothing.
+  template <class Work>
+  Result<void> all_or_nothing(const char* what, Work work) {
+    if (auto begun = execute(db_.get(), "BEGIN IMMEDIATE", what); !begun) return begun;
+    auto done = work();
+    if (done) done = execute(db_.get(), "COMMIT", what);
+    if (!done) (void)execute(db_.get(), "ROLLBACK", "take back what was begun");
+    return done;
+  }
+
+  mutable std::mutex mutex_;
+  Db db_;
+  std::uint64_t log_lines_ = 0;
+};
+
+// Adds columns to a database of an earlier version, which can still read it afterwards.
+Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
+  for (const auto& [table, column] :
+       {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"), std::pair("truths", "mse_stderr"),
+        std::pair("truths", "relmse_stderr")}) {
+    Statement known(db, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?");
+    const auto found = known.bind(std::string_view(table)).bind(std::string_view(column)).step(what);
+    if (!found) return tl::unexpected(found.error());
+    if (*found) continue;
+    if (auto done =
+            execute(db, fmt::format("ALTER TABLE {} ADD COLUMN {} REAL", table, column).c_str(), what);
+        !done)
+      return done;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file) {
+  sqlite3* raw = nullptr;
+  const int code = sqlite3_open_v2(
+      file.c_str(), &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
+  Db db(raw);
+  const std::string what = fmt::format("open the job database {}", file.string());
+  if (code != SQLITE_OK) return tl::unexpected(db_error(raw, what));
+  sqlite3_busy_timeout(raw, 5000);  // ms; only a backup or a curious person shares the file
+  // NORMAL would lose acknowledged work on power loss.
+  for (const char* sql :
+       {"PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL", "PRAGMA foreign_keys = ON"})
+    if (auto done = execute(raw, sql, what); !done) return tl::unexpected(done.error());
+  Statement version(raw, "PRAGMA user_version");
+  if (auto row = version.step(what); !row) return tl::unexpected(row.error());
+  if (const auto found = version.integer(0); found > kSchemaVersion)
+    return fail(
+        Errc::failed_precondition,
+        fmt::format(
+            "{} was written by a newer Lightshaft (schema {}, this one knows {}); use that one, or another "
+            "--data folder",
+            file.string(), found, kSchemaVersion));
+  if (auto done = version.run(what); !done) return tl::unexpected(done.error());
+  if (auto done = execute(raw, kSchema, what); !done) return tl::unexpected(done.error());
+  if (auto done = add_missing_columns(raw, what); !done) return tl::unexpected(done.error());
+  if (auto done = execute(raw, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)
+    return tl::unexpected(done.error());
+  return std::make_unique<SqliteJobStore>(std::move(db));
+}
+
+}  // namespace ls::coordinator

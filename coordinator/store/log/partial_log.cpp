@@ -1,0 +1,227 @@
+#include "coordinator/store/log/partial_log.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/protocol/limits.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/store/log/partial_header.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr std::uint64_t kHealthBytes = 64 << 10;
+
+// The header at `offset` if a whole record fits there into a file of `size` bytes.
+std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
+                                   const std::filesystem::path& path) {
+  if (size - offset < sizeof(RawHeader)) return std::nullopt;
+  const auto bytes = read_at(file, offset, sizeof(RawHeader), path);
+  if (!bytes) return std::nullopt;
+  RawHeader raw;
+  std::memcpy(&raw, bytes->data(), sizeof raw);
+  if ((raw.magic != kPartialMagic && raw.magic != kOldPartialMagic) || raw.header_check != header_check(raw))
+    return std::nullopt;
+  if (raw.bytes > ls::limits::kPartialBytes || raw.text_bytes() > kHealthBytes ||
+      raw.bytes + raw.text_bytes() > size - offset - sizeof raw)
+    return std::nullopt;
+  return raw;
+}
+
+// nullopt: damaged.
+std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
+                                const std::filesystem::path& path) {
+  Health health;
+  if (raw.magic == kOldPartialMagic) {
+    health.add(HealthCause::unnamed, raw.health_bytes);
+    health.add(HealthCause::negative, raw.health_check);
+    health.add(HealthCause::majorant_violation, raw.unused);
+    return health;
+  }
+  if (raw.health_bytes == 0) return health;
+  const auto bytes = read_at(file, offset, raw.health_bytes, path);
+  if (!bytes || check_of(*bytes) != raw.health_check) return std::nullopt;
+  auto read = parse_health({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  return read ? std::optional(std::move(*read)) : std::nullopt;
+}
+
+}  // namespace
+
+PartialLog::PartialLog(std::filesystem::path folder) : folder_(std::move(folder)) {}
+PartialLog::~PartialLog() = default;
+
+std::filesystem::path PartialLog::segment_path(std::uint32_t segment) const {
+  return folder_ / fmt::format("partials-{:03}.seg", segment);
+}
+
+std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
+  return folder_ / fmt::format("partials-{:03}.idx", segment);
+}
+
+Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
+  // Exists, perhaps as something else
+  if (std::error_code error; std::filesystem::exists(folder, error) || error)
+    if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
+  std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
+  std::uint32_t count = 0;
+  while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
+  for (std::uint32_t i = 0; i < count; ++i)
+    if (auto done = log->scan(i, i + 1 == count); !done) return tl::unexpected(done.error());
+  if (count == 0) return log;
+  if (auto started = log->start_segment(count - 1); !started) return tl::unexpected(started.error());
+  return log;
+}
+
+// Reads the whole segment from its index. False: there is no valid index.
+bool PartialLog::scan_index(std::uint32_t segment, const File& file, std::uint64_t size) {
+  const auto bytes = read_file(index_path(segment), limits::kMaxSegmentBytes);
+  const auto headers = bytes ? unpack_index(*bytes, size) : std::nullopt;
+  if (!headers) return false;
+  const std::size_t before = found_.size();
+  std::uint64_t at = 0;
+  for (const RawHeader& raw : *headers) {
+    auto health = health_at(file, at + sizeof(RawHeader) + raw.bytes, raw, segment_path(segment));
+    if (!health) {
+      found_.resize(before);
+      return false;
+    }
+    found_.push_back(
+        {unpack(raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw.bytes, raw.payload_check}});
+    at += raw.record_bytes();
+  }
+  return true;
+}
+
+Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
+  const auto path = segment_path(segment);
+  auto file = File::open(path, O_RDWR);
+  if (!file) return tl::unexpected(file.error());
+  struct stat info {};
+  if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  if (!last && scan_index(segment, *file, size)) return {};
+  std::uint64_t at = 0;
+  while (at < size) {
+    const auto raw = header_at(*file, at, size, path);
+    if (!raw) break;
+    if (last) {
+      const auto exr = read_at(*file, at + sizeof(RawHeader), raw->bytes, path);
+      if (!exr || check_of(*exr) != raw->payload_check) break;
+    }
+    auto health = health_at(*file, at + sizeof(RawHeader) + raw->bytes, *raw, path);
+    if (!health) break;
+    found_.push_back({unpack(*raw, std::move(*health)),
+                      {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
+    if (last) headers_.push_back(*raw);
+    at += raw->record_bytes();
+  }
+  if (at == size) return {};
+  // In an older segment this is disk damage: the units behind it are rendered again, and the bytes are kept
+  // for examination.
+  cut_bytes_ += size - at;
+  log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
+           last ? "cut a torn record" : "left out damaged records; their units are rendered again");
+  if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)
+    return tl::unexpected(errno_error("truncate", path));
+  return {};
+}
+
+Result<void> PartialLog::start_segment(std::uint32_t segment) {
+  if (segment >= limits::kMaxSegments)
+    return fail(Errc::resource_exhausted, fmt::format("{} holds too many segments", folder_.string()));
+  const auto path = segment_path(segment);
+  auto file = File::open(path, O_RDWR | O_CREAT | O_APPEND);
+  if (!file) return tl::unexpected(file.error());
+  if (auto synced = sync_folder(folder_); !synced) return synced;
+  struct stat info {};
+  if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
+  current_ = std::move(*file);
+  segment_ = segment;
+  size_ = static_cast<std::uint64_t>(info.st_size);
+  return {};
+}
+
+// Best effort: without the index a restart scans the segment. A segment abandoned after a failed write or
+// sync gets no index.
+void PartialLog::finish_segment() {
+  std::uint64_t bytes = 0;
+  for (const RawHeader& header : headers_) bytes += header.record_bytes();
+  if (bytes == size_)
+    if (const auto written = write_atomically(index_path(segment_), pack_index(headers_)); !written)
+      log_warn(fmt::format("file={}", index_path(segment_).string()), written.error().message);
+  headers_.clear();
+}
+
+Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::span<const std::byte> exr) {
+  if (exr.size() > ls::limits::kPartialBytes)
+    return fail(Errc::invalid_argument, fmt::format("a partial of {} bytes is larger than {}", exr.size(),
+                                                    ls::limits::kPartialBytes));
+  if (!current_) {
+    if (auto made = make_folder(folder_); !made) return tl::unexpected(made.error());
+    if (auto done = start_segment(0); !done) return tl::unexpected(done.error());
+  }
+  const std::string text = record.health.clean() ? "" : canonical_json(record.health);
+  const auto health = std::as_bytes(std::span(text));
+  const std::uint64_t whole = sizeof(RawHeader) + exr.size() + health.size();
+  if (size_ > 0 && size_ + whole > limits::kMaxSegmentBytes) {
+    if (auto done = flush(); !done) {
+      lost_ = done.error();
+      return tl::unexpected(done.error());
+    }
+    finish_segment();
+    if (auto done = start_segment(segment_ + 1); !done) return tl::unexpected(done.error());
+  }
+  const RawHeader raw = pack(record, exr, health);
+  const auto path = segment_path(segment_);
+  auto written = write_all(current_, std::as_bytes(std::span(&raw, 1)), path);
+  if (written) written = write_all(current_, exr, path);
+  if (written && !health.empty()) written = write_all(current_, health, path);
+  if (!written) {
+    // A partial record must not precede the next one; if it cannot be cut off, the next record opens a new
+    // segment.
+    if (::ftruncate(current_.fd(), static_cast<off_t>(size_)) != 0) size_ = limits::kMaxSegmentBytes;
+    return tl::unexpected(written.error());
+  }
+  const Place place{segment_, size_ + sizeof raw, raw.bytes, raw.payload_check};
+  size_ += whole;
+  headers_.push_back(raw);
+  unsynced_ = true;
+  return place;
+}
+
+Result<void> PartialLog::sync() {
+  const auto done = flush();
+  if (const auto lost = std::exchange(lost_, std::nullopt)) return tl::unexpected(*lost);
+  return done;
+}
+
+// After a failed sync the system may have dropped unwritten data and still report success the next time: this
+// segment is not trusted again, and the next record opens another one.
+Result<void> PartialLog::flush() {
+  if (!std::exchange(unsynced_, false)) return {};
+  auto done = sync_data(current_, segment_path(segment_));
+  if (!done) size_ = limits::kMaxSegmentBytes;
+  return done;
+}
+
+Result<std::vector<std::byte>> PartialLog::read(const Place& place) const {
+  const auto path = segment_path(place.segment);
+  auto file = File::open(path, O_RDONLY);
+  if (!file) return tl::unexpected(file.error());
+  auto bytes = read_at(*file, place.offset, place.bytes, path);
+  if (bytes && check_of(*bytes) != place.check)
+    return fail(Errc::unavailable, fmt::format("{} is damaged at byte {}", path.string(), place.offset));
+  return bytes;
+}
+
+}  // namespace ls::coordinator

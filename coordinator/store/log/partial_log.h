@@ -1,0 +1,88 @@
+// Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed size
+// with a checksum, the EXR bytes, and the unit's health as text if it is not clean. Records written before
+// sync() returned survive kill -9 and power loss; a torn record behind them is detected at open() and cut
+// off. Beside each full segment lies an index of its headers, partials-NNN.idx.
+//
+// append() and sync() from one thread; read() from any.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/error.h"
+#include "common/protocol/messages.h"
+#include "coordinator/store/files.h"
+
+namespace ls::coordinator {
+
+struct PartialRecord {
+  TileIndex tile = 0;
+  RoundIndex round = 0;
+  SampleRange samples;
+  Digest digest;  // unit digest
+  WorkerId worker;
+  double cpu_seconds = 0;
+  double at_seconds = 0;  // since the job's first ray
+  Health health;
+  bool operator==(const PartialRecord&) const = default;
+};
+
+struct RawHeader;  // partial_header.h
+
+class PartialLog {
+ public:
+  ~PartialLog();
+
+  struct Place {
+    std::uint32_t segment = 0;
+    std::uint64_t offset = 0;  // of the EXR bytes
+    std::uint32_t bytes = 0;
+    std::uint64_t check = 0;  // first 8 bytes of their SHA-256
+  };
+  struct Entry {
+    PartialRecord record;
+    Place place;
+  };
+
+  // Scans the segments in order. Headers are checked in all of them, EXR bytes only in the last segment,
+  // where a tail may be torn: full segments were synced before the next one began. If there is none, the
+  // first append() creates the folder and the first segment: a waiting job costs no file.
+  static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
+
+  const std::vector<Entry>& found() const { return found_; }  // records found by open()
+  std::uint64_t cut_bytes() const { return cut_bytes_; }      // torn or damaged bytes skipped by open()
+  void forget_found() { std::vector<Entry>().swap(found_); }
+
+  // After an error the file is unchanged.
+  Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
+  // Error: nothing appended since the last sync is durable; it may be appended again.
+  Result<void> sync();
+  Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
+
+ private:
+  explicit PartialLog(std::filesystem::path folder);
+  std::filesystem::path segment_path(std::uint32_t segment) const;
+  std::filesystem::path index_path(std::uint32_t segment) const;
+  Result<void> scan(std::uint32_t segment, bool last);
+  bool scan_index(std::uint32_t segment, const File& file, std::uint64_t size);
+  void finish_segment();
+  Result<void> start_segment(std::uint32_t segment);
+  Result<void> flush();
+
+  std::filesystem::path folder_;
+  File current_;
+  std::uint32_t segment_ = 0;
+  std::uint64_t size_ = 0;  // of the current segment
+  bool unsynced_ = false;
+  std::optional<Error> lost_;       // a full segment could not be synced; reported by the next sync()
+  std::vector<RawHeader> headers_;  // of the current segment
+  std::vector<Entry> found_;
+  std::uint64_t cut_bytes_ = 0;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,39 @@
+// Failure detector: a coordinator is dead after `looks` consecutive polls without a sign of life. Polls are
+// counted, not seconds, and after a pause of our own, or of Redis, counting begins again: so our own pauses
+// do not count against others.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace ls::coordinator {
+
+class FailureDetector {
+ public:
+  explicit FailureDetector(int looks) : looks_(looks) {}
+
+  // `known`: all coordinators, and whether each is alive. Returns those that count as dead.
+  std::vector<std::string> look(const std::map<std::string, bool>& known) {
+    std::map<std::string, int> now;
+    std::vector<std::string> gone;
+    for (const auto& [name, alive] : known) {
+      if (alive) continue;
+      const auto before = absent_.find(name);
+      const int times = (before == absent_.end() ? 0 : before->second) + 1;
+      now.emplace(name, times);
+      if (times >= looks_) gone.push_back(name);
+    }
+    absent_ = std::move(now);
+    return gone;
+  }
+  // Discards the counts: earlier polls no longer apply.
+  void begin_again() { absent_.clear(); }
+
+ private:
+  int looks_;
+  std::map<std::string, int> absent_;  // polls without a sign of life
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,300 @@
+// The implementation of redis_job_store.h: redis_job_store.cpp has what the service's threads use,
+// redis_job_store_tell.cpp the thread that updates Redis.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "common/base/log.h"
+#include "coordinator/store/redis/redis_job_store.h"
+#include "coordinator/store/redis/redis_pull.h"
+
+namespace ls::coordinator {
+
+class RedisJobStore final : public JobStore {
+ public:
+  RedisJobStore(std::unique_ptr<JobStore> local, RedisStoreOptions options, std::vector<StoredJob> jobs,
+                std::unique_ptr<RedisLink> link, std::unique_ptr<RedisMembers> members)
+      : local_(std::move(local)),
+        options_(std::move(options)),
+        link_(std::move(link)),
+        members_(std::move(members)) {
+    for (const StoredJob& job : jobs) {
+      revisions_[job.id] = job.revision;
+      fences_[job.id] = std::max(job.fence, first_fence());
+    }
+    if (const auto quarantined = local_->quarantined())
+      for (const QuarantinedWorker& worker : *quarantined) quarantined_[worker.worker] = worker.evidence;
+    sender_ = std::jthread([this](const std::stop_token& token) { send_loop(token); });
+  }
+
+  Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
+
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    const std::lock_guard lock(mutex_);
+    std::vector<StoredJob> revised;
+    for (const StoredJob& job : jobs) {
+      if (lost_.contains(job.id)) continue;  // another coordinator owns the record
+      const auto known = revisions_.find(job.id);
+      revised.push_back(job);
+      revised.back().revision = (known == revisions_.end() ? 0 : known->second) + 1;
+      revised.back().fence = fences_.try_emplace(job.id, first_fence()).first->second;
+    }
+    if (auto put = local_->put_jobs(revised); !put) return put;
+    for (const StoredJob& job : revised) {
+      revisions_[job.id] = job.revision;
+      due_[job.id].take(job);
+    }
+    wake_.notify_one();
+    return {};
+  }
+
+  Result<std::vector<StoredJob>> jobs() const override { return local_->jobs(); }
+
+  Result<void> remove_jobs(std::span<const JobId> jobs) override {
+    const std::lock_guard lock(mutex_);
+    // The mark first: Redis may have the job until it answers again, and must not restore it here.
+    for (const JobId& job : jobs)
+      if (revisions_.contains(job))
+        if (auto marked = local_->reserve(removal_mark(job), 1); !marked)
+          return tl::unexpected(marked.error());
+    if (auto removed = local_->remove_jobs(jobs); !removed) return removed;
+    for (const JobId& job : jobs) {
+      fences_.erase(job);
+      lost_.erase(job);
+      if (revisions_.erase(job) == 0) continue;
+      due_[job] = Due{};
+      due_[job].removed = true;
+    }
+    wake_.notify_one();
+    return {};
+  }
+
+  Result<void> add_point(const JobId& job, const ConvergencePoint& point) override {
+    return note(
+        job, [&] { return local_->add_point(job, point); }, [](Due& due) { due.points = true; });
+  }
+  Result<void> set_reference_error(const JobId& job, double spp,
+                                   const ReferenceError& reference_error) override {
+    return note(
+        job, [&] { return local_->set_reference_error(job, spp, reference_error); },
+        [](Due& due) { due.points = true; });
+  }
+  Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
+    return local_->points(job);
+  }
+  Result<void> remove_points(const JobId& job) override {
+    return note(
+        job, [&] { return local_->remove_points(job); }, [](Due& due) { due.points = true; });
+  }
+
+  Result<void> add_log(const JobId& job, const LogLine& line) override {
+    return note(
+        job, [&] { return local_->add_log(job, line); }, [](Due& due) { due.log = true; });
+  }
+  Result<std::vector<LogLine>> log(const JobId& job) const override { return local_->log(job); }
+
+  Result<void> quarantine(const QuarantinedWorker& worker) override {
+    if (auto kept = local_->quarantine(worker); !kept) return kept;
+    const std::lock_guard lock(mutex_);
+    if (quarantined_.try_emplace(worker.worker, worker.evidence).second)
+      quarantined_due_.insert(worker.worker);
+    wake_.notify_one();
+    return {};
+  }
+  Result<std::vector<QuarantinedWorker>> quarantined() const override { return local_->quarantined(); }
+
+  Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
+    auto before = local_->reserve(counter, amount);
+    if (!before) return before;
+    const std::lock_guard lock(mutex_);
+    auto& told = counters_[counter];
+    told = std::max(told, *before + amount);
+    wake_.notify_one();
+    return before;
+  }
+
+  StoreStatus status() const override {
+    const std::lock_guard lock(mutex_);
+    std::string trouble = trouble_.empty() ? not_kept_ : trouble_;
+    if (trouble.empty() && members_) trouble = members_->stranded();
+    return {options_.address.shown(), std::move(trouble),
+            due_.size() + telling_ + (all_due_ ? revisions_.size() : 0)};
+  }
+
+  Moved moved() override {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(moved_, {});
+  }
+  void announce(const std::string& http, const std::string& grpc) override {
+    if (members_) members_->announce(http, grpc);
+  }
+  Result<std::optional<JobLocation>> locate_job(const JobId& id) override {
+    if (!members_) return std::nullopt;
+    auto owner = members_->owner_of(id);
+    if (!owner) return tl::unexpected(owner.error());
+    if (!*owner) return std::nullopt;
+    if ((*owner)->node == options_.node) {  // on its way here, or being removed
+      const std::lock_guard lock(mutex_);
+      const auto due = due_.find(id);
+      return due != due_.end() && due->second.removed ? std::nullopt
+                                                      : std::optional<JobLocation>(JobLocation{});
+    }
+    return JobLocation{(*owner)->http, (*owner)->alive};
+  }
+
+  // Called by the members' thread
+
+  void take_over(std::vector<TakenJob> taken) {
+    for (TakenJob& one : taken) {
+      StoredJob& job = one.job.job;
+      job.fence = one.fence;
+      auto kept = keep_inherited(*local_, one.job);
+      const std::lock_guard lock(mutex_);
+      if (!kept) {  // Redis says that we own it: the members' thread will try again
+        if (not_kept_.empty())
+          log_error(fmt::format("job={}", job.id.value),
+                    "cannot be taken over now, and is tried again: " + kept.error().message);
+        not_kept_ = fmt::format("job {} cannot be taken over: {}", job.id.value, kept.error().message);
+        continue;
+      }
+      not_kept_.clear();
+      revisions_[job.id] = job.revision;
+      fences_[job.id] = job.fence;
+      lost_.erase(job.id);
+      moved_.inherited.push_back({std::move(job), std::move(one.from)});
+    }
+  }
+
+  void apply(const std::vector<QuarantinedWorker>& workers) {
+    for (const QuarantinedWorker& worker : workers) {
+      const std::lock_guard lock(mutex_);
+      if (quarantined_.contains(worker.worker)) continue;
+      // If it cannot be stored it is applied anyway, and requested again after a restart.
+      if (auto kept = local_->quarantine(worker); !kept) {
+        log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
+      }
+      quarantined_[worker.worker] = worker.evidence;
+      moved_.quarantined.push_back(worker);
+    }
+  }
+
+  // `ids`: jobs that this node owns according to Redis. Returns those that it does not have.
+  std::vector<JobId> unknown(std::vector<JobId> ids) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(ids, [&](const JobId& id) {
+      if (revisions_.contains(id)) return true;
+      const auto due = due_.find(id);
+      if (due != due_.end() && due->second.removed) return true;
+      const auto removed = local_->reserve(removal_mark(id), 0);
+      if (!removed || *removed == 0) return !removed.has_value();
+      due_[id] = Due{};
+      due_[id].removed = true;  // the removal has not reached Redis
+      wake_.notify_one();
+      return true;
+    });
+    return ids;
+  }
+
+  void lose(const std::vector<LostJob>& jobs) {
+    const std::lock_guard lock(mutex_);
+    for (const LostJob& job : jobs)
+      if (const auto mine = fences_.find(job.id); mine != fences_.end() && mine->second < job.fence)
+        lose_locked(job.id);
+  }
+
+  void start_members() {
+    if (members_) members_->start();
+  }
+
+ private:
+  // What Redis lacks of one job
+  struct Due {
+    std::optional<std::string> record;
+    std::string state;           // of the record
+    std::uint64_t revision = 0;  // of the record
+    bool points = false, log = false, removed = false;
+
+    void take(const StoredJob& job) {
+      record = to_json(job);
+      revision = job.revision;
+      removed = false;
+      state = to_string(job.state);
+    }
+  };
+
+  bool shared() const { return !options_.node.empty(); }
+  std::uint64_t first_fence() const { return shared() ? 1 : 0; }
+
+  // Stores nothing more of the job, and lets the service drop it.
+  void lose_locked(const JobId& job) {
+    if (!revisions_.contains(job)) return;
+    revisions_.erase(job);
+    fences_.erase(job);
+    due_.erase(job);
+    std::erase_if(moved_.inherited, [&](const Inherited& one) { return one.job.id == job; });
+    lost_.insert(job);
+    moved_.lost.push_back(job);
+    if (auto gone = local_->remove_job(job); !gone)
+      log_error(fmt::format("job={}", job.value),
+                "another coordinator has it, and its record stays here: " + gone.error().message);
+  }
+
+  // Late updates of a job that another coordinator owns are ignored: they must not be here when it comes
+  // back.
+  template <class Keep, class Edit>
+  Result<void> note(const JobId& job, Keep keep, Edit edit) {
+    const std::lock_guard lock(mutex_);
+    if (lost_.contains(job)) return {};
+    if (auto kept = keep(); !kept) return kept;
+    if (revisions_.contains(job)) edit(due_[job]);
+    wake_.notify_one();
+    return {};
+  }
+
+  bool idle() const { return due_.empty() && counters_.empty() && quarantined_due_.empty() && !all_due_; }
+
+  // The thread that updates Redis
+  void send_loop(const std::stop_token& token);
+  void send_the_rest();
+  void set_trouble(const Result<void>& told);
+  Result<void> send_once();
+  Result<void> check_memory();
+  Result<void> note_all_behind();
+  Result<void> send_counters();
+  Result<void> tell_quarantined();
+  Result<void> send_jobs();
+  std::vector<RedisLink::Command> commands_of(const JobId& id, const Due& due) const;
+  void give_back(std::map<JobId, Due> taken);
+
+  std::unique_ptr<JobStore> local_;
+  RedisStoreOptions options_;
+  mutable std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::map<JobId, std::uint64_t> revisions_;  // of every job
+  std::map<JobId, std::uint64_t> fences_;     // of every job; 0: never shared
+  std::set<JobId> lost_;                      // now owned by others: updates by the service are not stored
+  Moved moved_;                               // changes that the service has not fetched yet
+  std::map<JobId, Due> due_;
+  std::size_t telling_ = 0;  // jobs being sent to Redis: no longer in due_, not in Redis yet
+  JobId told_last_;          // last due job sent; the next ones follow it in order
+  std::map<std::string, std::uint64_t> counters_;
+  std::map<WorkerId, std::string> quarantined_;  // all known
+  std::set<WorkerId> quarantined_due_;
+  std::string not_kept_;             // why a job taken over could not be stored here yet
+  std::unique_ptr<RedisLink> link_;  // this and memory_ are used by the sending thread only
+  std::string memory_;               // empty: unknown
+  bool all_due_ = true;
+  std::string trouble_;
+  std::unique_ptr<RedisMembers> members_;
+  std::jthread sender_;  // last member: this and the members' thread end before what they use
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,240 @@
+#include <fmt/format.h>
+
+#include <random>
+
+#include "common/base/log.h"
+#include "coordinator/store/redis/redis_job_store_impl.h"
+#include "coordinator/store/redis/redis_pull.h"
+
+namespace ls::coordinator {
+namespace {
+// Jobs sent at once: a few MB at most.
+constexpr std::size_t kJobsAtOnce = 64;
+}  // namespace
+
+// The thread that updates Redis
+void RedisJobStore::send_loop(const std::stop_token& token) {
+  Duration pause = options_.first_retry;
+  std::unique_lock lock(mutex_);
+  while (!token.stop_requested()) {
+    (void)wake_.wait_for(lock, token, options_.check_every, [&] { return !idle(); });
+    if (token.stop_requested()) break;
+    lock.unlock();
+    const auto sent = send_once();
+    lock.lock();
+    set_trouble(sent);
+    if (sent) {
+      pause = options_.first_retry;
+      continue;
+    }
+    (void)wake_.wait_for(lock, token, pause, [] { return false; });
+    pause = std::min(pause * 2, options_.longest_retry);
+  }
+  lock.unlock();
+  send_the_rest();
+}
+
+// At shutdown; what remains unsent is on the disk. Tried twice: on a connection that broke unnoticed the
+// first attempt fails.
+void RedisJobStore::send_the_rest() {
+  int failed = 0;
+  for (bool more = true; more && failed < 2;) {
+    const bool sent = send_once().has_value();
+    if (!sent) ++failed;
+    const std::lock_guard lock(mutex_);
+    more = !sent || !idle();
+  }
+}
+
+void RedisJobStore::set_trouble(const Result<void>& sent) {
+  const std::string before = std::exchange(trouble_, sent ? "" : sent.error().message);
+  if (before.empty() && !sent)
+    log_warn("store=redis",
+             trouble_ + "; jobs go on, kept on this machine's disk, and Redis is told when it is back");
+  if (!before.empty() && sent)
+    log_info("store=redis", "Redis answers again and is being told what it missed");
+}
+
+Result<void> RedisJobStore::send_once() {
+  if (!link_ || link_->broken()) {
+    link_.reset();
+    auto link = RedisLink::connect(options_.address, options_.timeouts);
+    if (!link) return tl::unexpected(link.error());
+    link_ = std::move(*link);
+    memory_.clear();
+  }
+  if (auto same = check_memory(); !same) return same;
+  if (auto all = note_all_behind(); !all) return all;
+  // Before the jobs: a coordinator that takes them over must know
+  if (auto sent = tell_quarantined(); !sent) return sent;
+  if (auto sent = send_counters(); !sent) return sent;
+  return send_jobs();
+}
+
+// A random word that lives in Redis as long as its other data: if it has changed, Redis has lost its data, or
+// it is another Redis.
+Result<void> RedisJobStore::check_memory() {
+  auto word = link_->run({"GET", kRedisMemory});
+  if (!word) return tl::unexpected(word.error());
+  if (!memory_.empty() && word->text == memory_) return {};
+  if (word->nil) {
+    if (auto set = link_->run({"SET", kRedisMemory, std::to_string(std::random_device()()), "NX"}); !set)
+      return tl::unexpected(set.error());
+    word = link_->run({"GET", kRedisMemory});
+    if (!word) return tl::unexpected(word.error());
+  }
+  memory_ = word->text;
+  const std::lock_guard lock(mutex_);
+  all_due_ = true;
+  return {};
+}
+
+// Then every job that Redis lacks, or has in a lower revision, is due completely.
+Result<void> RedisJobStore::note_all_behind() {
+  std::vector<std::pair<JobId, std::uint64_t>> known;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!all_due_) return {};
+    known.assign(revisions_.begin(), revisions_.end());
+  }
+  auto behind = jobs_behind(*link_, known);
+  if (!behind) return tl::unexpected(behind.error());
+  auto jobs = behind->empty() ? Result<std::vector<StoredJob>>() : local_->jobs();
+  if (!jobs) return tl::unexpected(jobs.error());
+  const std::lock_guard lock(mutex_);
+  all_due_ = false;
+  for (const auto& [worker, evidence] : quarantined_) quarantined_due_.insert(worker);
+  for (const StoredJob& job : *jobs) {
+    if (job.damaged || !behind->contains(job.id) || !revisions_.contains(job.id)) continue;
+    Due& due = due_[job.id];
+    if (!due.record) due.take(job);
+    due.points = due.log = true;
+  }
+  return {};
+}
+
+Result<void> RedisJobStore::tell_quarantined() {
+  std::vector<RedisLink::Command> commands;
+  std::set<WorkerId> due;
+  {
+    const std::lock_guard lock(mutex_);
+    due.swap(quarantined_due_);
+    for (const WorkerId& worker : due)
+      commands.push_back({"HSETNX", kRedisQuarantined, worker.value, quarantined_.at(worker)});
+  }
+  if (due.empty()) return {};
+  auto replies = link_->run_all(commands);
+  std::optional<Error> failed;
+  if (!replies) failed = replies.error();
+  for (std::size_t i = 0; replies && i < replies->size() && !failed; ++i)
+    if (!(*replies)[i]) failed = (*replies)[i].error();
+  if (!failed) return {};
+  const std::lock_guard lock(mutex_);
+  quarantined_due_.merge(due);
+  return tl::unexpected(*failed);
+}
+
+Result<void> RedisJobStore::send_counters() {
+  std::map<std::string, std::uint64_t> counters;
+  {
+    const std::lock_guard lock(mutex_);
+    counters.swap(counters_);
+  }
+  if (counters.empty() || shared()) return {};  // shared: each coordinator has its own
+  RedisLink::Command command{"HSET", kRedisCounters};
+  for (const auto& [name, value] : counters) {
+    command.push_back(name);
+    command.push_back(std::to_string(value));
+  }
+  auto sent = link_->run(command);
+  if (sent) return {};
+  const std::lock_guard lock(mutex_);
+  for (const auto& [name, value] : counters) counters_[name] = std::max(counters_[name], value);
+  return tl::unexpected(sent.error());
+}
+
+Result<void> RedisJobStore::send_jobs() {
+  std::map<JobId, Due> taken;
+  std::vector<RedisLink::Command> commands;
+  std::vector<JobId> owner;               // the job of each command
+  std::map<JobId, std::uint64_t> fences;  // under which each job is written
+  {
+    const std::lock_guard lock(mutex_);
+    // Round robin, so that a job that Redis always rejects does not delay the others.
+    while (!due_.empty() && taken.size() < kJobsAtOnce) {
+      auto next = due_.upper_bound(told_last_);
+      if (next == due_.end()) next = due_.begin();
+      told_last_ = next->first;
+      taken.insert(due_.extract(next));
+    }
+    telling_ = taken.size();
+    for (const auto& [id, due] : taken)
+      if (const auto fence = fences_.find(id); fence != fences_.end()) fences.insert(*fence);
+  }
+  for (const auto& [id, due] : taken)
+    for (auto& command : commands_of(id, due)) {
+      commands.push_back(std::move(command));
+      owner.push_back(id);
+    }
+  auto replies = link_->run_all(commands);
+  std::optional<Error> failed;
+  std::set<JobId> refused;
+  if (!replies) failed = replies.error();
+  for (std::size_t i = 0; replies && i < replies->size(); ++i) {
+    const auto& reply = (*replies)[i];
+    if (!reply && !failed) failed = reply.error();
+    if (!reply) refused.insert(owner[i]);
+    if (reply && taken.at(owner[i]).removed) continue;
+    if (reply && shared() && reply->number == static_cast<int>(PutAnswer::lost)) {
+      const std::lock_guard lock(mutex_);
+      const auto now = fences_.find(owner[i]), then = fences.find(owner[i]);
+      if (now != fences_.end() && then != fences.end() && now->second == then->second) lose_locked(owner[i]);
+    }
+    if (reply && !shared() && commands[i].front() == "EVAL" &&
+        reply->number != static_cast<int>(PutAnswer::put))
+      log_error(fmt::format("job={}", owner[i].value),
+                "Redis has a later revision of this job: another coordinator writes it; what this one "
+                "knows is kept "
+                "on its disk only");
+  }
+  if (replies) std::erase_if(taken, [&](const auto& job) { return !refused.contains(job.first); });
+  give_back(std::move(taken));
+  return failed ? tl::unexpected(*failed) : Result<void>();
+}
+
+std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, const Due& due) const {
+  if (due.removed) return remove_commands(id, options_.node);
+  RedisUpdate update{.id = id, .revision = due.revision, .record = due.record, .node = options_.node};
+  update.state = due.state;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = revisions_.find(id);
+    if (known == revisions_.end()) return {};  // removed after it was taken; its removal is due
+    if (!due.record) update.revision = known->second;
+    if (const auto fence = fences_.find(id); fence != fences_.end()) update.fence = fence->second;
+  }
+  if (due.points)
+    if (auto points = local_->points(id)) update.points = points_json(*points);
+  if (due.log)
+    if (auto log = local_->log(id)) update.log = log_json(*log);
+  return {put_command(update)};
+}
+
+// Makes the jobs that were not sent due again.
+void RedisJobStore::give_back(std::map<JobId, Due> taken) {
+  const std::lock_guard lock(mutex_);
+  telling_ = 0;
+  for (auto& [id, old] : taken) {
+    const auto [now, fresh] = due_.try_emplace(id, old);
+    if (fresh || now->second.removed) continue;
+    if (!now->second.record) {
+      now->second.record = std::move(old.record);
+      now->second.revision = old.revision;
+      now->second.state = old.state;
+    }
+    now->second.points |= old.points;
+    now->second.log |= old.log;
+  }
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,116 @@
+#include "coordinator/store/redis/redis_link.h"
+
+#include <fmt/format.h>
+#include <hiredis/hiredis.h>
+#include <sys/time.h>
+
+namespace ls::coordinator {
+namespace {
+
+// Replies deeper or longer than our commands can have do not come from a Redis.
+constexpr int kMaxDepth = 4;
+
+timeval timeval_of(Duration d) {
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(d).count();
+  return {static_cast<time_t>(us / 1'000'000), static_cast<suseconds_t>(us % 1'000'000)};
+}
+
+struct FreeReply {
+  void operator()(redisReply* reply) const { freeReplyObject(reply); }
+};
+
+std::string text_of(const redisReply& reply) {
+  return reply.str ? std::string(reply.str, reply.len) : std::string();
+}
+
+RedisReply copied(const redisReply& from, int depth) {
+  RedisReply to;
+  to.nil = from.type == REDIS_REPLY_NIL;
+  to.number = from.integer;
+  to.text = text_of(from);
+  if (depth < kMaxDepth)
+    for (std::size_t i = 0; i < from.elements; ++i) to.items.push_back(copied(*from.element[i], depth + 1));
+  return to;
+}
+
+Error redis_error(const std::string& said, const std::string& shown) {
+  if (said.starts_with("NOAUTH") || said.starts_with("WRONGPASS") || said.find("AUTH") != std::string::npos)
+    return {Errc::invalid_argument,
+            fmt::format("{} wants a user and password ({}); put them into --store", shown, said)};
+  if (said.starts_with("OOM"))
+    return {Errc::resource_exhausted,
+            fmt::format("{} has no memory left ({}); raise its maxmemory", shown, said)};
+  return {Errc::unavailable, fmt::format("{} answered: {}", shown, said)};
+}
+
+}  // namespace
+
+void RedisLink::Close::operator()(redisContext* context) const { redisFree(context); }
+
+RedisLink::RedisLink(redisContext* context, std::string shown)
+    : context_(context), shown_(std::move(shown)) {}
+RedisLink::~RedisLink() = default;
+
+Error RedisLink::connection_error() {
+  broken_ = true;
+  return {Errc::unavailable, fmt::format("no answer from {}: {}", shown_,
+                                         context_ && context_->err ? context_->errstr : "no memory")};
+}
+
+Result<std::unique_ptr<RedisLink>> RedisLink::connect(const RedisAddress& address, Timeouts timeouts) {
+  redisContext* raw =
+      redisConnectWithTimeout(address.host.c_str(), address.port, timeval_of(timeouts.connect));
+  std::unique_ptr<RedisLink> link(new RedisLink(raw, address.shown()));
+  if (raw == nullptr || raw->err != 0) return tl::unexpected(link->connection_error());
+  if (redisSetTimeout(raw, timeval_of(timeouts.answer)) != REDIS_OK)
+    return tl::unexpected(link->connection_error());
+  (void)redisEnableKeepAlive(raw);
+  std::vector<Command> hello;
+  if (!address.password.empty())
+    hello.push_back(address.user.empty() ? Command{"AUTH", address.password}
+                                         : Command{"AUTH", address.user, address.password});
+  hello.push_back({"SELECT", std::to_string(address.db)});
+  for (const Command& command : hello)
+    if (const auto done = link->run(command); !done) return tl::unexpected(done.error());
+  return link;
+}
+
+Result<Result<RedisReply>> RedisLink::next_reply() {
+  void* raw = nullptr;
+  if (redisGetReply(context_.get(), &raw) != REDIS_OK || raw == nullptr)
+    return tl::unexpected(connection_error());
+  const std::unique_ptr<redisReply, FreeReply> reply(static_cast<redisReply*>(raw));
+  if (reply->type == REDIS_REPLY_ERROR)
+    return Result<RedisReply>(tl::unexpected(redis_error(text_of(*reply), shown_)));
+  return Result<RedisReply>(copied(*reply, 0));
+}
+
+Result<std::vector<Result<RedisReply>>> RedisLink::run_all(std::span<const Command> commands) {
+  if (broken_) return tl::unexpected(connection_error());
+  for (const Command& command : commands) {
+    std::vector<const char*> words;
+    std::vector<std::size_t> lengths;
+    for (const std::string& word : command) {
+      words.push_back(word.data());
+      lengths.push_back(word.size());
+    }
+    if (redisAppendCommandArgv(context_.get(), static_cast<int>(words.size()), words.data(),
+                               lengths.data()) != REDIS_OK)
+      return tl::unexpected(connection_error());
+  }
+  std::vector<Result<RedisReply>> replies;
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    auto reply = next_reply();
+    if (!reply) return tl::unexpected(reply.error());
+    replies.push_back(std::move(*reply));
+  }
+  return replies;
+}
+
+Result<RedisReply> RedisLink::run(const Command& command) {
+  auto replies = run_all({&command, 1});
+  if (!replies) return tl::unexpected(replies.error());
+  return std::move(replies->front());
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,331 @@
+#include "coordinator/store/redis/redis_members.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <nlohmann/json.hpp>
+
+#include "common/base/log.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr const char* kHeirMilliseconds = "15000";  // longer than taking a batch of jobs takes
+
+// ARGV: node, addresses, lease in ms, start, number of lost jobs handled. -> {lost jobs, node, alive, node,
+// alive, ...}
+constexpr const char* kBeat = R"(
+redis.call('SET', 'lightshaft:alive:' .. ARGV[1], ARGV[2], 'PX', ARGV[3])
+redis.call('HSET', 'lightshaft:nodes', ARGV[1], ARGV[2])
+if tonumber(redis.call('HGET', 'lightshaft:counters', 'shared-starts') or '0') < tonumber(ARGV[4]) then
+  redis.call('HSET', 'lightshaft:counters', 'shared-starts', ARGV[4])
+end
+redis.call('LTRIM', 'lightshaft:lost:' .. ARGV[1], ARGV[5], -1)
+local answer = { redis.call('LRANGE', 'lightshaft:lost:' .. ARGV[1], 0, 9999) }
+for _, node in ipairs(redis.call('HKEYS', 'lightshaft:nodes')) do
+  table.insert(answer, node)
+  table.insert(answer, redis.call('EXISTS', 'lightshaft:alive:' .. node))
+end
+return answer
+)";
+
+// ARGV: job, dead node, node, sequence or ''. Returns nothing if the dead node is alive again or no longer
+// has the job.
+constexpr const char* kTake = R"(
+local key = 'lightshaft:job:' .. ARGV[1]
+if redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[2]) == 1 then return {} end
+if redis.call('HGET', key, 'owner') ~= ARGV[2] then
+  redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])
+  return {}
+end
+local fence = redis.call('HINCRBY', key, 'fence', 1)
+redis.call('HSET', key, 'owner', ARGV[3], 'from', ARGV[2])
+redis.call('SMOVE', 'lightshaft:owned:' .. ARGV[2], 'lightshaft:owned:' .. ARGV[3], ARGV[1])
+redis.call('RPUSH', 'lightshaft:lost:' .. ARGV[2], ARGV[1] .. ' ' .. fence)
+if ARGV[4] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[4], ARGV[3]) end
+return redis.call('HGETALL', key)
+)";
+
+// ARGV: dead node. A node without jobs is no longer polled; its list of lost jobs is kept for a week, should
+// it ask.
+constexpr const char* kSettle = R"(
+if redis.call('SCARD', 'lightshaft:owned:' .. ARGV[1]) == 0 and redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[1]) == 0 then
+  redis.call('HDEL', 'lightshaft:nodes', ARGV[1])
+  redis.call('EXPIRE', 'lightshaft:lost:' .. ARGV[1], 604800)
+end
+return redis.call('DEL', 'lightshaft:heir:' .. ARGV[1])
+)";
+
+// ARGV: least
+constexpr const char* kStart = R"(
+local last = tonumber(redis.call('HGET', 'lightshaft:counters', 'shared-starts') or '0')
+local start = string.format('%.0f', math.max(last, tonumber(ARGV[1])) + 1)
+redis.call('HSET', 'lightshaft:counters', 'shared-starts', start)
+return start
+)";
+
+// The jobs of a sequence must stay together.
+JobId group_of(const JobId& job) {
+  const auto frame = frame_of(job);
+  return frame ? frame->sequence : job;
+}
+
+}  // namespace
+
+RedisMembers::RedisMembers(MemberOptions options, Callbacks callbacks)
+    : options_(std::move(options)), callbacks_(std::move(callbacks)), absence_(options_.looks) {}
+
+Result<RedisLink*> RedisMembers::link() {
+  if (!link_ || link_->broken()) {
+    link_.reset();
+    absence_.begin_again();
+    own_unclear_ = true;    // it is unknown what Redis carried out last
+    quarantined_seen_ = 0;  // it may be another Redis
+    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
+    if (!fresh) return tl::unexpected(fresh.error());
+    link_ = std::move(*fresh);
+  }
+  return link_.get();
+}
+
+Result<void> RedisMembers::join() {
+  auto known = send_heartbeat();
+  return known ? Result<void>() : tl::unexpected(known.error());
+}
+
+void RedisMembers::announce(const std::string& http, const std::string& grpc) {
+  const std::lock_guard lock(mutex_);
+  http_ = http;
+  grpc_ = grpc;
+}
+
+Result<std::uint64_t> RedisMembers::unique_start(std::uint64_t least) {
+  auto link = this->link();
+  if (!link) return tl::unexpected(link.error());
+  auto number = (*link)->run({"EVAL", kStart, "0", std::to_string(least)});
+  if (!number) return tl::unexpected(number.error());
+  start_ = counter_of(number->text);
+  return start_;
+}
+
+Result<std::map<std::string, bool>> RedisMembers::send_heartbeat() {
+  auto link = this->link();
+  if (!link) return tl::unexpected(link.error());
+  std::string addresses;
+  {
+    const std::lock_guard lock(mutex_);
+    addresses = nlohmann::json{{"http", http_}, {"grpc", grpc_}}.dump();
+  }
+  const auto lease = std::chrono::duration_cast<std::chrono::milliseconds>(options_.lease).count();
+  auto answer = (*link)->run({"EVAL", kBeat, "0", options_.node, addresses, std::to_string(lease),
+                              std::to_string(start_), std::to_string(std::exchange(lost_taken_, 0))});
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->items.empty()) return fail(Errc::internal, "Redis gave no list of coordinators");
+  std::vector<LostJob> lost;
+  for (const RedisReply& item : answer->items.front().items) {
+    const std::size_t gap = std::min(item.text.find(' '), item.text.size());
+    if (const std::string id = item.text.substr(0, gap); is_job_id(id))
+      lost.push_back({{id}, counter_of(item.text.substr(std::min(gap + 1, item.text.size())))});
+  }
+  std::map<std::string, bool> known;
+  for (std::size_t i = 1; i + 1 < answer->items.size(); i += 2)
+    if (answer->items[i].text != options_.node)
+      known[answer->items[i].text] = answer->items[i + 1].number == 1;
+  if (!lost.empty()) callbacks_.lost(lost);
+  lost_taken_ = answer->items.front().items.size();
+  return known;
+}
+
+Result<void> RedisMembers::beat() {
+  auto known = send_heartbeat();
+  if (!known) return tl::unexpected(known.error());
+  if (auto quarantined = look_for_quarantined(); !quarantined) return quarantined;
+  if (auto own = look_for_stranded(); !own) return own;
+  std::erase_if(settled_, [&](const std::string& node) { return known->contains(node) && known->at(node); });
+  for (const std::string& dead : absence_.look(*known)) {
+    if (settled_.contains(dead)) continue;
+    if (auto taken = take_from(dead); !taken) return taken;
+  }
+  return {};
+}
+
+Result<void> RedisMembers::look_for_quarantined() {
+  if (!callbacks_.quarantined) return {};
+  auto count = link_->run({"HLEN", kRedisQuarantined});
+  if (!count) return tl::unexpected(count.error());
+  if (count->number == quarantined_seen_) return {};
+  auto all = link_->run({"HGETALL", kRedisQuarantined});
+  if (!all) return tl::unexpected(all.error());
+  callbacks_.quarantined(quarantined_workers(*all));
+  quarantined_seen_ = static_cast<std::int64_t>(all->items.size() / 2);
+  return {};
+}
+
+// Repeated at every heartbeat until the store has all of them: nobody else takes the jobs of a living node.
+Result<void> RedisMembers::look_for_stranded() {
+  if (!own_unclear_ || !callbacks_.unknown) return {};
+  auto owned = link_->run({"SMEMBERS", "lightshaft:owned:" + options_.node});
+  if (!owned) return tl::unexpected(owned.error());
+  std::vector<JobId> ids;
+  for (const RedisReply& member : owned->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  const auto unknown = callbacks_.unknown(std::move(ids));
+  own_unclear_ = !unknown.empty();
+  std::vector<TakenJob> taken;
+  std::string stranded;
+  for (const JobId& id : unknown) {
+    auto fields = link_->run({"HGETALL", redis_job_key(id)});
+    if (!fields) return tl::unexpected(fields.error());
+    auto job = parse_redis_job(*fields);
+    if (!readable(id, job, "nobody renders it: repair it, or remove the job's keys")) {
+      stranded = fmt::format("the record of job {} cannot be read: nobody renders it", id.value);
+      continue;
+    }
+    if (job->owner != options_.node) continue;
+    const std::string from = job->from.empty() ? "of before" : job->from;
+    taken.push_back({std::move(*job), 0, from});
+    taken.back().fence = taken.back().job.fence;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    stranded_ = std::move(stranded);
+  }
+  if (!taken.empty()) callbacks_.taken(std::move(taken));
+  return {};
+}
+
+bool RedisMembers::readable(const JobId& id, const Result<RedisJob>& job, const char* what_of_it) {
+  if (job && job->job.id == id) return true;
+  const std::string text = fmt::format("its record in Redis cannot be read; {}", what_of_it);
+  if (unreadable_.insert(id).second) log_error(fmt::format("job={} store=redis", id.value), text);
+  return false;
+}
+
+std::string RedisMembers::stranded() const {
+  const std::lock_guard lock(mutex_);
+  return stranded_;
+}
+
+Result<std::vector<JobId>> RedisMembers::left_unfinished(const std::string& dead) {
+  auto members = link_->run({"SMEMBERS", "lightshaft:owned:" + dead});
+  if (!members) return tl::unexpected(members.error());
+  std::erase_if(members->items, [](const RedisReply& member) { return !is_job_id(member.text); });
+  std::map<JobId, std::vector<JobId>> groups;
+  std::set<JobId> open;
+  for (std::size_t i = 0; i < members->items.size(); i += kAskedAtOnce) {
+    const std::size_t end = std::min(members->items.size(), i + kAskedAtOnce);
+    std::vector<RedisLink::Command> commands;
+    for (std::size_t k = i; k < end; ++k)
+      commands.push_back({"HGET", redis_job_key({members->items[k].text}), "state"});
+    auto states = link_->run_all(commands);
+    if (!states) return tl::unexpected(states.error());
+    for (std::size_t k = i; k < end; ++k) {
+      const auto& state = (*states)[k - i];
+      if (!state) return tl::unexpected(state.error());
+      const JobId id{members->items[k].text}, group = group_of(id);
+      groups[group].push_back(id);
+      if (state->text != "done" && state->text != "failed" && state->text != "cancelled") open.insert(group);
+    }
+  }
+  std::vector<JobId> unfinished;
+  for (const JobId& group : open) {
+    auto& jobs = groups[group];
+    std::sort(jobs.begin(), jobs.end());
+    unfinished.insert(unfinished.end(), jobs.begin(), jobs.end());
+  }
+  return unfinished;
+}
+
+Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::string& dead) {
+  // First check that the job can be read; otherwise this node would own a job that it cannot use, and no
+  // other could take it.
+  auto before = link_->run({"HGETALL", redis_job_key(id)});
+  if (!before) return tl::unexpected(before.error());
+  if (!readable(id, parse_redis_job(*before), "it stays with the coordinator that is gone"))
+    return std::nullopt;
+  const auto frame = frame_of(id);
+  own_unclear_ = true;
+  auto fields = link_->run(
+      {"EVAL", kTake, "0", id.value, dead, options_.node, frame ? frame->sequence.value : std::string()});
+  if (!fields) return tl::unexpected(fields.error());
+  if (fields->items.empty()) return std::nullopt;
+  auto job = parse_redis_job(*fields);
+  if (!job || job->job.id != id) return std::nullopt;  // checked again as a job of this node
+  const std::uint64_t fence = job->fence;
+  return TakenJob{std::move(*job), fence, dead};
+}
+
+Result<void> RedisMembers::take_from(const std::string& dead) {
+  const std::string heir_key = "lightshaft:heir:" + dead;
+  auto first = link_->run({"SET", heir_key, options_.node, "NX", "PX", kHeirMilliseconds});
+  if (!first) return tl::unexpected(first.error());
+  if (first->nil) {
+    const auto heir = link_->run({"GET", heir_key});
+    if (!heir || heir->text != options_.node) return {};  // another node does it
+  }
+  auto unfinished = left_unfinished(dead);
+  if (!unfinished) return tl::unexpected(unfinished.error());
+  std::vector<TakenJob> taken;
+  std::optional<Error> cut;
+  for (const JobId& id : *unfinished) {
+    auto job = take(id, dead);
+    if (!job) {
+      cut = job.error();
+      break;
+    }
+    if (*job) taken.push_back(std::move(**job));
+  }
+  if (!taken.empty()) {
+    log_warn("store=redis",
+             fmt::format("coordinator {} is gone: {} of its jobs are taken over", dead, taken.size()));
+    callbacks_.taken(std::move(taken));
+  }
+  if (cut) return tl::unexpected(*cut);
+  settled_.insert(dead);
+  auto done = link_->run({"EVAL", kSettle, "0", dead});
+  return done ? Result<void>() : tl::unexpected(done.error());
+}
+
+Result<std::optional<Member>> RedisMembers::owner_of(const JobId& id) {
+  const std::lock_guard lock(asking_);
+  if (!asking_link_ || asking_link_->broken()) {
+    asking_link_.reset();
+    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
+    if (!fresh) return tl::unexpected(fresh.error());
+    asking_link_ = std::move(*fresh);
+  }
+  auto owner = asking_link_->run({"HGET", redis_job_key(id), "owner"});
+  if (owner && owner->nil) owner = asking_link_->run({"HGET", "lightshaft:sequences", id.value});
+  if (!owner) return tl::unexpected(owner.error());
+  if (owner->nil) return std::nullopt;
+  auto addresses = asking_link_->run({"HGET", "lightshaft:nodes", owner->text});
+  if (!addresses) return tl::unexpected(addresses.error());
+  auto alive = asking_link_->run({"EXISTS", "lightshaft:alive:" + owner->text});
+  if (!alive) return tl::unexpected(alive.error());
+  Member member{owner->text, "", "", alive->number == 1};
+  const auto json = nlohmann::json::parse(addresses->text, nullptr, false);
+  if (json.is_object()) {
+    member.http = json.value("http", "");
+    member.grpc = json.value("grpc", "");
+  }
+  return member;
+}
+
+void RedisMembers::start() {
+  beater_ = std::jthread([this](const std::stop_token& token) {
+    std::mutex mutex;
+    std::condition_variable_any woken;
+    std::unique_lock lock(mutex);
+    do {
+      const auto done = beat();
+      const std::string before = std::exchange(trouble_, done ? "" : done.error().message);
+      if (before.empty() && !done)
+        log_warn("store=redis",
+                 trouble_ + "; this coordinator's jobs go on, and nobody can be seen or taken over from");
+    } while (!woken.wait_for(lock, token, options_.beat, [&] { return token.stop_requested(); }) &&
+             !token.stop_requested());
+  });
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,205 @@
+#include "coordinator/store/redis/redis_pull.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "common/base/log.h"
+#include "coordinator/store/redis/redis_records.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Counts that Redis may have lost with its last writes: ids stay unique as long as there are far fewer than a
+// million reservations per second.
+constexpr std::uint64_t kCountsLost = 1'000'000;
+
+// Runs several commands in batches; an error of any of them fails the call.
+Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::Command> commands) {
+  std::vector<RedisReply> all;
+  for (std::size_t i = 0; i < commands.size(); i += kAskedAtOnce) {
+    auto replies = link.run_all(commands.subspan(i, std::min(kAskedAtOnce, commands.size() - i)));
+    if (!replies) return tl::unexpected(replies.error());
+    for (auto& reply : *replies) {
+      if (!reply) return tl::unexpected(reply.error());
+      all.push_back(std::move(*reply));
+    }
+  }
+  return all;
+}
+
+Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const JobId> ids) {
+  std::vector<RedisLink::Command> commands;
+  for (const JobId& id : ids) commands.push_back({"HGET", redis_job_key(id), "revision"});
+  std::vector<std::uint64_t> revisions;
+  for (std::size_t i = 0; i < commands.size(); i += kAskedAtOnce) {
+    const auto portion = std::span(commands).subspan(i, std::min(kAskedAtOnce, commands.size() - i));
+    auto replies = link.run_all(portion);
+    if (!replies) return tl::unexpected(replies.error());
+    // An unreadable revision counts as 0 and does not prevent reading the others.
+    for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
+  }
+  return revisions;
+}
+
+Result<void> pull_counters(RedisLink& link, JobStore& local) {
+  auto all = link.run({"HGETALL", kRedisCounters});
+  if (!all) return tl::unexpected(all.error());
+  for (std::size_t i = 0; i + 1 < all->items.size(); i += 2) {
+    const std::string& name = all->items[i].text;
+    const std::uint64_t there = counter_of(all->items[i + 1].text);
+    auto here = local.reserve(name, 0);
+    if (!here) return tl::unexpected(here.error());
+    if (*here >= there) continue;
+    if (auto ahead = local.reserve(name, there - *here + kCountsLost); !ahead)
+      return tl::unexpected(ahead.error());
+  }
+  return {};
+}
+
+// Returns those of `ids` of which Redis has a higher revision than `here` (id, revision), without those
+// removed here.
+Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
+                                     const std::map<JobId, std::uint64_t>& here,
+                                     const std::vector<JobId>& ids, const std::string& node) {
+  auto there = revisions_of(link, ids);
+  if (!there) return tl::unexpected(there.error());
+  std::vector<JobId> wanted;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (const auto mine = here.find(ids[i]); mine != here.end()) {
+      if (mine->second < (*there)[i]) wanted.push_back(ids[i]);
+      continue;
+    }
+    auto removed = local.reserve(removal_mark(ids[i]), 0);
+    if (!removed) return tl::unexpected(removed.error());
+    if (*removed == 0) {
+      wanted.push_back(ids[i]);
+      continue;
+    }
+    for (const auto& command : remove_commands(ids[i], node))
+      if (auto gone = link.run(command); !gone) return tl::unexpected(gone.error());
+  }
+  return wanted;
+}
+
+Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
+  auto members = link.run({"SMEMBERS", kRedisJobs});
+  if (!members) return tl::unexpected(members.error());
+  std::map<JobId, std::uint64_t> here;
+  for (const StoredJob& job : known) here[job.id] = job.revision;
+  std::vector<JobId> ids;
+  for (const RedisReply& member : members->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  return wanted_of(link, local, here, ids, "");
+}
+
+Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId>& wanted) {
+  std::vector<RedisLink::Command> commands;
+  for (const JobId& id : wanted) commands.push_back({"HGETALL", redis_job_key(id)});
+  auto replies = ask(link, commands);
+  if (!replies) return tl::unexpected(replies.error());
+
+  std::vector<RedisJob> jobs;
+  for (std::size_t i = 0; i < replies->size(); ++i) {
+    auto job = parse_redis_job((*replies)[i]);
+    if (job && job->job.id != wanted[i]) job = fail(Errc::internal, "the record is of another job");
+    if (job)
+      jobs.push_back(std::move(*job));
+    else
+      log_error(fmt::format("job={} store=redis", wanted[i].value),
+                job.error().message + "; it is left in Redis as it is");
+  }
+  std::stable_sort(jobs.begin(), jobs.end(), [](const RedisJob& a, const RedisJob& b) {
+    return a.job.submitted_unix < b.job.submitted_unix;
+  });
+  for (const RedisJob& job : jobs)
+    if (auto taken = keep_from_redis(local, job); !taken) return taken;
+  if (!jobs.empty()) log_info("store=redis", fmt::format("{} jobs taken from Redis", jobs.size()));
+  return {};
+}
+
+}  // namespace
+
+Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
+  auto points = local.points(job.job.id);
+  if (!points) return tl::unexpected(points.error());
+  auto log = local.log(job.job.id);
+  if (!log) return tl::unexpected(log.error());
+  if (auto put = local.put_job(job.job); !put) return put;
+  for (std::size_t i = points->size(); i < job.points.size(); ++i)
+    if (auto added = local.add_point(job.job.id, job.points[i]); !added) return added;
+  if (!log->empty()) return {};
+  for (const LogLine& line : job.log)
+    if (auto added = local.add_log(job.job.id, line); !added) return added;
+  return {};
+}
+
+std::string removal_mark(const JobId& job) { return "removed:" + job.value; }
+
+Result<void> keep_inherited(JobStore& local, const RedisJob& job) {
+  // Local data is from an earlier ownership.
+  if (auto removed = local.remove_job(job.job.id); !removed) return removed;
+  return keep_from_redis(local, job);
+}
+
+Result<void> pull_quarantined(RedisLink& link, JobStore& local) {
+  auto all = link.run({"HGETALL", kRedisQuarantined});
+  if (!all) return tl::unexpected(all.error());
+  for (const QuarantinedWorker& worker : quarantined_workers(*all))
+    if (auto kept = local.quarantine(worker); !kept) return kept;
+  return {};
+}
+
+Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
+  if (auto quarantined = pull_quarantined(link, local); !quarantined) return quarantined;
+  if (auto counters = pull_counters(link, local); !counters) return counters;
+  auto wanted = wanted_ids(link, local, known);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, *wanted);
+}
+
+Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node) {
+  if (auto quarantined = pull_quarantined(link, local); !quarantined) return quarantined;
+  auto known = local.jobs();
+  if (!known) return tl::unexpected(known.error());
+  std::vector<RedisLink::Command> commands;
+  for (const StoredJob& job : *known) commands.push_back({"HGET", redis_job_key(job.id), "owner"});
+  auto owners = ask(link, commands);
+  if (!owners) return tl::unexpected(owners.error());
+  std::vector<JobId> gone;
+  std::map<JobId, std::uint64_t> here;
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    const StoredJob& job = (*known)[i];
+    if ((*owners)[i].nil || (*owners)[i].text == node)
+      here[job.id] = job.revision;
+    else
+      gone.push_back(job.id);
+  }
+  for (const JobId& id : gone)
+    log_warn(fmt::format("job={} store=redis", id.value),
+             "another coordinator has taken it over while this one was away: dropped");
+  if (auto removed = local.remove_jobs(gone); !removed) return removed;
+
+  auto owned = link.run({"SMEMBERS", "lightshaft:owned:" + node});
+  if (!owned) return tl::unexpected(owned.error());
+  std::vector<JobId> ids;
+  for (const RedisReply& member : owned->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  auto wanted = wanted_of(link, local, here, ids, node);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, *wanted);
+}
+
+Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known) {
+  std::vector<JobId> ids;
+  for (const auto& [id, revision] : known) ids.push_back(id);
+  auto there = revisions_of(link, ids);
+  if (!there) return tl::unexpected(there.error());
+  std::set<JobId> behind;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if ((*there)[i] < known[i].second) behind.insert(ids[i]);
+  return behind;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,54 @@
+// Records in Redis: encodes commands and decodes replies. No connection: texts in, texts out.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "coordinator/store/jobs/job_store.h"
+#include "coordinator/store/redis/redis_link.h"
+
+namespace ls::coordinator {
+
+inline constexpr const char* kRedisJobs = "lightshaft:jobs";
+inline constexpr const char* kRedisMemory = "lightshaft:memory";
+inline constexpr const char* kRedisCounters = "lightshaft:counters";
+inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: worker -> evidence
+inline constexpr std::size_t kAskedAtOnce = 256;  // commands sent without waiting for an answer
+std::string redis_job_key(const JobId& id);
+std::uint64_t counter_of(const std::string& text);  // 0: not a number
+// An id becomes the name of a folder: anything else under our keys in Redis is no job.
+bool is_job_id(std::string_view id);
+std::vector<QuarantinedWorker> quarantined_workers(const RedisReply& fields);  // from the reply to HGETALL
+
+// Changes of one job for Redis; fields that are not set stay as they are.
+struct RedisUpdate {
+  JobId id;
+  std::uint64_t revision = 0;  // of the record; without one: the latest known
+  std::optional<std::string> record, points, log;
+  // If several coordinators share the Redis: the writer and its fence. Then the state is sent with the
+  // record.
+  std::string node;
+  std::uint64_t fence = 0;
+  std::string state;
+};
+enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
+// Changes nothing and answers later_revision if Redis has a higher revision of the job, or lost if another
+// coordinator owns it by now, with a higher fence.
+RedisLink::Command put_command(const RedisUpdate& update);
+// With a `node` (shared Redis): removes nothing of a job that another node owns.
+std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
+
+std::string points_json(const std::vector<ConvergencePoint>& points);
+std::string log_json(const std::vector<LogLine>& lines);
+
+struct RedisJob {
+  StoredJob job;
+  std::vector<ConvergencePoint> points;
+  std::vector<LogLine> log;
+  std::string owner, from;  // the owning node and the previous one; empty: unknown
+  std::uint64_t fence = 0;  // of the owner
+};
+// Decodes the reply to HGETALL.
+Result<RedisJob> parse_redis_job(const RedisReply& fields);
+
+}  // namespace ls::coordinator

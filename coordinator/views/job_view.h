@@ -1,0 +1,169 @@
+// Public views of jobs, frames, tiles and workers, and the changes that a user may request of a job.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/frame_range.h"
+#include "common/base/id.h"
+#include "common/image/error/convergence.h"
+#include "common/image/film/health.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
+#include "common/image/reference/reference.h"
+#include "common/job/health_notes.h"
+#include "coordinator/domain/job_state.h"
+#include "coordinator/domain/time_split.h"
+
+namespace ls::coordinator {
+
+inline constexpr int kMoreWorkers = 8;  // for JobView::eta_with_more
+
+struct ErrorFigures {  // of the image folded up to one complete round in all tiles
+  double rmse = 0;
+  double relmse = 0;
+  double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
+  double rmse_lo = 0, rmse_hi = 0;      // both 0: unknown, stored by a version without them
+};
+// Error against a reference, the reference's own noise subtracted (common/image/reference/reference.h)
+struct ReferenceError {
+  double rmse = 0, relmse = 0;
+  std::optional<double> flip;  // mean HDR-FLIP (common/image/reference/flip.h); at doubling samples only
+  std::optional<double> mse_stderr = {}, relmse_stderr = {};
+  // True if the error is too small to be distinguished from the reference's own noise; this is shown instead
+  // of it.
+  bool rmse_below_noise() const { return below_noise(rmse * rmse, mse_stderr); }
+  bool relmse_below_noise() const { return below_noise(relmse, relmse_stderr); }
+  bool operator==(const ReferenceError&) const = default;
+};
+struct ConvergencePoint {
+  double seconds = 0;       // since the first ray
+  double core_seconds = 0;  // CPU time of workers
+  double spp = 0;
+  ErrorFigures error;
+  // nullopt: the job has no reference, the comparison is not finished, or the coordinator restarted during
+  // the checkpoint
+  std::optional<ReferenceError> reference_error = {};
+};
+
+// Sequences: jobs with frames. Every frame is a job, too; its id is made of the sequence's id and its number.
+struct FrameId {
+  JobId sequence;
+  std::uint32_t frame = 0;
+};
+JobId frame_job(const JobId& sequence, std::uint32_t frame);  // "j-7f3a91c2-frame12"
+std::optional<FrameId> frame_of(const JobId& job);            // nullopt: the job is not a frame
+
+struct FrameView {
+  std::uint32_t frame = 0;
+  JobId job;
+  JobState state = JobState::queued;
+  double progress = 0;
+  double spp_done = 0;
+  std::optional<double> relmse;
+  std::string error;
+};
+struct FramesView {
+  FrameRange range;
+  std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
+  std::uint32_t current = 0;   // the frame to show: the first that is being rendered, or has been
+  std::vector<FrameView> all;  // ascending; filled by Coordinator::job() only
+};
+
+struct JobView {
+  JobId id;
+  std::string name;  // scene file name, for display
+  // User whose token submitted it; empty: the administrator, or submitted before there were users
+  std::string owner;
+  JobState state = JobState::queued;
+  std::string stopped;                 // "spp", "error", "time", "user" once done
+  double progress = 0;                 // 0..1
+  std::uint64_t spp = 0;               // requested, or the limit
+  bool spp_asked = true;               // false: its target or its time ends it
+  std::optional<double> target_error;  // relMSE, requested
+  double spp_done = 0;                 // mean over pixels
+  std::optional<ErrorFigures> error_now;
+  std::optional<ReferenceError> reference_error;  // of the last checkpoint that has one
+  // Reference and image share scene and seed, hence noise: reference_error means nothing (see same_noise()
+  // there)
+  bool reference_same_seed = false;
+  std::optional<ConvergenceStatus> convergence_status;  // nullopt: no samples yet
+  std::optional<std::uint64_t> few_hits;                // pixels with few hits in the current image
+  std::optional<Trend> trend;                           // nullopt: too few checkpoints
+  std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
+  std::optional<std::uint64_t> pixels_without_samples;  // in the current image; nullopt: unknown
+  std::optional<double> eta_seconds;
+  std::optional<std::pair<double, double>> eta_ci95;  // if an error target ends the job
+  std::optional<double> eta_with_more;                // with kMoreWorkers more workers like the present ones
+  std::optional<std::pair<double, double>> eta_with_more_ci95;  // as eta_ci95
+  std::string error;                                            // why it failed
+  std::vector<std::string> warnings;                            // of the scene
+  FrameSize size;
+  int tile = 32;
+  int priority = 0;
+  std::optional<std::uint32_t> max_workers, max_units;  // requested
+  std::uint64_t memory_bytes = 0;                       // the least a worker needs
+  std::uint64_t units_done = 0, units_total = 0;
+  double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
+  double elapsed_seconds = 0, core_seconds = 0;
+  TimeSplit time;
+  double submitted_unix = 0;      // wall clock, for display
+  Health health;                  // of the folded units; for a sequence only the totals
+  std::vector<HealthNote> notes;  // the same in words; empty: no problems
+  bool fake = false;              // fake workers invent its pixels; for a sequence: those of any frame
+  // Only for a sequence; its other values combine all frames: sums, means over pixels, and elapsed_seconds
+  // from the first ray of any frame to the last fold.
+  std::optional<FramesView> frames;
+};
+
+// Changes to a job requested by a user. Either all are applied or, if any is rejected, none.
+struct JobChange {
+  std::optional<JobState> state;  // paused, running or cancelled
+  std::optional<int> priority;
+  std::optional<std::uint64_t> spp;  // the new total
+  // Only for a job that has one and was not stopped for another reason; a smaller target resumes it
+  std::optional<double> target_error;
+};
+
+struct TileView {
+  TileIndex tile = 0;
+  PixelRect rect;
+  RoundIndex rounds_folded = 0;
+  std::uint64_t spp = 0;
+  std::optional<double> relmse;      // estimated; nullopt: no samples yet
+  std::vector<std::string> workers;  // names of the workers rendering it now
+};
+
+struct WorkerView {
+  WorkerId id;
+  std::string name;
+  std::string build;
+  Digest numeric_class;
+  bool fake = false;  // renders nothing and invents its pixels
+  int threads = 1;
+  std::vector<std::string> tags;
+  std::string state;     // "connected", "draining", "lost", "sick"
+  std::string activity;  // as last reported by the worker
+  std::string job;       // the job it works on; may be empty
+  std::uint64_t units_done = 0;
+  double cpu_seconds = 0;
+  std::uint64_t rss_bytes = 0;
+  std::uint64_t memory_bytes = 0;  // that it may use; 0: unknown
+  double last_seen_seconds = 0;    // seconds ago
+};
+
+// An event of the event stream. `data` is JSON. Ids increase by one and survive restarts.
+struct StreamEvent {
+  std::uint64_t id = 0;
+  std::string type;  // "job", "tile", "worker"
+  std::string data;
+  // Job that a `job` or `tile` event is about; empty: about no single job, sent to every reader
+  std::string job;
+  std::string owner = {};  // of that job; for a `worker` event: of the job it works on
+};
+
+}  // namespace ls::coordinator

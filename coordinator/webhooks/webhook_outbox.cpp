@@ -1,0 +1,92 @@
+#include "coordinator/webhooks/webhook_outbox.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "common/base/digest.h"
+#include "coordinator/store/files.h"
+
+namespace ls::coordinator::webhooks {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr std::uint64_t kMaxDeliveryBytes = 4 << 20;
+
+std::optional<Delivery> read_delivery(const fs::path& file) {
+  const auto bytes = read_file(file, kMaxDeliveryBytes);
+  if (!bytes) return std::nullopt;
+  const auto* text = reinterpret_cast<const char*>(bytes->data());
+  const json j = json::parse(text, text + bytes->size(), nullptr, false);
+  const auto is_text = [&](const char* key) { return j.contains(key) && j[key].is_string(); };
+  if (!j.is_object() || !is_text("id") || !is_text("event") || !is_text("body") || !j.contains("number") ||
+      !j["number"].is_number_unsigned())
+    return std::nullopt;
+  return Delivery{j["number"].get<std::uint64_t>(), j["id"].get<std::string>(), j["event"].get<std::string>(),
+                  j["body"].get<std::string>()};
+}
+
+template <class Visit>
+void each_file(const fs::path& folder, Visit visit) {
+  std::error_code failed;
+  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed))
+    visit(at->path());
+}
+
+}  // namespace
+
+Result<Outbox> Outbox::open(fs::path folder, const std::vector<std::string>& urls) {
+  Outbox outbox(std::move(folder));
+  if (auto made = make_folder(outbox.folder_ / "open"); !made) return tl::unexpected(made.error());
+  for (const auto& url : urls) {
+    outbox.receivers_.push_back(outbox.folder_ / sha256(url).hex().substr(0, 16));
+    if (auto made = make_folder(outbox.receivers_.back()); !made) return tl::unexpected(made.error());
+  }
+  return outbox;
+}
+
+fs::path Outbox::file(std::size_t receiver, const Delivery& delivery) const {
+  return receivers_[receiver] / fmt::format("{}.json", delivery.number);
+}
+
+std::vector<Delivery> Outbox::waiting(std::size_t receiver) const {
+  std::vector<Delivery> found;
+  each_file(receivers_[receiver], [&](const fs::path& path) {
+    if (auto delivery = path.extension() == ".json" ? read_delivery(path) : std::nullopt)
+      found.push_back(std::move(*delivery));
+  });
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  return found;
+}
+
+Result<void> Outbox::keep(std::size_t receiver, const Delivery& d) {
+  const std::string text =
+      json{{"number", d.number}, {"id", d.id}, {"event", d.event}, {"body", d.body}}.dump(
+          -1, ' ', false, json::error_handler_t::replace);
+  return write_atomically(file(receiver, d), std::as_bytes(std::span(text)));
+}
+
+void Outbox::forget(std::size_t receiver, const Delivery& delivery) {
+  std::error_code gone_already;
+  fs::remove(file(receiver, delivery), gone_already);
+}
+
+std::set<JobId> Outbox::open_jobs() const {
+  std::set<JobId> jobs;
+  each_file(folder_ / "open", [&](const fs::path& path) { jobs.insert(JobId{path.filename().string()}); });
+  return jobs;
+}
+
+Result<void> Outbox::job_is_open(const JobId& job) {
+  return write_atomically(folder_ / "open" / job.value, {});
+}
+
+void Outbox::job_has_ended(const JobId& job) {
+  std::error_code gone_already;
+  fs::remove(folder_ / "open" / job.value, gone_already);
+}
+
+}  // namespace ls::coordinator::webhooks

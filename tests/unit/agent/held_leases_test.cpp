@@ -1,0 +1,109 @@
+#include "worker/agent/held_leases.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace ls::worker {
+namespace {
+
+const JobId kJob{"j-1"}, kOther{"j-2"};
+
+Lease lease(const char* id, const JobId& job, std::vector<TileIndex> tiles) {
+  Lease l{LeaseId{id}, job, {}};
+  for (const TileIndex t : tiles) l.units.push_back({t, 0, {0, 0, 8, 8}, {0, 2}});
+  return l;
+}
+UnitKey key(TileIndex tile) { return {kJob, tile, 0}; }
+bool nothing_handed_in(const UnitKey&) { return false; }
+bool any(const JobId&) { return true; }
+
+TEST(HeldLeases, GivesUnitsInTheOrderOfTheirLeases) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {5, 1}), nothing_handed_in);
+  table.add(lease("b", kJob, {0}), nothing_handed_in);
+
+  EXPECT_EQ(table.take(any)->key, key(5));
+  EXPECT_EQ(table.take(any)->key, key(1));
+  EXPECT_EQ(table.take(any)->key, key(0));
+  EXPECT_FALSE(table.take(any));
+}
+
+TEST(HeldLeases, SkipsJobsThatAreNotReady) {
+  HeldLeases table;
+  table.add(lease("a", kOther, {0}), nothing_handed_in);
+  table.add(lease("b", kJob, {1}), nothing_handed_in);
+
+  EXPECT_EQ(table.take([](const JobId& job) { return job == kJob; })->key, key(1));
+}
+
+TEST(HeldLeases, HoldsAUnitOnceWhenALaterLeaseNamesItAgain) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+  table.take(any);
+
+  table.add(lease("b", kJob, {0, 1}), nothing_handed_in);
+
+  EXPECT_EQ(table.finish(key(0)), LeaseId{"b"});
+  EXPECT_EQ(table.take(any)->lease, LeaseId{"b"});
+  EXPECT_FALSE(table.take(any));
+}
+
+TEST(HeldLeases, ALeaseEndsWhenALaterOneHasTakenAllItsUnits) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+
+  table.add(lease("b", kJob, {0, 1}), nothing_handed_in);
+
+  ASSERT_EQ(table.progress().size(), 1u);
+  EXPECT_EQ(table.progress()[0].lease, LeaseId{"b"});
+}
+
+TEST(HeldLeases, DoesNotRenderAgainWhatWaitsForItsAcknowledgementUnlessThatIsARefusal) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), [](const UnitKey&) { return true; });
+
+  EXPECT_FALSE(table.take(any));
+  table.acknowledged(key(0), false);
+  EXPECT_FALSE(table.take(any));
+  table.acknowledged(key(1), true);
+  EXPECT_EQ(table.take(any)->key, key(1));
+}
+
+TEST(HeldLeases, CountsDoneUnitsAndForgetsFinishedLeases) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+  table.take(any);
+  table.finish(key(0));
+
+  EXPECT_THAT(table.progress(), testing::ElementsAre(WorkerProgress::Entry{LeaseId{"a"}, 1}));
+  table.take(any);
+  table.finish(key(1));
+  EXPECT_EQ(table.lease_count(), 0U);
+}
+
+TEST(HeldLeases, DropsRunningAndWaitingUnitsOfALease) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+  table.add(lease("b", kJob, {2}), nothing_handed_in);
+  table.take(any);
+
+  table.drop_lease(LeaseId{"a"});
+
+  EXPECT_FALSE(table.finish(key(0)));
+  EXPECT_EQ(table.take(any)->key, key(2));
+}
+
+TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
+  table.add(lease("b", kOther, {2}), nothing_handed_in);
+  table.take(any);
+
+  EXPECT_THAT(table.return_waiting(&kJob), testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1)}}));
+  EXPECT_THAT(table.return_waiting(), testing::ElementsAre(LeaseReturned{LeaseId{"b"}, {{kOther, 2, 0}}}));
+  EXPECT_EQ(table.finish(key(0)), LeaseId{"a"});
+  EXPECT_EQ(table.lease_count(), 0U);
+}
+
+}  // namespace
+}  // namespace ls::worker

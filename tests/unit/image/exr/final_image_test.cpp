@@ -1,0 +1,230 @@
+#include "common/image/exr/final_image.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "common/image/exr/exr_file.h"
+#include "tests/unit/image/support.h"
+
+namespace ls {
+namespace {
+
+using test::make_film;
+using test::make_partial;
+using ::testing::HasSubstr;
+
+const TileGrid kFinalGrid{{20, 13}, 8};
+
+// Both halves of every pixel of a tile have this sum.
+Partial flat(const TileGrid& grid, TileIndex tile, std::array<float, 3> half_sum) {
+  Partial p = make_partial(grid, tile, {0, 2});
+  const auto n = static_cast<std::size_t>(p.header.tile.pixels());
+  for (std::size_t i = 0; i < p.sums.size(); ++i) p.sums[i] = half_sum[i / n % 3];
+  return p;
+}
+
+std::string as_text(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST(PixelsDigest, IsOverFloatsOfTheMeansRowByRow) {
+  const Film film = make_film(kFinalGrid, 6);
+  std::vector<float> pixels(20 * 13 * 3);
+  for (TileIndex t = 0; t < kFinalGrid.count(); ++t) {
+    const TilePixels tile = film.pixels(t);
+    for (int i = 0; i < tile.rect.pixels(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        const int x = tile.rect.x0 + i % tile.rect.width(), y = tile.rect.y0 + i / tile.rect.width();
+        pixels[static_cast<std::size_t>((y * 20 + x) * 3 + c)] =
+            static_cast<float>(tile.mean[static_cast<std::size_t>(3 * i + c)]);
+      }
+  }
+
+  EXPECT_EQ(pixels_sha256(film), sha256(std::as_bytes(std::span(pixels))));
+}
+
+TEST(PixelsDigest, MakesNoDifferenceBetweenZeros) {
+  const TileGrid grid{{8, 8}, 8};
+  Film plus(grid), minus(grid);
+  ASSERT_TRUE(plus.fold(0, 0, flat(grid, 0, {0.0f, 0.0f, 0.0f})));
+  ASSERT_TRUE(minus.fold(0, 0, flat(grid, 0, {-0.0f, -0.0f, -0.0f})));
+
+  EXPECT_EQ(pixels_sha256(plus), pixels_sha256(minus));
+  EXPECT_EQ(pixels_sha256(plus), sha256(std::string(8 * 8 * 3 * 4, '\0')));
+}
+
+Provenance some_provenance() {
+  Provenance from{test::name_of("scene"), R"({"seed":7})", "build 1", test::name_of("class"), 7, 12.3456};
+  from.core_seconds = 98.7654;
+  from.stopped = "time; so and so";
+  return from;
+}
+
+TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
+  const Film film = make_film(kFinalGrid, 6);
+
+  const auto image = final_exr(film, some_provenance(), true);
+  ASSERT_TRUE(image) << image.error().message;
+  const auto back = read_exr_rgb(image->exr, "final");
+
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->size, kFinalGrid.frame);
+  EXPECT_EQ(sha256(std::as_bytes(std::span(back->rgb))), pixels_sha256(film));
+  const std::string text = as_text(image->exr);
+  for (const char* name :
+       {"stderr.R", "stderr.G", "stderr.B", "spp", "lightshaft:scene", "lightshaft:job", "lightshaft:build",
+        "lightshaft:class", "lightshaft:seed", "lightshaft:relmse", "lightshaft:relmse_ci95",
+        "lightshaft:rmse", "lightshaft:few_hits", "lightshaft:seconds", "lightshaft:tiles"})
+    EXPECT_THAT(text, HasSubstr(name));
+  EXPECT_THAT(text, HasSubstr(R"({"seed":7})"));
+  const auto header = read_final_exr(image->exr, "final")->strings;
+  EXPECT_EQ(header.at("lightshaft:core_seconds"), "98.765");
+  EXPECT_EQ(header.at("lightshaft:stopped"), "time; so and so");
+  EXPECT_EQ(header.at("lightshaft:verdict"), "trusted");
+  for (TileIndex t = 0; t < kFinalGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
+}
+
+TEST(FinalExr, IsAFunctionOfFilmAndProvenance) {
+  EXPECT_EQ(final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr,
+            final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr);
+}
+
+TEST(FinalExr, ClampsToTheLargestHalfAndCounts) {
+  const TileGrid grid{{8, 8}, 8};
+  Film film(grid);
+  ASSERT_TRUE(film.fold(0, 0, flat(grid, 0, {1e6f, -1e30f, 65504.0f})));
+
+  const auto half = final_exr(film, some_provenance(), false),
+             full = final_exr(film, some_provenance(), true);
+
+  EXPECT_EQ(half->clamped, 128u);
+  EXPECT_EQ(full->clamped, 0u);
+  const auto a = read_exr_rgb(half->exr, "half")->rgb, b = read_exr_rgb(full->exr, "full")->rgb;
+  EXPECT_EQ((std::array{a[0], a[1], a[2]}), (std::array{65504.0f, -65504.0f, 65504.0f}));
+  EXPECT_EQ((std::array{b[0], b[1], b[2]}), (std::array{1e6f, -1e30f, 65504.0f}));
+}
+
+TEST(FinalExr, RoundsToTheNearestHalf) {
+  const TileGrid grid{{8, 8}, 8};
+  Film film(grid);
+  ASSERT_TRUE(film.fold(0, 0, flat(grid, 0, {0.1f, 1.0f, 3e-8f})));
+
+  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), false)->exr, "half")->rgb;
+
+  EXPECT_NEAR(rgb[0], 0.1f, 0.1f * 0x1p-11f);  // half a unit of a 10-bit mantissa
+  EXPECT_EQ(rgb[1], 1.0f);
+  EXPECT_NEAR(rgb[2], 3e-8f, 0x1p-25f);  // half of the smallest step, 2^-24
+}
+
+TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
+  Film film = make_film(kFinalGrid, 4);
+  film.discard(0);
+
+  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), true)->exr, "part")->rgb;
+
+  EXPECT_EQ(rgb[0], 0);
+  EXPECT_NE(rgb[3 * 8], 0);
+}
+
+TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
+  const auto strings = [](const Film& film) {
+    return read_final_exr(final_exr(film, some_provenance(), true)->exr, "part").value().strings;
+  };
+  Film film = make_film(kFinalGrid, 4);
+  const std::string whole = strings(film).at("lightshaft:relmse");
+  EXPECT_FALSE(strings(film).contains("lightshaft:pixels_without_samples"));
+  film.discard(0);
+
+  const auto part = strings(film), none = strings(Film(kFinalGrid));
+
+  EXPECT_EQ(part.at("lightshaft:pixels_without_samples"), std::to_string(kFinalGrid.rect(0).pixels()));
+  // That of the pixels that are there, rather than thinned by those that are not.
+  TileError rest;
+  for (TileIndex t = 1; t < kFinalGrid.count(); ++t) rest.add(film.error(t));
+  EXPECT_EQ(part.at("lightshaft:relmse"), fmt::format("{:.9g}", image_error(rest).relmse));
+  for (const char* key : {"relmse", "relmse_ci95", "rmse", "rmse_ci95", "verdict", "few_hits"})
+    EXPECT_FALSE(none.contains(std::string("lightshaft:") + key)) << key;
+}
+
+TEST(FinalExr, IsTrustedNoMoreThanItsCurve) {
+  const Film film = make_film(kFinalGrid, 4);
+  Provenance from = some_provenance();
+  from.convergence_status =
+      ConvergenceStatus{ConvergenceStatus::Kind::heavy_tail, "don't trust yet: it falls too slowly", false};
+  from.figures = {{"slope", -.5}};
+  from.seed.reset();
+  from.seconds.reset();
+
+  const auto strings = read_final_exr(final_exr(film, from, true)->exr, "a tail").value().strings;
+
+  EXPECT_NE(strings.at("lightshaft:verdict"), "trusted");
+  EXPECT_EQ(strings.at("lightshaft:slope"), "-0.5");
+  EXPECT_FALSE(strings.contains("lightshaft:seed"));
+  EXPECT_FALSE(strings.contains("lightshaft:seconds"));
+}
+
+struct Decoded {
+  FrameSize size;
+  std::vector<png_byte> rgb;
+  std::array<int, 3> at(int x, int y) const {
+    const png_byte* p = &rgb[static_cast<std::size_t>((y * size.width + x) * 3)];
+    return {p[0], p[1], p[2]};
+  }
+};
+Decoded decode(const std::vector<std::byte>& png) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  EXPECT_TRUE(png_image_begin_read_from_memory(&image, png.data(), png.size())) << image.message;
+  image.format = PNG_FORMAT_RGB;
+  Decoded out{{static_cast<int>(image.width), static_cast<int>(image.height)},
+              std::vector<png_byte>(PNG_IMAGE_SIZE(image))};
+  EXPECT_TRUE(png_image_finish_read(&image, nullptr, out.rgb.data(), 0, nullptr)) << image.message;
+  return out;
+}
+
+TEST(Preview, IsSrgbWithExposureInStops) {
+  Film film(kFinalGrid);
+  ASSERT_TRUE(film.fold(0, 0, flat(kFinalGrid, 0, {0.5f, 0.001f, 2.0f})));
+  ASSERT_TRUE(film.fold(1, 0, flat(kFinalGrid, 1, {-1.0f, 0.0f, 1.0f})));
+
+  const Decoded normal = decode(preview_png(film, 0).value()), darker = decode(preview_png(film, -1).value());
+
+  EXPECT_EQ(normal.size, kFinalGrid.frame);
+  // sRGB of 0.5 is 0.735357 (188), of 0.001 the linear piece 0.01292 (3), of 0.25 0.537099 (137), of 0.0005
+  // 0.00646 (2).
+  EXPECT_EQ(normal.at(3, 3), (std::array{188, 3, 255}));
+  EXPECT_EQ(normal.at(9, 3), (std::array{0, 0, 255}));
+  EXPECT_EQ(darker.at(3, 3), (std::array{137, 2, 255}));
+  EXPECT_EQ(darker.at(9, 3), (std::array{0, 0, 188}));
+}
+
+TEST(Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  using Pixel = std::array<std::uint8_t, 3>;
+
+  EXPECT_EQ(srgb8(std::array{0.5, nan, 0.5}.data(), 1), (Pixel{255, 0, 255}));
+  EXPECT_EQ(srgb8(std::array{inf, -inf, 0.0}.data(), 1), (Pixel{255, 0, 0}));
+}
+
+TEST(Preview, ShowsADarkCheckerWhereNothingIsRendered) {
+  const Decoded image = decode(preview_png(Film(kFinalGrid), 0).value());
+
+  EXPECT_NE(image.at(0, 0), image.at(8, 0));
+  EXPECT_EQ(image.at(0, 0), image.at(8, 8));
+  for (const int v : image.at(8, 0)) EXPECT_TRUE(v > 10 && v < 50) << v;
+}
+
+TEST(Preview, RefusesAnAbsurdExposure) {
+  for (const double stops :
+       {1e9, -61.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    EXPECT_THAT(preview_png(Film(kFinalGrid), stops).error().message, HasSubstr("exposure")) << stops;
+}
+
+}  // namespace
+}  // namespace ls

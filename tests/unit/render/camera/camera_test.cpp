@@ -1,0 +1,358 @@
+// The camera and the pixel filters.
+#include "worker/render/camera/camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/render_check.h"
+#include "worker/render/camera/pixel_filter.h"
+#include "worker/render/math/random.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+using test::operator*;
+
+constexpr FrameSize kSize{200, 100};
+
+Camera camera(const Sensor& s, FrameSize size = kSize) { return {s, size, V3d(0), 1}; }
+double degrees_between(const V3& a, const V3& b) {
+  return std::atan2(V3d(a).cross(V3d(b)).length(), V3d(a).dot(V3d(b))) * 180 / M_PI;
+}
+double horizontal(const Camera& c, FrameSize s = kSize) {
+  return degrees_between(c.ray(0, s.height / 2., {}).d, c.ray(s.width, s.height / 2., {}).d);
+}
+double vertical(const Camera& c, FrameSize s = kSize) {
+  return degrees_between(c.ray(s.width / 2., 0, {}).d, c.ray(s.width / 2., s.height, {}).d);
+}
+
+TEST(Camera, LooksAlongItsZWithXToTheLeftAndYUp) {
+  const Camera c = camera({});
+
+  EXPECT_EQ(c.ray(100, 50, {}).d, V3(0, 0, 1));
+  EXPECT_GT(c.ray(0, 50, {}).d.x, 0.f);   // the left of the film
+  EXPECT_GT(c.ray(100, 0, {}).d.y, 0.f);  // its top
+  EXPECT_LT(c.ray(200, 100, {}).d.x, 0.f);
+}
+
+TEST(Camera, FieldOfViewIsMeasuredAlongTheAxisAsked) {
+  Sensor s;
+  s.fov = 40;
+  const double tolerance = 1e-4;  // degrees: directions are float32
+
+  s.fov_axis = FovAxis::x;
+  EXPECT_NEAR(horizontal(camera(s)), 40, tolerance);
+  s.fov_axis = FovAxis::larger;
+  EXPECT_NEAR(horizontal(camera(s)), 40, tolerance);
+  EXPECT_NEAR(vertical(camera(s, {100, 200}), {100, 200}), 40, tolerance);
+  s.fov_axis = FovAxis::y;
+  EXPECT_NEAR(vertical(camera(s)), 40, tolerance);
+  s.fov_axis = FovAxis::smaller;
+  EXPECT_NEAR(vertical(camera(s)), 40, tolerance);
+  EXPECT_NEAR(horizontal(camera(s, {100, 200}), {100, 200}), 40, tolerance);
+  s.fov_axis = FovAxis::diagonal;
+  EXPECT_NEAR(degrees_between(camera(s).ray(0, 0, {}).d, camera(s).ray(200, 100, {}).d), 40, tolerance);
+}
+
+TEST(Camera, ExtremeFieldsOfViewGiveUnitDirections) {
+  for (const double fov : {179.9, .01, 1e-5}) {
+    Sensor s;
+    s.fov = fov;
+    for (const double f : {0., .3, 1.}) {
+      const CameraRay r = camera(s).ray(200 * f, 100 * f, {});
+      EXPECT_NEAR(dot(r.d, r.d), 1, 4e-7);
+      EXPECT_TRUE(is_finite(r.o));
+    }
+  }
+}
+
+TEST(Camera, WithoutApertureTheLensNumbersChangeNothing) {
+  Sensor s;
+  s.focus_distance = 3;
+  const Camera c = camera(s);
+
+  for (const V2& lens : {V2(0, 0), V2(.5f, .5f), V2(.99f, .2f)}) {
+    EXPECT_EQ(c.ray(31.25, 77.5, lens).o, c.ray(31.25, 77.5, {}).o);
+    EXPECT_EQ(c.ray(31.25, 77.5, lens).d, c.ray(31.25, 77.5, {}).d);
+  }
+}
+
+TEST(Camera, AllRaysOfAPixelThroughTheLensMeetInThePlaneOfFocus) {
+  Sensor s, pinhole;
+  s.aperture_radius = .25;
+  s.focus_distance = 3;
+  s.near_clip = pinhole.near_clip = 1e-3;
+  const CameraRay through = camera(pinhole).ray(40, 20, {});
+  const V3 target = through.o + through.d * ((3 - through.o.z) / through.d.z);
+
+  for (const V2& lens : {V2(.1f, .2f), V2(.5f, .5f), V2(.9f, .3f), V2(.7f, .99f)}) {
+    const CameraRay r = camera(s).ray(40, 20, lens);
+    const V3 at = r.o + r.d * ((3 - r.o.z) / r.d.z);
+    EXPECT_LT((at - target).length(), 3e-6f);  // of 3: a few roundings
+  }
+}
+
+TEST(Camera, CircleOfConfusionIsTheApertureSeenThroughThePointInFocus) {
+  // On a plane at depth z the lens point p lands |p| |z - zf| / zf away from the pinhole's point.
+  Sensor s, pinhole;
+  s.aperture_radius = .2;
+  s.focus_distance = 2;
+  s.near_clip = pinhole.near_clip = 1e-4;
+  const CameraRay a = camera(pinhole).ray(70, 60, {});
+  RandomStream rng(1);
+  double widest = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const float u = rng.uniform(), v = rng.uniform();
+    const CameraRay r = camera(s).ray(70, 60, {u, v});
+    const V3 p = r.o + r.d * ((5 - r.o.z) / r.d.z), q = a.o + a.d * ((5 - a.o.z) / a.d.z);
+    widest = std::max<double>(widest, (p - q).length());
+  }
+  EXPECT_LE(widest, .2 * 3 / 2 + 1e-5);
+  EXPECT_GT(widest,
+            .2 * 3 / 2 * .99);  // 4000 uniform points of a disk: the outermost 1 % of radius holds 2 %
+}
+
+TEST(Camera, RaysRunFromTheNearToTheFarPlane) {
+  Sensor s;
+  s.near_clip = .5;
+  s.far_clip = 8;
+  for (const double f : {0., .5, .8}) {
+    const CameraRay r = camera(s).ray(200 * f, 100 * f, {});
+    EXPECT_NEAR(r.o.z, .5, 1e-6);
+    EXPECT_NEAR((r.o + r.d * r.t_max).z, 8, 1e-5);
+  }
+}
+
+// What Mitsuba 3.9.1 gives (scalar_rgb, sample_ray) for a frame of 200 x 100: origin and direction at shares
+// of the rendered part.
+struct SeenRay {
+  double u, v;
+  V3 o, d;
+};
+void expect_rays(const Camera& c, std::array<int, 2> offset, FrameSize part,
+                 std::initializer_list<SeenRay> rays) {
+  for (const SeenRay& r : rays) {
+    const CameraRay ray = c.ray(offset[0] + r.u * part.width, offset[1] + r.v * part.height, {.5f, .5f});
+    EXPECT_LT((ray.o - r.o).length(), 1e-6f) << ray.o << r.o;
+    EXPECT_LT((ray.d - r.d).length(), 2e-6f) << ray.d << r.d;  // printed to 6 digits
+  }
+}
+
+TEST(Camera, PrincipalPointIsMitsubas) {
+  Sensor s;
+  s.fov = 60;
+  s.principal_point_offset = {.1, .2};
+  const Camera c = camera(s);
+
+  expect_rays(c, {0, 0}, kSize,
+              {{0, 0, {.0046188f, .00173205f, .01f}, {.414224f, .155334f, .896822f}},
+               {.25, .75, {.00173205f, -.00259808f, .01f}, {.165333f, -.247999f, .954548f}},
+               {1, 1, {-.0069282f, -.00404145f, .01f}, {-.540453f, -.315264f, .780077f}}});
+  expect_rays(c, {10, 20}, {30, 40},
+              {{0, 0, {.00404145f, .00057735f, .01f}, {.374166f, .0534523f, .92582f}},
+               {1, 1, {.0023094f, -.00173205f, .01f}, {.22188f, -.16641f, .960769f}}});
+}
+
+TEST(Camera, OrthographicRaysAreMitsubas) {
+  Sensor s;
+  s.projection = Projection::orthographic;
+  s.to_world.m = {2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 0, 1};
+  const Camera c = camera(s);
+
+  expect_rays(c, {0, 0}, kSize,
+              {{0, 0, {2, 1.5f, .04f}, {0, 0, 1}},
+               {.25, .75, {1, -.75f, .04f}, {0, 0, 1}},
+               {1, 1, {-2, -1.5f, .04f}, {0, 0, 1}}});
+  expect_rays(c, {10, 20}, {30, 40},
+              {{0, 0, {1.8f, .9f, .04f}, {0, 0, 1}}, {1, 1, {1.2f, -.3f, .04f}, {0, 0, 1}}});
+  EXPECT_NEAR(c.ray(3, 4, {}).t_max, 9999.99, 1e-2);
+}
+
+TEST(Camera, OrthographicIsTheSameInAnyWorld) {
+  // The world is the scene moved by its centre and scaled.
+  Sensor s;
+  s.projection = Projection::orthographic;
+  s.to_world.m = {.5, 0, 0, 7, 0, .5, 0, 8, 0, 0, 1, 9, 0, 0, 0, 1};
+  const V3d center(1, 2, 3);
+  const CameraRay a = Camera(s, kSize, V3d(0), 1).ray(30, 70, {}),
+                  b = Camera(s, kSize, center, .125).ray(30, 70, {});
+
+  EXPECT_LT((V3((V3d(a.o) - center) * .125) - b.o).length(), 1e-6f);
+  EXPECT_EQ(a.d, b.d);
+  EXPECT_NEAR(a.t_max * .125, b.t_max, 1e-3);
+}
+
+TEST(Camera, SphericalSeesEveryDirectionInLatitudeAndLongitude) {
+  Sensor s;
+  s.projection = Projection::spherical;
+  s.to_world.m[3] = 5;
+  const Camera c = camera(s);
+  const struct {
+    double u, v;
+    V3 d;
+  } expected[] = {{.3, 0, {0, 1, 0}},   {.8, 1, {0, -1, 0}}, {0, .5, {0, 0, -1}},
+                  {.25, .5, {1, 0, 0}}, {.5, .5, {0, 0, 1}}, {.75, .5, {-1, 0, 0}}};
+  for (const auto& e : expected) {
+    const CameraRay r = c.ray(200 * e.u, 100 * e.v, {.3f, .4f});
+    EXPECT_LT((r.d - e.d).length(), 1e-6f) << e.u << " " << e.v;
+    EXPECT_EQ(r.o, V3(5, 0, 0));
+    EXPECT_EQ(r.t_max, std::numeric_limits<float>::infinity());
+  }
+}
+
+TEST(Camera, AThinLensWithoutAnApertureIsAPinholeToTheLastBit) {
+  Sensor pinhole, lens;
+  pinhole.to_world = lens.to_world = test::rotate_x(20) * test::rotate_y(-50) * test::translate({1, 2, 3});
+  lens.focus_distance = 3.7;
+  for (int i = 0; i < 1000; ++i) {
+    const double x = .2 * i, y = 37.1 + .05 * i;
+    const CameraRay a = camera(pinhole).ray(x, y, {.7f, .1f}), b = camera(lens).ray(x, y, {.7f, .1f});
+    ASSERT_EQ(a.o, b.o);
+    ASSERT_EQ(a.d, b.d);
+    ASSERT_EQ(a.t_max, b.t_max);
+  }
+}
+
+// ---- aperture maps and crops, in whole worlds
+
+// A checkerboard of 2 x 2 over the frame: closed at the upper left and lower right, open elsewhere.
+test::SceneBuilder with_aperture_map(double closed, double open) {
+  test::SceneBuilder builder({16, 8});
+  builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
+  builder.look({0, 0, 5}, {0, 0, 0}, 30, {0, 1, 0});
+  const TextureIndex a = builder.texture({closed, closed, closed}), b = builder.texture({open, open, open});
+  builder.scene.sensor.aperture_radius = .25;
+  builder.scene.sensor.focus_distance = 3;
+  builder.scene.sensor.aperture_scale =
+      test::SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{a, b, {}}));
+  return builder;
+}
+
+TEST(ApertureMap, MultipliesTheRadiusWherePixelsAre) {
+  const auto mapped = test::world_of(with_aperture_map(0, 1));
+  test::SceneBuilder builder = with_aperture_map(0, 1);
+  builder.scene.sensor.aperture_scale.reset();
+  const auto open = test::world_of(builder);
+  builder.scene.sensor.aperture_radius = 0;
+  const auto pinhole = test::world_of(builder);
+  for (const double x : {.5, 3.25, 7.5, 8.5, 12.75, 15.5}) {
+    for (const double y : {.5, 3.5, 4.5, 7.5}) {
+      const bool closed = (x < 8) == (y < 4);
+      const CameraRay r = mapped->camera.ray(x, y, {.8f, .3f}),
+                      e = (closed ? pinhole : open)->camera.ray(x, y, {.8f, .3f});
+      EXPECT_EQ(r.o, e.o) << x << " " << y;
+      EXPECT_EQ(r.d, e.d) << x << " " << y;
+    }
+  }
+}
+
+TEST(ApertureMap, OfOneAndOfNothingChangeNoBit) {
+  const auto render = [](const test::SceneBuilder& builder) {
+    return render_tile(*test::world_of(builder), {0, 0, 16, 8}, {0, 4}, nullptr, nullptr).sums;
+  };
+  test::SceneBuilder builder = with_aperture_map(0, 1);
+  builder.environment();
+  test::SceneBuilder closed = with_aperture_map(0, 0), open = with_aperture_map(1, 1), plain = open,
+                     pinhole = open;
+  plain.scene.sensor.aperture_scale.reset();
+  pinhole.scene.sensor.aperture_scale.reset();
+  pinhole.scene.sensor.aperture_radius = 0;
+  for (test::SceneBuilder* k : {&closed, &open, &plain, &pinhole}) k->environment();
+  EXPECT_EQ(render(open), render(plain));
+  EXPECT_EQ(render(closed), render(pinhole));
+  EXPECT_NE(render(open), render(pinhole));
+}
+
+test::SceneBuilder cropped(std::array<int, 2> offset, FrameSize size) {
+  test::SceneBuilder builder({16, 8});
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5));
+  builder.environment();
+  builder.look({0, 0, 5}, {0, 0, 0}, 30, {0, 1, 0});
+  builder.scene.film.filter = GaussianFilter{};
+  builder.scene.film.crop_offset = offset;
+  builder.scene.film.crop_size = size;
+  return builder;
+}
+TileResult render_size(const test::SceneBuilder& builder, FrameSize size) {
+  RenderSettings settings = test::settings_of(builder.scene);
+  settings.size = size;
+  const auto w = build_world(builder.scene, settings, builder.files, 1);
+  EXPECT_TRUE(w);
+  return render_tile(**w, {0, 0, size.width, size.height}, {0, 8}, nullptr, nullptr);
+}
+
+TEST(Crop, IsThatPartOfTheFrameToTheLastBit) {
+  const auto whole = render_size(cropped({0, 0}, {0, 0}), {16, 8}),
+             part = render_size(cropped({5, 2}, {7, 4}), {7, 4});
+  for (std::size_t plane = 0; plane < 6; ++plane)
+    for (std::size_t y = 0; y < 4; ++y)
+      for (std::size_t x = 0; x < 7; ++x)
+        ASSERT_EQ(part.sums[plane * 28 + y * 7 + x], whole.sums[plane * 128 + (y + 2) * 16 + x + 5]);
+}
+
+TEST(Crop, AtAnotherSizeIsTheSamePartOfALargerFrame) {
+  test::SceneBuilder twice = cropped({10, 4}, {14, 8});
+  twice.scene.film.size = {32, 16};
+  EXPECT_EQ(render_size(cropped({5, 2}, {7, 4}), {14, 8}).sums, render_size(twice, {14, 8}).sums);
+}
+
+// ---- filters
+
+struct RadiusMoments {
+  double mean, variance;
+};
+RadiusMoments moments(const ReconstructionFilter& f) {
+  const PixelFilter filter(f);
+  constexpr int kN = 1 << 20;
+  double m = 0, v = 0;
+  for (int i = 0; i < kN; ++i) {  // midpoints of 2^20 strata: exact in float32
+    const double x = filter.offset(static_cast<float>((i + .5) / kN));
+    m += x;
+    v += x * x;
+  }
+  return {m / kN, v / kN - m / kN * (m / kN)};
+}
+
+TEST(PixelFilter, HasTheMomentsOfTheFilter) {
+  EXPECT_NEAR(moments(BoxFilter{.5}).variance, 1. / 12, 1e-6);
+  EXPECT_NEAR(moments(TentFilter{1.5}).variance, 1.5 * 1.5 / 6, 1e-5);
+  for (const ReconstructionFilter& f :
+       {ReconstructionFilter{BoxFilter{.5}}, ReconstructionFilter{TentFilter{1}},
+        ReconstructionFilter{GaussianFilter{.5}}}) {
+    EXPECT_NEAR(moments(f).mean, 0, 1e-6);
+  }
+}
+
+TEST(PixelFilter, GaussianIsCutAtFourDeviationsAndShiftedToReachZero) {
+  // max(0, e^(-x^2 / 2) - e^-8) on [-4, 4] in units of the deviation: moments by the error function.
+  const double e = std::exp(-8.), root = std::sqrt(2 * M_PI), inside = std::erf(4 / std::sqrt(2.));
+  const double mass = root * inside - 8 * e, second = root * inside - 2 * 4 * e - e * 2 * 64 / 3;
+  const double deviation = .7;
+
+  const RadiusMoments m = moments(GaussianFilter{deviation});
+
+  // The table's density is constant in steps of h = 1/128 of a deviation: adds h^2 / 6 = 1.02e-5 to the
+  // variance.
+  EXPECT_NEAR(m.variance / (deviation * deviation), second / mass + 1.02e-5, 1e-6);
+  EXPECT_LE(PixelFilter(GaussianFilter{deviation}).offset(1 - 0x1p-24f), 4 * deviation);
+  EXPECT_GE(PixelFilter(GaussianFilter{deviation}).offset(0), -4 * deviation);
+}
+
+TEST(PixelFilter, OffsetsGrowWithTheNumber) {
+  for (const ReconstructionFilter& f :
+       {ReconstructionFilter{BoxFilter{.5}}, ReconstructionFilter{TentFilter{1}},
+        ReconstructionFilter{GaussianFilter{.5}}}) {
+    const PixelFilter filter(f);
+    double last = -10;
+    for (int i = 0; i < 10000; ++i) {
+      const double x = filter.offset(static_cast<float>(i) / 10000);
+      ASSERT_GE(x, last);
+      last = x;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

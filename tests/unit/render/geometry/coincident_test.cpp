@@ -1,0 +1,263 @@
+// Surfaces that lie on each other.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string_view>
+
+#include "tests/support/render_check.h"
+#include "worker/render/geometry/coincident.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::translate;
+using test::operator*;
+
+// Fog that stands on a floor, lit from below only: what gets through the floor is an error.
+// All of it is turned by `turn`: rounded corners of floor and box then lie in no common plane.
+std::uint64_t lit_from_below(const Transform& turn, double floor, bool light_is_a_plane) {
+  SceneBuilder builder({4, 4});
+  const MediumIndex fog = builder.homogeneous({.5, .5, .5}, {.9, .9, .9});
+  builder.container(CubeShape{}, turn * translate({0, 0, 1}) * test::scale(2, 2, 1), builder.null(), fog);
+  builder.shape(RectangleShape{}, turn * test::scale(floor), builder.diffuse(.5));
+  const auto turned = [&](const Vec3& p) {
+    const auto& m = turn.m;
+    return Vec3{m[0] * p[0] + m[1] * p[1] + m[2] * p[2], m[4] * p[0] + m[5] * p[1] + m[6] * p[2],
+                m[8] * p[0] + m[9] * p[1] + m[10] * p[2]};
+  };
+  if (light_is_a_plane) {
+    const TextureIndex light = builder.texture({1, 1, 1});
+    builder.shape(RectangleShape{}, turn * translate({0, 0, -50}) * test::scale(40), builder.diffuse(0))
+        .emitter = AreaEmitter{light};
+  } else {
+    builder.scene.emitters.push_back(DirectionalEmitter{turned({0, 0, 1}), {1, 1, 1}});
+  }
+  builder.look(turned({0, -6, 3}), turned({0, 0, .5}), 40, turned({0, 0, 1}));
+  const auto world = test::world_of(builder);
+  std::uint64_t leaks = 0;
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x)
+      for (std::uint64_t s = 0; s < 400; ++s) leaks += render_sample(*world, x, y, s).rgb[0] > 0;
+  return leaks;
+}
+
+TEST(FogOnAFloor, LetsNoLightThroughTheFloor) {
+  for (const Transform& turn : {Transform{}, test::rotate_x(17) * test::rotate_y(31)}) {
+    EXPECT_EQ(lit_from_below(turn, 4, false), 0u);
+    EXPECT_EQ(lit_from_below(turn, 40, false), 0u);
+    EXPECT_EQ(lit_from_below(turn, 40, true), 0u);  // no way round the edge reaches the light
+  }
+}
+
+TEST(Coincident, AreFoundWhereSurfacesShareAPlaceOnly) {
+  const auto found = [](const ls::Geometry& g, const Transform& t) {
+    SceneBuilder builder({1, 1});
+    const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+    builder.container(CubeShape{}, {}, builder.null(), fog);
+    builder.shape(g, t, builder.diffuse(.5));
+    return test::world_of(builder)->coincident;
+  };
+  EXPECT_TRUE(found(RectangleShape{}, translate({0, 0, -1}) * test::scale(5)));
+  EXPECT_TRUE(found(DiskShape{}, translate({.5, 0, -1}) * test::scale(.1)));
+  EXPECT_FALSE(found(RectangleShape{}, translate({0, 0, -1.001}) * test::scale(5)));
+  EXPECT_FALSE(found(RectangleShape{}, translate({3, 0, -1})));  // in the plane, but beside it
+  EXPECT_FALSE(found(RectangleShape{}, test::scale(5)));         // across it
+  EXPECT_FALSE(found(CubeShape{}, test::scale(.5)));
+  EXPECT_TRUE(found(CubeShape{}, {}));
+  EXPECT_FALSE(found(SphereShape{}, {}));
+}
+
+TEST(Coincident, AreFoundAmongRoundShapes) {
+  const auto found = [](double radius) {
+    SceneBuilder builder({1, 1});
+    const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+    builder.container(SphereShape{}, {}, builder.null(), fog);
+    builder.shape(SphereShape{}, test::scale(radius), builder.glass(1.5));
+    return test::world_of(builder)->coincident;
+  };
+  EXPECT_TRUE(found(1));
+  EXPECT_FALSE(found(1.001));
+}
+
+// No other instantiation looks for them; that media overlap is another matter.
+TEST(Coincident, AreAMatterOfTheGeneralInstantiationWithOrWithoutMedia) {
+  for (const bool foggy : {false, true}) {
+    SceneBuilder builder({1, 1});
+    if (foggy)
+      builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));
+    else
+      builder.shape(CubeShape{}, {}, builder.null());
+    builder.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(5), builder.diffuse(.5));
+    const auto w = test::world_of(builder);
+    EXPECT_TRUE(w->coincident);
+    EXPECT_TRUE(w->need.overlaps);
+    EXPECT_FALSE(w->overlaps);
+    EXPECT_EQ(covering_variants(*w).front(), "everything");
+  }
+}
+
+// All that lies between two points, whatever its kind, each once.
+TEST(Coincident, AreAllListedByTheAccelerationStructure) {
+  SceneBuilder builder({1, 1});
+  const BsdfIndex null = builder.null(), grey = builder.diffuse(.5);
+  for (int i = 0; i < 3; ++i) builder.shape(RectangleShape{}, test::scale(1 + i), i == 1 ? grey : null);
+  builder.shape(DiskShape{}, {}, null);
+  builder.shape(SphereShape{}, translate({0, 0, 1}), null);
+  const auto w = test::world_of(builder);
+  ASSERT_TRUE(w->coincident);
+  const auto at = [&](double z) { return V3((V3d(.1, .2, z) - w->geometry.center) * w->geometry.scale); };
+  EXPECT_EQ(w->accel.between(at(-.01), at(.001)).count, 4);
+  EXPECT_EQ(w->accel.between(at(-.01), at(.1)).count, 5);
+  EXPECT_EQ(w->accel.between(at(.1), at(.5)).count, 0);
+}
+
+// Apart from each other, and too many to compare all with all.
+TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
+  constexpr int kSpheres = 12'000;
+  SceneBuilder builder({1, 1});
+  const BsdfIndex null = builder.null();
+  for (int i = 0; i < kSpheres; ++i) builder.shape(SphereShape{}, translate({3. * i, 0, 0}), null);
+  auto g = Geometry::build(builder.scene, {builder.scene, builder.files});
+  ASSERT_TRUE(g);
+
+  const Coincidence found = find_coincident(*g);
+
+  EXPECT_TRUE(found.any);
+  EXPECT_LE(found.marks, g->primitive_count());
+  for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.coincident_reach, 1);
+}
+
+// Instances of every shape of a group of many: more boxes than can be listed.
+TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
+  constexpr int kShapes = 3'000, kInstances = 3'000;
+  SceneBuilder builder({1, 1});
+  const BsdfIndex null = builder.null();
+  const GroupIndex group = SceneBuilder::push<GroupTag>(builder.scene.groups, ShapeGroup{});
+  for (int i = 0; i < kShapes; ++i)
+    builder.shape(SphereShape{}, translate({3. * i, 0, 0}), null).group = group;
+  for (int i = 0; i < kInstances; ++i) builder.scene.instances.push_back({group, translate({0, 3. * i, 0})});
+  auto g = Geometry::build(builder.scene, {builder.scene, builder.files});
+  ASSERT_TRUE(g);
+
+  EXPECT_TRUE(find_coincident(*g).any);
+
+  for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.coincident_reach, 1);
+}
+
+// A glass plate and the fog in it, with the same faces: both are crossed or none.
+TEST(Coincident, MediaBeginWithTheGlassThatTheyFill) {
+  SceneBuilder builder({1, 1});
+  HomogeneousMedium m;
+  m.sigma_t = {0, 0, 0};
+  m.phase = builder.phase(0);
+  m.emission = {1, 1, 1};
+  const auto fog = SceneBuilder::push<MediumTag>(builder.scene.media, m);
+  builder.container(CubeShape{}, {}, builder.null(), fog);
+  builder.shape(CubeShape{}, {}, builder.glass(1.0001));
+  builder.look({-5, .1, .2}, {0, .1, .2}, 1e-4);
+  const auto w = test::world_of(builder);
+  int whole = 0;
+  for (std::uint64_t s = 0; s < 64; ++s) {
+    const double light = render_sample(*w, 0, 0, s).rgb[0];
+    whole += std::abs(light - 2) < 1e-2;  // but for the share 2.5e-9 that is reflected
+  }
+  EXPECT_EQ(whole, 64);
+}
+
+// A floor under a box of fog of optical depth 1, lit straight down through a pane in one of the box's faces:
+// rho / pi times what the pane and the fog leave. Parallel light has no noise.
+double under_a_pane(BsdfIndex (*pane)(SceneBuilder&), const Transform& at, bool pane_first,
+                    const char* integrator, bool instanced = false) {
+  SceneBuilder builder({2, 2});
+  builder.scene.integrator.name = integrator;
+  builder.scene.integrator.max_depth = integrator == std::string_view("path") ? -1 : 2;
+  const BsdfIndex bsdf = pane(builder), null = builder.null();
+  if (pane_first) builder.shape(RectangleShape{}, at, bsdf);
+  Shape& fog = builder.container(CubeShape{}, translate({0, 0, 1.5}) * test::scale(1, 1, .5), null,
+                                 builder.homogeneous({1, 1, 1}, {0, 0, 0}));
+  if (instanced) {
+    fog.group = SceneBuilder::push<GroupTag>(builder.scene.groups, ShapeGroup{});
+    builder.scene.instances.push_back({*fog.group, {}});
+  }
+  if (!pane_first) builder.shape(RectangleShape{}, at, bsdf);
+  builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
+  builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+  builder.look({-3, .1, .4}, {0, 0, 0});
+  return test::estimate(builder, 8, 0, 1).mean[1];
+}
+BsdfIndex half_mask(SceneBuilder& builder) {
+  return builder.bsdf(MaskBsdf{builder.texture({.5, .5, .5}), builder.diffuse(0)});
+}
+BsdfIndex thin_glass(SceneBuilder& builder) {
+  const TextureIndex white = builder.texture({1, 1, 1});
+  return builder.bsdf(ThinDielectricBsdf{1.5, 1, white, white});
+}
+
+TEST(PaneOnABoundary, TakesItsShareOfShadowRaysWhicheverOfTheTwoIsMet) {
+  const double fog = std::exp(-1.), lit = .5 / test::kPi;
+  for (const double face : {1., 2.})
+    for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7, 1e-2, -1e-2})
+      for (const bool first : {false, true}) {
+        SCOPED_TRACE(fmt::format("at {} {:+g}, {}", face, aside, first ? "first" : "last"));
+        const Transform at = translate({0, 0, face + aside});
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath"), .5 * fog * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath_distant_mis"), .5 * fog * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "path"), .5 * lit, 1e-5 * lit);
+        EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath", true), .5 * fog * lit, 1e-5 * lit);
+        // Of a pane R = .04 a side: (1 - R) / (1 + R).
+        EXPECT_NEAR(under_a_pane(thin_glass, at, first, "volpath"), .96 / 1.04 * fog * lit, 1e-5 * lit);
+      }
+}
+
+// A room whose walls are lit by a light that lets all light pass and lies on them: whatever of the two a ray
+// meets, L + rho L + rho^2 L ... = L / (1 - rho) everywhere.
+TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
+  for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7})
+    for (const bool first : {false, true}) {
+      SCOPED_TRACE(fmt::format("{:+g} outside, {}", aside, first ? "first" : "last"));
+      SceneBuilder builder;
+      const TextureIndex radiance = builder.texture({1, 1, 1});
+      const BsdfIndex wall = builder.diffuse(.5), null = builder.null();
+      const auto light = [&] {
+        Shape& s = builder.shape(CubeShape{}, test::scale(1 + aside), null);
+        s.emitter = AreaEmitter{radiance};
+        s.flip_normals = true;
+      };
+      if (first) light();
+      builder.shape(CubeShape{}, {}, wall).flip_normals = true;
+      if (!first) light();
+      builder.look({.1, .2, -.3}, {1, .3, .4}, 60);
+      const test::Estimate e = test::estimate(builder, 256, 0, 1);
+      EXPECT_NEAR(e.mean[1], 2, 5 * e.standard_error[1]);
+      EXPECT_LT(e.standard_error[1], .004);
+      EXPECT_EQ(e.health.nonfinite, 0u);
+    }
+}
+
+// Seen through fog, on the fog's own faces: behind all of it, and before it.
+TEST(LightThatLetsLightPass, ShinesOnTheFaceOfAMediumThatItLiesOn) {
+  for (const double face : {-1., 1.})
+    for (const bool first : {false, true}) {
+      SCOPED_TRACE(fmt::format("at {}, {}", face, first ? "first" : "last"));
+      SceneBuilder builder({2, 2});
+      const TextureIndex radiance = builder.texture({1, 1, 1});
+      const BsdfIndex null = builder.null();
+      const auto light = [&] {
+        builder.shape(RectangleShape{}, translate({0, 0, face}), null).emitter = AreaEmitter{radiance};
+      };
+      if (first) light();
+      builder.container(CubeShape{}, {}, null, builder.homogeneous({.5, .5, .5}, {0, 0, 0}));
+      if (!first) light();
+      builder.look({.1, .2, 5}, {.1, .2, 0}, 1e-3, {0, 1, 0});
+      const test::Estimate e = test::estimate(builder, 4096, 0, 1);
+      const double seen = face > 0 ? 1 : std::exp(-1.);
+      EXPECT_NEAR(e.mean[1], seen, 5 * e.standard_error[1] + 1e-5);
+      EXPECT_LT(e.standard_error[1], .004);
+    }
+}
+
+}  // namespace
+}  // namespace ls::render

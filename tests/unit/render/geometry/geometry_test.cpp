@@ -1,0 +1,320 @@
+// Intersections at extreme scales, orientation, tangents and closed boxes.
+#include "worker/render/geometry/geometry.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/support/render_check.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::translate;
+using test::operator*;
+constexpr double kFarOut = std::numeric_limits<double>::infinity();
+
+Sphere sphere(const V3d& c, double r) {
+  Sphere s;
+  s.center = c;
+  s.radius = r;
+  return s;
+}
+
+TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
+  EXPECT_NEAR(intersect(sphere({0, 0, 1e6}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1e6 - 1, 1e-9);
+  EXPECT_NEAR(intersect(sphere({0, 0, 1}, 1e-6), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1 - 1e-6, 1e-15);
+  EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1, 0);
+  // Height 1 - 1e-12 over the centre: half chord sqrt(2e-12).
+  EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {-5, 1 - 1e-12, 0}, {1, 0, 0}, 0, kFarOut),
+              5 - std::sqrt(2e-12), 1e-9);
+  EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {-5, 1 + 1e-12, 0}, {1, 0, 0}, 0, kFarOut), kFarOut);
+  EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {0, 0, 5}, {0, 0, 1}, 0, kFarOut), kFarOut) << "behind";
+  EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {0, 0, -5}, {0, 0, 1}, 0, 4), kFarOut) << "beyond t_max";
+}
+
+// A box of size 2 with a lamp of 1e5 at 1e7: about the middle of all, 2 is two last places of float32.
+TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
+  SceneBuilder builder;
+  builder.shape(CubeShape{}, {}, builder.diffuse(.5));
+  builder.shape(SphereShape{}, translate({0, 1e7, 0}) * test::scale(1e5), builder.diffuse(0));
+  const auto g = Geometry::build(builder.scene, AssetLoader{builder.scene, builder.files});
+  ASSERT_TRUE(g.has_value());
+  EXPECT_EQ(g->center.x, 0);
+  EXPECT_EQ(g->center.y, 0);
+  for (const V3& p : g->positions)
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(std::abs(p[k]) / g->scale, 1);
+  const double far = g->spheres.at(0).center.length() + g->spheres.at(0).radius;
+  EXPECT_LE(far, 1) << "the world is no longer of unit size";
+  EXPECT_GE(far, .5);
+  EXPECT_GE(g->radius, far);
+}
+
+TEST(World, IsAboutItsMiddleWhereEveryMeshIsWellResolved) {
+  SceneBuilder builder;
+  builder.shape(CubeShape{}, {}, builder.diffuse(.5));
+  builder.shape(CubeShape{}, translate({100, 0, 0}), builder.diffuse(.5));
+  const auto g = Geometry::build(builder.scene, AssetLoader{builder.scene, builder.files});
+  ASSERT_TRUE(g.has_value());
+  EXPECT_EQ(g->center.x, 50);
+}
+
+TEST(DiskIntersection, EndsAtItsRimAndIgnoresParallelRays) {
+  Disk d;
+  d.center = {0, 0, 1e-5};
+  d.u = {1e-6, 0, 0};
+  d.v = {0, 2e-6, 0};
+  d.n = {0, 0, 1};
+  EXPECT_NEAR(intersect(d, {.9e-6, 0, 0}, {0, 0, 1}, 0, kFarOut), 1e-5, 1e-20);
+  EXPECT_EQ(intersect(d, {1.1e-6, 0, 0}, {0, 0, 1}, 0, kFarOut), kFarOut);
+  EXPECT_NEAR(intersect(d, {0, 1.9e-6, 0}, {0, 0, 1}, 0, kFarOut), 1e-5, 1e-20);
+  EXPECT_EQ(intersect(d, {0, 0, 0}, {1, 0, 0}, 0, kFarOut), kFarOut);
+}
+
+V3 any_direction(std::mt19937& rng) {
+  std::normal_distribution<double> n;
+  const double x = n(rng), y = n(rng), z = n(rng);
+  return V3(V3d(x, y, z).normalized());
+}
+
+// A path that bounces about inside a closed shape must never get out.
+std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, unsigned seed) {
+  SceneBuilder builder;
+  builder.shape(shape, t, builder.diffuse(.5));
+  const auto world = test::world_of(builder);
+  std::mt19937 rng(seed);
+  std::uint64_t lost = 0;
+  V3 o(0);
+  V3 d = any_direction(rng);
+  for (int i = 0; i < rays; ++i) {
+    const auto primitive = world->accel.nearest(o, d, kInfinity);
+    SurfaceHit hit;
+    if (!primitive || !world->geometry.complete(*primitive, o, d, hit)) {
+      ++lost;
+      o = V3(0);
+      continue;
+    }
+    d = any_direction(rng);
+    if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;  // inwards: these shapes are about the origin
+    o = offset_point(hit, d);
+  }
+  return lost;
+}
+
+TEST(ClosedShapes, LoseNoRayAtAnyScale) {
+  for (const double s : {1e-4, .37, 1., 12345.6, 1e6}) {
+    const Transform t = test::rotate_x(33) * test::rotate_y(21) * test::scale(s);
+    EXPECT_EQ(leaks(CubeShape{}, t, 100000, 1), 0u) << s;
+    EXPECT_EQ(leaks(SphereShape{}, t, 100000, 2), 0u) << s;
+  }
+  EXPECT_EQ(leaks(CubeShape{}, test::scale(1, .01, 300), 100000, 3), 0u);
+  EXPECT_EQ(leaks(CubeShape{}, {}, 400000, 4), 0u);
+}
+
+SurfaceHit geometry_hit(const World& w, const V3d& from, const V3d& to) {
+  const auto at = [&](const V3d& p) { return (p - w.geometry.center) * w.geometry.scale; };
+  const V3 o(at(from)), d((at(to) - at(from)).normalized());
+  const auto primitive = w.accel.nearest(o, d, kInfinity);
+  SurfaceHit hit;
+  EXPECT_TRUE(primitive && w.geometry.complete(*primitive, o, d, hit));
+  return hit;
+}
+std::shared_ptr<const World> one(const ls::Geometry& g, const Transform& t, bool flip) {
+  SceneBuilder builder;
+  builder.shape(g, t, builder.diffuse(.5)).flip_normals = flip;
+  return test::world_of(builder);
+}
+
+// What Mitsuba 3.9.1 says of rays at unit shapes (scalar_rgb, ray_intersect): shading normal, uv, and the
+// direction of dp/du.
+struct SeenShape {
+  const char* shape;
+  V3d from, to;
+  V3 normal;
+  V2 uv;
+  V3 along_u;
+};
+const SeenShape kSeenShapes[] = {
+    {"cube", {5, .6, .8}, {0, 0, 0}, {1, 0, 0}, {.56f, .42f}, {0, 1, 0}},
+    {"cube", {-5, .6, .8}, {0, 0, 0}, {-1, 0, 0}, {.56f, .58f}, {0, 1, 0}},
+    {"cube", {.6, 5, .8}, {0, 0, 0}, {0, 1, 0}, {.44f, .42f}, {-1, 0, 0}},
+    {"cube", {.6, -5, .8}, {0, 0, 0}, {0, -1, 0}, {.58f, .56f}, {0, 0, 1}},
+    {"cube", {.6, .8, 5}, {0, 0, 0}, {0, 0, 1}, {.58f, .56f}, {0, 1, 0}},
+    {"cube", {.6, .8, -5}, {0, 0, 0}, {0, 0, -1}, {.42f, .56f}, {0, -1, 0}},
+    {"rectangle", {.6, .4, 5}, {.3, .2, 0}, {0, 0, 1}, {.65f, .6f}, {1, 0, 0}},
+    {"sphere",
+     {5, .6, .8},
+     {0, 0, 0},
+     {.980581f, .11767f, .156893f},
+     {.0190077f, .449852f},
+     {-.11915f, .99288f, 0}},
+    {"sphere",
+     {-5, .6, .8},
+     {0, 0, 0},
+     {-.980581f, .11767f, .156893f},
+     {.480992f, .449852f},
+     {-.11915f, -.99288f, 0}},
+    {"sphere",
+     {.6, -5, .8},
+     {0, 0, 0},
+     {.11767f, -.980581f, .156893f},
+     {.769008f, .449852f},
+     {.99288f, .11915f, 0}},
+    {"sphere", {.6, .8, -5}, {0, 0, 0}, {.11767f, .156893f, -.980581f}, {.147584f, .937167f}, {-.8f, .6f, 0}},
+    {"disk", {.6, .4, 5}, {.3, .2, 0}, {0, 0, 1}, {.360555f, .0935835f}, {.83205f, .5547f, 0}},
+};
+// Mitsuba's figures are printed to 6 digits (dp/du to 5).
+void expect_near(const V3& a, const V3& b, const char* what) {
+  EXPECT_LT((a - b).length(), 2e-5f) << what << a << b;
+}
+ls::Geometry named(const std::string& name) {
+  if (name == "cube") return CubeShape{};
+  if (name == "rectangle") return RectangleShape{};
+  if (name == "disk") return DiskShape{};
+  return SphereShape{};
+}
+
+// A material that wants all that a hit can say.
+BsdfIndex brushed_shape(SceneBuilder& builder) {
+  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
+  RoughConductorBsdf b;
+  b.alpha_u = builder.texture({.1, .1, .1});
+  b.alpha_v = builder.texture({.3, .3, .3});
+  b.specular_reflectance =
+      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
+  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
+}
+
+TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
+  for (const SeenShape& s : kSeenShapes) {
+    SceneBuilder builder;
+    builder.shape(named(s.shape), {}, brushed_shape(builder));
+    const SurfaceHit h = geometry_hit(*test::world_of(builder), s.from, s.to);
+    expect_near(h.shading.n, s.normal, s.shape);
+    expect_near({h.uv.x, h.uv.y, 0}, {s.uv.x, s.uv.y, 0}, s.shape);
+    expect_near(h.shading.s, s.along_u, s.shape);
+  }
+}
+
+// The side that shines, by Mitsuba 3.9.1: flat shapes and cubes keep the normal that was mapped, a mirrored
+// sphere turns inside out, a flip turns them all.
+TEST(Shapes, ShineToTheSideThatMitsubaSays) {
+  for (const char* name : {"cube", "rectangle", "disk", "sphere"}) {
+    for (const bool mirror : {false, true}) {
+      for (const bool flip : {false, true}) {
+        const bool inside_out = flip != (mirror && std::string(name) == "sphere");
+        const auto world = one(named(name), test::scale(mirror ? -1 : 1, 1, 1), flip);
+        const SurfaceHit h = geometry_hit(*world, {.3, .2, 5}, {.3, .2, 0});
+        EXPECT_EQ(h.ng.z > 0, !inside_out) << name << mirror << flip;
+        EXPECT_EQ(h.shading.n.z > 0, !inside_out) << name << mirror << flip;
+      }
+    }
+  }
+}
+
+// A square in z = 0 by an OBJ file with or without vertex normals along +z or -z.
+SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
+  static const test::ScratchFolder folder;
+  std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 " + std::to_string(z) + "\n";
+  text += normals ? "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n" : "f 1 2 3\nf 1 3 4\n";
+  SceneBuilder builder;
+  const Asset asset{"square.obj", sha256(text), text.size()};
+  builder.files[asset.digest] = folder.path() / asset.digest.hex();
+  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
+  MeshShape mesh;
+  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.face_normals = !normals;
+  builder.shape(mesh, test::scale(mirror ? -1 : 1, 1, 1), builder.diffuse(.5));
+  return geometry_hit(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
+}
+
+TEST(Meshes, FollowTheirNormalsAndElseTheirWinding) {
+  EXPECT_EQ(square_hit(true, false).shading.n.z, 1.f);
+  EXPECT_EQ(square_hit(true, true).shading.n.z, 1.f);
+  EXPECT_EQ(square_hit(true, true).ng.z, 1.f);
+  EXPECT_EQ(square_hit(false, false).ng.z, 1.f);
+  EXPECT_EQ(square_hit(false, true).ng.z, -1.f);
+}
+
+TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
+  for (const bool mirror : {false, true}) {
+    EXPECT_EQ(square_hit(true, mirror, -1).shading.n.z, -1.f);
+    EXPECT_EQ(square_hit(true, mirror, -1).ng.z, -1.f);
+  }
+}
+
+// Light in a closed room whose normals point inwards, against its winding; the medium lies where the winding
+// has the inside.
+TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
+  static const test::ScratchFolder folder;
+  std::string text =
+      "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
+  text += "f 1//1 4//4 2//2\nf 1//1 3//3 4//4\nf 1//1 2//2 3//3\nf 2//2 4//4 3//3\n";
+  for (const bool filled : {false, true}) {
+    SceneBuilder builder;
+    const Asset asset{"room.obj", sha256(text), text.size()};
+    builder.files[asset.digest] = folder.path() / asset.digest.hex();
+    std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
+    MeshShape mesh;
+    mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+    const MediumIndex dark = builder.homogeneous({3, 3, 3}, {0, 0, 0});
+    const TextureIndex light = builder.texture({1, 1, 1});
+    Shape& room = builder.shape(mesh, {}, builder.diffuse(0));
+    room.emitter = AreaEmitter{light};
+    if (filled) {
+      room.interior = dark;
+      room.is_medium_transition = true;
+      builder.scene.sensor.medium = dark;
+    }
+    builder.look({0, 0, 0}, {.3, .3, .3});
+    const auto e = test::estimate(builder, 1);
+    if (filled) {
+      EXPECT_GT(e.mean[0], 0);
+      EXPECT_LT(e.mean[0], std::exp(-3 * .5));  // the nearest wall is farther than .5
+    } else {
+      EXPECT_EQ(e.mean[0], 1);
+    }
+  }
+}
+
+TEST(Meshes, WithoutNormalsAreSmooth) {
+  // A roof without normals, hit near its ridge; Mitsuba 3.9.1: shading normal (.0358577, 0, .999357).
+  const std::string text =
+      "v -1 -1 0\nv 0 -1 1\nv 0 1 1\nv -1 1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\nf 1 3 4\nf 2 5 6\nf 2 6 3\n";
+  const test::ScratchFolder folder;
+  SceneBuilder builder;
+  const Asset asset{"roof.obj", sha256(text), text.size()};
+  builder.files[asset.digest] = folder.path() / "roof.obj";
+  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
+  MeshShape mesh;
+  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  builder.shape(mesh, {}, builder.diffuse(.5));
+
+  const SurfaceHit h = geometry_hit(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});
+
+  expect_near(h.shading.n, {.0358577f, 0, .999357f}, "smooth");
+  expect_near(h.ng, {.707107f, 0, .707107f}, "flat");
+}
+
+TEST(Normals, ShadingFrameIsRightHandedAndAgreesWithTheGeometricNormal) {
+  for (const ls::Geometry& g : {ls::Geometry{CubeShape{}}, ls::Geometry{SphereShape{}},
+                                ls::Geometry{DiskShape{}}, ls::Geometry{RectangleShape{}}}) {
+    const SurfaceHit h = geometry_hit(*one(g, {}, false), {.3, .4, 5}, {.2, .3, 0});
+    EXPECT_NEAR(dot(h.shading.n, h.ng), 1, 1e-6);
+    EXPECT_NEAR(dot(cross(h.shading.s, h.shading.t), h.shading.n), 1, 1e-6);
+  }
+}
+
+TEST(Offset, LeavesToTheSideOfTheDirection) {
+  for (const float z : {-1.f, 1.f}) {
+    const V3 p = offset_point(V3(.5f, .25f, .125f), V3(0, 0, 1), 1, V3(.1f, 0, z));
+    EXPECT_EQ(p.z > .125f, z > 0);
+    EXPECT_NEAR(std::abs(p.z - .125f), 0x1p-20f, 0x1p-26f);
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,310 @@
+// AOVs on scenes where their values are known, and the light's parts, which must add up to the whole.
+#include "common/image/aov/aov.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/image/aov/cryptomatte.h"
+#include "common/image/aov/id_slots.h"
+#include "common/image/film/partial.h"
+#include "tests/support/render_check.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::translate;
+using test::operator*;
+
+constexpr std::uint64_t kSamples = 16;
+// Positions in the unit-size world, uv and unit vectors are float32 after a few operations each: 2^-20 of the
+// largest of them is 16 units in the last place.
+constexpr double kClose = 0x1p-20;
+
+// One picture with AOVs: means by name and component over the pixel (of the hits, where they are).
+class Picture {
+ public:
+  Picture(const SceneBuilder& builder, std::vector<std::string> names, std::uint64_t samples = kSamples)
+      : samples_(samples) {
+    RenderSettings settings = test::settings_of(builder.scene);
+    settings.aov = names_of(parse_aovs(names).value());
+    aovs_ = planes_of(aovs_of(settings));
+    size_ = settings.size;
+    auto world = build_world(builder.scene, settings, builder.files, 1);
+    if (!world) throw std::runtime_error(world.error().message);
+    sums_ = render_tile(**world, {0, 0, size_.width, size_.height}, {0, samples}, nullptr, nullptr).sums;
+  }
+  std::size_t pixels() const { return static_cast<std::size_t>(size_.width * size_.height); }
+  std::vector<float> beauty() const {
+    return {sums_.begin(), sums_.begin() + static_cast<std::ptrdiff_t>(6 * pixels())};
+  }
+  double sum(const std::string& plane, std::size_t pixel) const {
+    const auto at = std::find(aovs_.names.begin(), aovs_.names.end(), plane);
+    if (at == aovs_.names.end()) throw std::runtime_error("no plane " + plane);
+    return sums_[(6 + static_cast<std::size_t>(at - aovs_.names.begin())) * pixels() + pixel];
+  }
+  double of_all(const std::string& plane, std::size_t pixel = 0) const {
+    return sum(plane, pixel) / static_cast<double>(samples_);
+  }
+  double of_hits(const std::string& plane, std::size_t pixel = 0) const {
+    return sum(plane, pixel) / sum("aov.hits", pixel);
+  }
+  double whole(std::size_t channel, std::size_t pixel) const {
+    return double{sums_[channel * pixels() + pixel]} + sums_[(3 + channel) * pixels() + pixel];
+  }
+  IdSlots ids(std::size_t which, std::size_t pixel = 0) const {
+    return load_slots(&sums_[(6 + aovs_.sums.size() + which * kIdPlanes) * pixels() + pixel], pixels());
+  }
+
+ private:
+  std::uint64_t samples_;
+  AovPlanes aovs_;
+  FrameSize size_;
+  std::vector<float> sums_;
+};
+
+// A wall of side 4 in z = 0, seen straight on at (x, y) from five above, wherever the scene lies.
+SceneBuilder wall(double x = .4, double y = .6, const Vec3& at = {0, 0, 0}) {
+  SceneBuilder builder({2, 2});
+  builder.shape(RectangleShape{}, translate(at) * test::scale(2), builder.diffuse(.3));
+  builder.environment();
+  builder.look({at[0] + x, at[1] + y, at[2] + 5}, {at[0] + x, at[1] + y, at[2]}, 1e-3, {0, 1, 0});
+  return builder;
+}
+const std::vector<std::string> kOfSurface = {"albedo", "coverage", "depth",    "normal",     "geo_normal",
+                                             "uv",     "position", "shape_id", "material_id"};
+
+TEST(Aovs, OfAWallAreItsOwn) {
+  for (const Vec3& at : {Vec3{0, 0, 0}, Vec3{100, -200, 50}}) {
+    const Picture p(wall(.4, .6, at), kOfSurface);
+    for (std::size_t pixel = 0; pixel < 4; ++pixel) {
+      // The view is 5 tan(.001 deg) = 9e-5 wide; each pixel sees one quarter of it.
+      const double view = 5 * 1e-3 * test::kPi / 180;
+      EXPECT_EQ(p.sum("aov.hits", pixel), kSamples);
+      EXPECT_NEAR(p.of_hits("aov.depth.Z", pixel), 5, 8 * kClose);
+      EXPECT_NEAR(p.of_hits("aov.position.X", pixel), at[0] + .4, view + 256 * kClose);
+      EXPECT_NEAR(p.of_hits("aov.position.Y", pixel), at[1] + .6, view + 256 * kClose);
+      EXPECT_NEAR(p.of_hits("aov.position.Z", pixel), at[2], 256 * kClose);
+      EXPECT_NEAR(p.of_hits("aov.uv.U", pixel), .6, view + kClose);
+      EXPECT_NEAR(p.of_hits("aov.uv.V", pixel), .65, view + kClose);
+      for (const char* normal : {"aov.normal.", "aov.geo_normal."}) {
+        EXPECT_NEAR(p.of_all(std::string(normal) + "X", pixel), 0, kClose);
+        EXPECT_NEAR(p.of_all(std::string(normal) + "Z", pixel), 1, kClose);
+      }
+      EXPECT_NEAR(p.of_all("aov.albedo.G", pixel), .3, kClose);
+      EXPECT_EQ(p.of_all("aov.coverage.A", pixel), 1);
+    }
+  }
+}
+
+TEST(Aovs, DepthIsFromTheCameraWhateverItsNearClip) {
+  SceneBuilder builder = wall();
+  builder.scene.sensor.near_clip = 3;
+  EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 8 * kClose);
+
+  builder = wall();
+  builder.look({0, 3, 4}, {0, 0, 0});  // along the ray, not the axis or the normal
+  EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 5e-4);  // the view's half width, slanted
+
+  builder = wall();
+  builder.scene.sensor.projection = Projection::orthographic;
+  builder.scene.sensor.to_world = builder.scene.sensor.to_world * test::scale(.01, .01, 1);
+  EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 8 * kClose);
+}
+
+TEST(Aovs, SeeThroughMediaAndBoundaries) {
+  SceneBuilder builder = wall();
+  const MediumIndex fog = builder.homogeneous({2, 2, 2}, {.9, .9, .9});
+  builder.container(CubeShape{}, translate({0, 0, 2}), builder.null(), fog);
+
+  const Picture p(builder, {"depth", "coverage", "volume", "normal"}, 64);
+
+  EXPECT_NEAR(p.of_hits("aov.depth.Z"), 5, 8 * kClose);
+  EXPECT_EQ(p.of_all("aov.coverage.A"), 1);
+  EXPECT_NEAR(p.of_all("aov.normal.Z"), 1, kClose);
+  EXPECT_GT(p.of_all("aov.volume.R"), 0);
+}
+
+TEST(Aovs, SphereGivesNormalAndUv) {
+  SceneBuilder builder({1, 1});
+  builder.shape(SphereShape{}, translate({1, 2, 3}), builder.diffuse(.5));
+  builder.shape(SphereShape{}, translate({1, 2, 9}), builder.diffuse(.5)).flip_normals = true;
+  builder.look({5, 2, 3}, {1, 2, 3});
+  const Picture p(builder, {"normal", "uv", "depth"});
+  // Met at +x: azimuth 0 (or 1), polar angle a quarter turn.
+  EXPECT_NEAR(p.of_all("aov.normal.X"), 1, 1e-8 + kClose);
+  EXPECT_NEAR(p.of_hits("aov.uv.V"), .5, 1e-4);
+  EXPECT_NEAR(p.of_hits("aov.depth.Z"), 3, 16 * kClose);
+
+  builder.look({1, 6, 9}, {1, 2, 9});
+  const Picture flipped(builder, {"normal", "uv"});
+  EXPECT_NEAR(flipped.of_all("aov.normal.Y"), -1, kClose);
+  EXPECT_NEAR(flipped.of_hits("aov.uv.U"), .25, 1e-4);
+}
+
+TEST(Aovs, AlbedoIsTheShareOfLightThatAMaterialSendsOn) {
+  const auto albedo = [](BsdfIndex (*make)(SceneBuilder&)) {
+    SceneBuilder builder = wall();
+    builder.scene.shapes[0].bsdf = make(builder);
+    return Picture(builder, {"albedo"}).of_all("aov.albedo.R");
+  };
+  EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.mirror(); }), 1, kClose);
+  EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.glass(1.5); }), 1,
+              kClose);  // not 1.5^-2 of what goes through
+  EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.diffuse(0); }), 0, 0);
+}
+
+TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {
+  SceneBuilder builder({1, 1});
+  builder.shape(RectangleShape{}, translate({-2, 0, 0}) * test::scale(2),
+                builder.diffuse(.5));  // x from -4 to 0
+  builder.look({0, 0, 1}, {0, 0, 0}, 60, {0, 1, 0});
+  const Picture half(builder, kOfSurface, 64);
+  EXPECT_NEAR(half.of_all("aov.coverage.A"), .5, 3. / 64);  // a Sobol sequence halves: within few samples
+  EXPECT_NEAR(half.of_all("aov.normal.Z"), half.of_all("aov.coverage.A"), kClose);
+  EXPECT_GE(half.of_hits("aov.depth.Z"), 1);
+  EXPECT_LT(half.of_hits("aov.position.X"), 0);
+  EXPECT_EQ(half.ids(0).slots[1], IdSlot{});
+
+  builder.look({0, 0, -5}, {0, 0, -9}, 1, {0, 1, 0});
+  const Picture none(builder, kOfSurface);
+  for (const char* plane : {"aov.hits", "aov.depth.Z", "aov.normal.Z", "aov.coverage.A", "aov.albedo.R"})
+    EXPECT_EQ(none.sum(plane, 0), 0) << plane;
+  EXPECT_EQ(none.ids(0), IdSlots{});
+}
+
+TEST(Aovs, MattesCountTheSamplesOfEachThing) {
+  SceneBuilder builder = wall();
+  const BsdfIndex inner = builder.diffuse(.5), both = builder.bsdf(TwoSidedBsdf{inner, inner});
+  const BsdfIndex mask = builder.bsdf(MaskBsdf{builder.texture({.25, .25, .25}), both});
+  builder.shape(RectangleShape{}, translate({0, 0, 1}) * test::scale(2), mask);
+  builder.scene.shape_labels = {{"wall", "plaster"}, {"veil", "lace"}};
+
+  const Picture p(builder, {"shape_id", "material_id"}, 256);
+
+  const IdSlots material = p.ids(0), shape = p.ids(1);
+  EXPECT_EQ(shape.slots[0].id, cryptomatte_id("wall"));
+  EXPECT_EQ(shape.slots[1].id, cryptomatte_id("veil"));
+  EXPECT_EQ(shape.slots[0].n + shape.slots[1].n, 256);
+  // A quarter of 2 x 128 points of the first dimension of two Sobol sequences: exactly, up to one of each.
+  EXPECT_NEAR(shape.slots[1].n, 64, 2);
+  EXPECT_EQ(material.slots[0], (IdSlot{cryptomatte_id("plaster"), shape.slots[0].n}));
+  EXPECT_EQ(material.slots[1].id, cryptomatte_id("lace"));
+  EXPECT_EQ(shape.more + material.more, 0);
+}
+
+TEST(Aovs, InstancesAreThingsOfTheirOwn) {
+  SceneBuilder builder({1, 1});
+  builder.shape(SphereShape{}, translate({0, 0, 0}), builder.diffuse(.5)).group = GroupIndex{0};
+  builder.scene.groups.emplace_back();
+  builder.scene.instances = {{GroupIndex{0}, translate({5, 0, 0})}, {GroupIndex{0}, translate({0, 5, 0})}};
+  builder.scene.shape_labels = {{"ball", "clay"}};
+  builder.scene.instance_labels = {{"left", ""}, {"right", ""}};
+  builder.look({0, 5, 9}, {0, 5, 0}, 1e-3, {0, 1, 0});
+
+  const Picture p(builder, {"shape_id", "material_id", "uv"});
+
+  EXPECT_EQ(p.ids(1).slots[0], (IdSlot{cryptomatte_id("right"), kSamples}));
+  EXPECT_EQ(p.ids(0).slots[0], (IdSlot{cryptomatte_id("clay"), kSamples}));
+  EXPECT_NEAR(p.of_hits("aov.uv.V"), 0, 1e-4);  // its pole
+}
+
+// ---- light ----
+SceneBuilder hall(bool media, bool grids) {
+  SceneBuilder builder({8, 6});
+  const BsdfIndex white = builder.diffuse(.7);
+  builder.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(3), white);
+  builder.shape(SphereShape{}, translate({.6, .8, -.5}) * test::scale(.4), builder.glass(1.5));
+  builder.shape(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(180) * test::scale(.5), white)
+      .emitter = AreaEmitter{builder.texture({3, 2, 1})};
+  builder.scene.emitters.push_back(PointEmitter{{1, -1, 1}, {1, 1, 1}});
+  builder.environment(.1);
+  if (media) {
+    const Transform box = translate({-1, -1, -1}) * test::scale(2);
+    const MediumIndex m =
+        grids ? builder.heterogeneous(builder.grid({2, 2, 2}, {1, 2, 3, 1, .5f, 1, 2, 0}, box), {.9, .6, .3},
+                                      1, .4)
+              : builder.homogeneous({.8, .9, 1}, {.9, .5, .2}, .3);
+    builder.container(CubeShape{}, test::scale(.9), builder.null(), m);
+  }
+  builder.look({0, -5, 1}, {0, 0, 0}, 40);
+  return builder;
+}
+const std::vector<std::string> kOfLight = {"direct", "indirect", "surface", "volume",
+                                           "single", "multiple", "emission"};
+
+// Each part is a double sum of the same float32 numbers in another order, rounded once; a sample's own sum is
+// of float32: with n contributions of one sign, n 2^-24 of the whole. These paths have below 256.
+TEST(Aovs, PartsOfTheLightAddUpToIt) {
+  for (const char* integrator : {"volpath", "volpath_distant_mis"})
+    for (const int media : {0, 1, 2}) {
+      SceneBuilder builder = hall(media > 0, media > 1);
+      builder.scene.integrator.name = integrator;
+      const Picture p(builder, kOfLight, 32);
+      double volume = 0;
+      for (std::size_t i = 0; i < p.pixels(); ++i)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const auto part = [&](const char* name) {
+            return p.sum(std::string("aov.") + name + "." + "RGB"[c], i);
+          };
+          const double whole = p.whole(c, i), close = 0x1p-16 * whole;
+          EXPECT_NEAR(part("direct") + part("indirect"), whole, close) << integrator << media;
+          EXPECT_NEAR(part("surface") + part("volume") + part("emission"), whole, close)
+              << integrator << media;
+          EXPECT_NEAR(part("single") + part("multiple"), part("volume"), close);
+          EXPECT_GE(part("indirect"), 0);
+          volume += part("volume");
+        }
+      EXPECT_EQ(volume > 0, media > 0);
+    }
+}
+
+TEST(Aovs, BeautyHasTheSameBitsWithAndWithoutThem) {
+  std::vector<std::string> all;
+  for (const AovRow& row : aov_rows()) all.emplace_back(row.name);
+  for (const char* integrator : {"volpath", "volpath_distant_mis"})
+    for (const int media : {0, 1, 2}) {
+      SceneBuilder builder = hall(media > 0, media > 1);
+      builder.scene.integrator.name = integrator;
+      const std::vector<float> plain = Picture(builder, {}).beauty();
+      EXPECT_EQ(Picture(builder, all).beauty(), plain) << integrator << media;
+      EXPECT_EQ(Picture(builder, {"uv"}).beauty(), plain) << integrator << media;
+      EXPECT_EQ(Picture(builder, {"direct"}).beauty(), plain) << integrator << media;
+    }
+}
+
+TEST(Aovs, LightSeenStraightIsEmission) {
+  SceneBuilder builder = wall();
+  builder.scene.shapes[0].emitter = AreaEmitter{builder.texture({3, 2, 1})};
+  builder.scene.shapes[0].bsdf = builder.diffuse(0);
+  const Picture p(builder, kOfLight);
+  EXPECT_EQ(p.of_all("aov.emission.R"), 3);
+  EXPECT_EQ(p.of_all("aov.direct.B"), 1);
+  EXPECT_EQ(p.of_all("aov.surface.R") + p.of_all("aov.indirect.R"), 0);
+}
+
+TEST(Aovs, WithOneScatteringThereIsNoIndirectLightAndNoMultiple) {
+  SceneBuilder builder = hall(true, false);
+  builder.scene.integrator.max_depth = 2;
+  const Picture p(builder, kOfLight);
+  double single = 0;
+  for (std::size_t i = 0; i < p.pixels(); ++i) {
+    EXPECT_EQ(p.sum("aov.indirect.G", i), 0);
+    EXPECT_EQ(p.sum("aov.multiple.G", i), 0);
+    single += p.sum("aov.single.G", i);
+  }
+  EXPECT_GT(single, 0);
+}
+
+// A wall of albedo a in a white furnace: direct light is a, and no more comes.
+TEST(Aovs, DirectLightOfAWallIsItsAlbedo) {
+  const Picture p(wall(), {"surface", "indirect", "direct"}, 64);
+  EXPECT_NEAR(p.of_all("aov.surface.R"), .3, 64 * kClose);
+  EXPECT_NEAR(p.of_all("aov.direct.R"), .3, 64 * kClose);
+  EXPECT_EQ(p.of_all("aov.indirect.R"), 0);
+}
+
+}  // namespace
+}  // namespace ls::render

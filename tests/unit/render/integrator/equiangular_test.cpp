@@ -1,0 +1,98 @@
+// Equi-angular distances where textbook arctangents cancel (STABILITY N22 to N24).
+#include "worker/render/integrator/equiangular.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "worker/render/math/random.h"
+
+namespace ls::render {
+namespace {
+
+// A segment whose ends lie at offsets a and b from the foot of a pivot at distance D. The foot lies at the
+// origin, so that a, b and D are exact in float32.
+struct TestSegment {
+  float a, b, distance;
+  EquiAngular make() const { return {V3(a, 0, 0), V3(1, 0, 0), b - a, V3(0, distance, 0)}; }
+  double length() const { return double{b - a}; }
+  double angle() const {  // in double, by the difference that does not cancel
+    const double d = distance;
+    return std::atan2(d * (double{b} - a), d * d + double{a} * b);
+  }
+};
+const TestSegment kSegments[] = {{-3, 3, .5f},         {-3, 3, 1e-5f},  {100, 101, .01f},
+                                 {1e6f, 1.0001e6f, 1}, {-1e6f, 1, .1f}, {-2, -1, .3f},
+                                 {-101, -100, .01f},   {0, 1, 1},       {0, 4, 1e-3f},
+                                 {-.5f, .25f, 1e4f},   {-1, 1, 1e7f},   {5, 5.0001f, 2}};
+
+TEST(EquiAngular, DensityIsThatOfTheAngle) {
+  for (const TestSegment& s : kSegments) {
+    const EquiAngular e = s.make();
+    for (int i = 0; i <= 16; ++i) {
+      const float t = (s.b - s.a) * static_cast<float>(i) / 16;
+      const double x = double{s.a} + t;
+      // The foot is computed from a point |a| away: its place is good to 2^-24 |a|, and nearer than
+      // 1e-7 of the ends to the pivot the distance is a lower bound.
+      const double d = std::max<double>(s.distance, 1e-7 * std::max(std::abs(s.a), std::abs(s.b)));
+      const double angle = std::atan2(d * (double{s.b} - s.a), d * d + double{s.a} * s.b);
+      const double near = std::sqrt(d * d + x * x), place = 0x1p-23 * (std::abs(s.a) + t);
+      EXPECT_NEAR(e.pdf(t) / (d / angle / (near * near)), 1, 2e-6 + 4 * place / near)
+          << s.a << " " << s.b << " " << s.distance << " t " << t;
+    }
+  }
+}
+
+TEST(EquiAngular, EstimatesTheInverseSquareIntegralWithoutVariance) {
+  for (const TestSegment& s : kSegments) {
+    const double d = std::max<double>(s.distance, 1e-7 * std::max(std::abs(s.a), std::abs(s.b)));
+    const double integral = std::atan2(d * (double{s.b} - s.a), d * d + double{s.a} * s.b) / d;
+    RandomStream r(3);
+    for (int i = 0; i < 1000; ++i) {
+      const auto sample = s.make().sample(r.uniform());
+      const V3d p(sample.p);
+      const double value = 1 / (d * d + p.x * p.x) / sample.pdf;
+      // Position measured from the foot, which lies at the origin: relative errors only. The uniform branch
+      // takes over where the integrand is flat to (b - a) / D = 1e-6.
+      ASSERT_NEAR(value / integral, 1, 4e-6) << s.a << " " << s.b << " " << s.distance << " at " << p.x;
+    }
+  }
+}
+
+TEST(EquiAngular, SamplesLieOnTheSegmentAndFollowTheAngle) {
+  for (const TestSegment& s : kSegments) {
+    const EquiAngular e = s.make();
+    float last = -1;
+    for (int i = 0; i < 1000; ++i) {
+      const float xi = static_cast<float>(i) / 1000;
+      const auto sample = e.sample(xi);
+      ASSERT_GE(sample.t, 0.f);
+      ASSERT_LE(sample.t, (s.b - s.a) * (1 + 0x1p-22f));
+      ASSERT_GE(sample.t, last) << "order";
+      last = sample.t;
+      // Share of the angle below the sample: xi, in double.
+      const double d = std::max<double>(s.distance, 1e-7 * std::max(std::abs(s.a), std::abs(s.b)));
+      const double x = sample.p.x, below = std::atan2(d * (x - s.a), d * d + x * s.a);
+      const double all = std::atan2(d * (double{s.b} - s.a), d * d + double{s.a} * s.b);
+      // One rounding of x by 2^-24 |x| turns the angle by d / (d^2 + x^2) of it.
+      const double turn = 0x1p-22 * std::abs(x) * d / (d * d + x * x) / all;
+      ASSERT_NEAR(below / all, xi, 4e-6 + turn) << s.a << " " << s.b << " " << s.distance;
+    }
+  }
+}
+
+TEST(EquiAngular, DensityOfASampleIsTheDensityAtItsPlace) {
+  RandomStream r(9);
+  for (const TestSegment& s : kSegments) {
+    for (int i = 0; i < 200; ++i) {
+      const auto sample = s.make().sample(r.uniform());
+      const double x = sample.p.x, near = std::hypot(x, double{s.distance}) + 1e-7 * std::abs(s.a);
+      const double place = 0x1p-23 * (std::abs(s.a) + std::abs(s.b));  // t is coarse near the light
+      ASSERT_NEAR(s.make().pdf(sample.t) / sample.pdf, 1,
+                  2e-6 + 4 * place / near + 4 * place * place / near / near);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

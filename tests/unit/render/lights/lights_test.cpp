@@ -1,0 +1,254 @@
+// Lights: irradiance by their own sampling against closed forms, and densities that agree with the sampling.
+#include "worker/render/lights/lights.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <ctime>
+
+#include "tests/unit/render/light_bench.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::operator*;
+using test::translate;
+
+TEST(Lights, RectangleGivesLambertsIrradiance) {
+  // Four corners of half sides a, b at height h: A/sqrt(1+A^2) atan(B/sqrt(1+A^2)) + the same with A, B
+  // swapped.
+  const double a = .8 / 1.25, b = .5 / 1.25;
+  const auto half = [](double p, double q) { return p / std::hypot(1, p) * std::atan(q / std::hypot(1, p)); };
+  const LightBench bench(
+      area(RectangleShape{}, translate({0, 0, 1.25}) * test::rotate_x(180) * test::scale(.8, .5, 1)));
+
+  expect_close(bench.irradiance({0, 0, 0}, {0, 0, 1}), 2 * (half(a, b) + half(b, a)));
+  EXPECT_EQ(bench.irradiance({0, 0, 3}, {0, 0, -1}).mean, 0) << "behind it";
+}
+
+TEST(Lights, DiskGivesPiSineSquared) {
+  for (const double height : {.05, 1., 300.}) {
+    const LightBench bench(area(DiskShape{}, translate({0, 0, height}) * test::rotate_x(180)));
+    const auto e = bench.irradiance({0, 0, 0}, {0, 0, 1}, height < 1 ? 512 : 128);
+    EXPECT_NEAR(e.mean, M_PI / (1 + height * height), 5 * e.se + M_PI / (1 + height * height) * 1e-5)
+        << height;
+  }
+}
+
+TEST(Lights, SphereGivesPiTimesTheSquareOfRadiusOverDistance) {
+  for (const double distance : {1.01, 2., 100., 1e5}) {
+    const LightBench bench(area(SphereShape{}, {}));
+    // At 1e5 radii directions are 1e-5 apart: their float32 rounding is 1e-2 of that, but cancels in the
+    // mean.
+    expect_close(bench.irradiance({0, 0, -distance}, {0, 0, 1}), M_PI / (distance * distance));
+  }
+}
+
+TEST(Lights, InsideAShiningSphereIrradianceIsPiEverywhere) {
+  const LightBench bench(area(SphereShape{}, {}, true));
+  // Uniform directions: the cosine's relative variance is 5/3 of its mean 1/4.
+  for (const V3d& x : {V3d(0, 0, 0), V3d(.3, -.5, .2), V3d(0, 0, -.999), V3d(0, 0, -1)}) {
+    expect_close(bench.irradiance(x, {0, 0, 1}, 256), M_PI);
+  }
+}
+
+TEST(Lights, MeshGivesTheIrradianceOfItsFaces) {
+  // A cube of half side .5, its lower face 1 above: only that face is turned towards the point.
+  const LightBench bench(area(CubeShape{}, translate({0, 0, 1.5}) * test::scale(.5)));
+  const double x = .5;
+  const auto e = bench.irradiance({0, 0, 0}, {0, 0, 1}, 512);
+  expect_close(e, 4 * x / std::hypot(1, x) * std::atan(x / std::hypot(1, x)));
+}
+
+TEST(Lights, SpotFallsOffLinearlyInTheAngle) {
+  SceneBuilder builder;
+  builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
+  builder.scene.emitters.push_back(SpotEmitter{{}, {2, 2, 2}, 30, 10, {}});
+  const LightBench bench(builder);
+  for (const double degrees : {0., 5., 9.9, 12., 20., 29., 31., 90.}) {
+    const double a = degrees * M_PI / 180, share = std::clamp((30 - degrees) / 20, 0., 1.);
+    const auto e =
+        bench.irradiance({3 * std::sin(a), 0, 3 * std::cos(a)}, V3(-std::sin(a), 0, -std::cos(a)), 2);
+    // The angle is the arc cosine of a float32: 2^-24 / sin(angle) off, against 20 degrees.
+    EXPECT_NEAR(e.mean, 2. / 9 * share, 2. / 9 * 2e-6) << degrees;
+  }
+}
+
+TEST(Lights, PointFollowsTheInverseSquareAtAllScales) {
+  for (const double d : {1e-4, 1., 1e4}) {
+    SceneBuilder builder;
+    builder.shape(RectangleShape{}, test::scale(d), builder.diffuse(.5));
+    builder.scene.emitters.push_back(PointEmitter{{0, 0, d}, {3, 3, 3}});
+    const LightBench bench(builder);
+    const double s = bench.world->geometry.scale;
+    EXPECT_NEAR(bench.irradiance({0, 0, 0}, {0, 0, 1}, 2).mean, 3 / (d * d), 3 / (d * d) * 1e-6) << s;
+  }
+}
+
+// The density that a hit claims is the one that a sample of the same point had.
+TEST(Lights, DensityOfAHitIsThatOfItsSample) {
+  struct Named {
+    const char* name;
+    SceneBuilder builder;
+    V3d x;
+  };
+  const Named all[] = {
+      {"rectangle", area(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1}},
+      {"disk", area(DiskShape{}, translate({0, 0, 2}) * test::rotate_x(160)), {.3, .2, -1}},
+      {"cube", area(CubeShape{}, translate({0, 0, 3})), {.3, .2, -1}},
+      {"sphere", area(SphereShape{}, translate({0, 0, 3})), {.3, .2, -1}},
+      {"distant sphere", area(SphereShape{}, translate({0, 0, 500})), {.3, .2, -1}},
+      {"inside of a sphere", area(SphereShape{}, {}, true), {.3, .2, -.4}},
+      {"inside of a cube", area(CubeShape{}, {}, true), {.3, .2, -.4}},
+      {"cylinder", area(CylinderShape{}, translate({0, 0, 3}) * test::rotate_x(70)), {.3, .2, -1}},
+      {"inside of a cylinder", area(CylinderShape{}, {}, true), {.3, .2, .4}},
+  };
+  for (const Named& n : all) {
+    const LightBench b(n.builder);
+    const V3 x = b.at(n.x);
+    RandomStream r(5);
+    int hits = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const float u = r.uniform(), v = r.uniform();
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
+      if (!s) continue;
+      const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
+      SurfaceHit hit;
+      if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;  // the rim
+      if (std::abs(hit.t - s->distance) > 1e-4f * s->distance + 1e-5f) continue;  // another face in front
+      const float cosine = std::abs(dot(hit.ng, s->direction));
+      if (cosine < .05f) continue;  // grazing: the light's offset moves the point along it
+      ++hits;
+      ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / cosine) << n.name;
+      ASSERT_EQ(b.world->lights.emitted(hit, -s->direction).x, 1.f) << n.name;
+    }
+    EXPECT_GT(hits, 300) << n.name;
+  }
+}
+
+// Two colours in the quarters of azimuth and polar angle: from a point on the equator's plane or below a pole
+// as much is seen of one as of the other.
+SceneBuilder checkered_sphere(bool flip) {
+  SceneBuilder builder = area(SphereShape{}, {}, flip);
+  const TextureIndex dark = builder.texture({.25, .25, .25}), bright = builder.texture({1.5, 1.5, 1.5});
+  builder.scene.textures.push_back(CheckerboardTexture{dark, bright, {}});
+  builder.scene.shapes[0].emitter->radiance = {static_cast<std::uint32_t>(builder.scene.textures.size() - 1)};
+  return builder;
+}
+
+TEST(Lights, ACheckeredSphereGivesTheMeanOfItsColours) {
+  const LightBench outside(checkered_sphere(false)), inside(checkered_sphere(true));
+  constexpr double kMean = (.25 + 1.5) / 2;
+  expect_close(outside.irradiance({0, 0, -3}, {0, 0, 1}, 256), kMean * M_PI / 9);
+  expect_close(outside.irradiance({0, 3, 0}, {0, -1, 0}, 256), kMean * M_PI / 9);
+  expect_close(inside.irradiance({0, 0, 0}, {0, 1, 0}, 256), kMean * M_PI);
+}
+
+TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
+  for (const bool flip : {false, true}) {
+    const LightBench b(checkered_sphere(flip));
+    const V3 x = b.at(flip ? V3d(.3, -.2, .4) : V3d(1.5, -.9, .8));
+    RandomStream r(9);
+    int same = 0, count = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const float u = r.uniform(), v = r.uniform();
+      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
+      SurfaceHit hit;
+      if (!s || !b.world->geometry.complete({PrimitiveId::Kind::sphere, 0}, x, s->direction, hit)) continue;
+      ++count;
+      same += s->radiance == b.world->lights.emitted(hit, -s->direction);
+    }
+    // Rounding may put a point on the other side of a colour's border, a share of 1e-6 of all.
+    EXPECT_GT(count, 1900);
+    EXPECT_GE(same, count - 2);
+  }
+}
+
+TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
+  SceneBuilder builder = area(RectangleShape{}, {});
+  constexpr int kLights = 20000;
+  for (int i = 1; i < kLights; ++i) {
+    const double power = 1 + i % 7;
+    builder.scene.emitters.push_back(PointEmitter{{0, 0, 1. * i / kLights}, {power, power, power}});
+  }
+  const LightBench b(builder);
+  const auto light_of = [&](std::uint64_t word) {
+    return b.world->lights.choose({static_cast<std::uint32_t>(word), 0, 0}).light;
+  };
+  const auto end_of = [&](std::uint32_t light, std::uint64_t from) {  // first word of the next light
+    std::uint64_t lo = from, hi = std::uint64_t{1} << 32;
+    while (lo < hi) {
+      const std::uint64_t mid = (lo + hi) / 2;
+      if (light_of(mid) <= light) {
+        lo = mid + 1;
+      } else {
+        hi = mid;
+      }
+    }
+    return lo;
+  };
+  std::uint64_t word = 0;
+  for (std::uint32_t i = 0; i < kLights; ++i) {
+    const LightChoice c = b.world->lights.choose({static_cast<std::uint32_t>(word), 0, 0});
+    ASSERT_EQ(c.light, i);
+    const std::uint64_t end = end_of(i, word);
+    ASSERT_FLOAT_EQ(c.probability, static_cast<float>(static_cast<double>(end - word) * 0x1p-32)) << i;
+    word = end;
+  }
+  EXPECT_EQ(word, std::uint64_t{1} << 32);
+}
+
+// CPU time of this thread alone, and as a multiple of another linear step's: neither the machine nor its load
+// matters.
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
+  SceneBuilder builder = area(RectangleShape{}, {});
+  constexpr int kShapes = 20000;
+  const Shape first = builder.scene.shapes[0];
+  for (int i = 1; i < kShapes; ++i) {
+    Shape s = first;
+    s.to_world = translate({1. * i, 0, 0});
+    builder.scene.shapes.push_back(s);
+  }
+  const double t0 = cpu_seconds();
+  auto geometry = Geometry::build(builder.scene, AssetLoader{builder.scene, builder.files});
+  const double t1 = cpu_seconds();
+  ASSERT_TRUE(geometry);
+  const auto textures = TextureTable::build(builder.scene, {});
+  ASSERT_TRUE(textures);
+  const double t2 = cpu_seconds();
+  const auto lights = Lights::build(builder.scene, *geometry, *textures);
+  const double t3 = cpu_seconds();
+  ASSERT_TRUE(lights);
+  EXPECT_EQ(lights->count(), static_cast<std::size_t>(kShapes));
+  EXPECT_LT(t3 - t2, 5 * (t1 - t0));
+}
+
+TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
+  const LightBench outside(area(SphereShape{}, {}, true)), inside(area(SphereShape{}, {}));
+  SurfaceHit hit;
+  const V3 from_out = outside.at({0, 0, -3}), from_in = inside.at({0, 0, .5});
+  ASSERT_TRUE(outside.world->geometry.complete({PrimitiveId::Kind::sphere, 0}, from_out, {0, 0, 1}, hit));
+  EXPECT_FALSE(outside.world->lights.sample(outside.world->lights.choose(numbers(0, .3f, .4f)), from_out));
+  EXPECT_EQ(outside.world->lights.pdf(hit, from_out, {0, 0, 1}), 0.f);
+  EXPECT_FALSE(inside.world->lights.sample(inside.world->lights.choose(numbers(0, .3f, .4f)), from_in));
+  EXPECT_EQ(inside.world->lights.pdf(hit, from_in, {0, 0, 1}), 0.f);
+}
+
+TEST(Lights, LightsWithoutPowerAreLeftOut) {
+  SceneBuilder builder = area(RectangleShape{}, {});
+  builder.scene.textures[0] = ConstantTexture{{0, 0, 0}};
+  builder.scene.emitters.push_back(PointEmitter{{0, 0, 1}, {0, 0, 0}});
+  const LightBench b(builder);
+  EXPECT_FALSE(b.world->lights.can_sample());
+  EXPECT_EQ(b.world->lights.left_out(), 2u);
+}
+
+}  // namespace
+}  // namespace ls::render

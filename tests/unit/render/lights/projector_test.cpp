@@ -1,0 +1,122 @@
+// The projector: Mitsuba 3's values, and what its image does on a wall.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/sky_builder.h"
+#include "tests/unit/render/light_bench.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+
+struct OracleRow {
+  FovAxis axis;
+  V3d p;
+  double value[3];
+};
+// emitter.sample_direction() of Mitsuba 3.9.1 (scalar_rgb) at these points, for the projector below.
+constexpr double kFov = 40, kScale = 3;
+const OracleRow kOracle[] = {
+    {FovAxis::x, {1.3, 2.1, 0}, {0.7532101, 0.376605, 0.09415126}},
+    {FovAxis::x, {1.9, 2.3, 0.5}, {0.9099139, 0.4549569, 0.1137392}},
+    {FovAxis::x, {1, 1.5, 1}, {3.012798, 0.6025596, 0.3012798}},
+    {FovAxis::x, {0.4, 2.4, 2}, {1.161528, 0.580764, 0.290382}},
+    {FovAxis::x, {2.2, 1.2, -1}, {1.287708, 0.2575416, 0.1287708}},
+    {FovAxis::x, {3.5, 3.5, -3}, {0.4351928, 0.2175964, 0.03626607}},
+    {FovAxis::x, {1, 2, 7}, {0, 0, 0}},
+    {FovAxis::x, {1.1, 3.7, 0}, {0, 0, 0}},
+    {FovAxis::y, {1.3, 2.1, 0}, {0.7532101, 0.376605, 0.09415126}},
+    {FovAxis::y, {1.9, 2.3, 0.5}, {0.9099139, 0.4549569, 0.1137392}},
+    {FovAxis::y, {1, 1.5, 1}, {3.012798, 0.6025596, 0.3012798}},
+    {FovAxis::y, {0.4, 2.4, 2}, {1.161528, 0.580764, 0.290382}},
+    {FovAxis::y, {2.2, 1.2, -1}, {1.287708, 0.2575416, 0.1287708}},
+    {FovAxis::y, {3.5, 3.5, -3}, {0.4351928, 0.2175964, 0.03626607}},
+    {FovAxis::y, {1, 2, 7}, {0, 0, 0}},
+    {FovAxis::y, {1.1, 3.7, 0}, {0.8036595, 0.4018297, 0.1004574}},
+    {FovAxis::diagonal, {1.3, 2.1, 0}, {0.7532101, 0.376605, 0.09415126}},
+    {FovAxis::diagonal, {1.9, 2.3, 0.5}, {0.9099139, 0.4549569, 0.1137392}},
+    {FovAxis::diagonal, {1, 1.5, 1}, {3.012798, 0.6025596, 0.3012798}},
+    {FovAxis::diagonal, {0.4, 2.4, 2}, {0, 0, 0}},
+    {FovAxis::diagonal, {2.2, 1.2, -1}, {1.287708, 0.2575416, 0.1287708}},
+    {FovAxis::diagonal, {3.5, 3.5, -3}, {0.4351928, 0.2175964, 0.03626607}},
+    {FovAxis::diagonal, {1, 2, 7}, {0, 0, 0}},
+    {FovAxis::diagonal, {1.1, 3.7, 0}, {0, 0, 0}},
+};
+
+// 3 x 2 texels: (1 + x + 3 y, (x + 1) / 2, (y + 1) / 4).
+test::SkyImage image() {
+  test::SkyImage s(3, 2);
+  for (int y = 0; y < 2; ++y)
+    for (int x = 0; x < 3; ++x) s.set(x, y, {1. + x + 3 * y, .5 * (x + 1), .25 * (y + 1)});
+  return s;
+}
+SceneBuilder projecting(const test::SkyImage& s, const ProjectorEmitter& how, double size = 1) {
+  SceneBuilder builder;
+  BitmapTexture t;
+  t.file = test::add_image(builder, s);
+  t.filter = TextureFilter::nearest;
+  ProjectorEmitter e = how;
+  e.irradiance = SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(t));
+  builder.scene.emitters.push_back(e);
+  builder.shape(RectangleShape{}, test::scale(size), builder.diffuse(.5));
+  return builder;
+}
+C3 arriving(const LightBench& b, const V3d& p) {
+  const auto s = b.world->lights.sample(b.world->lights.choose(numbers(.5f, .5f, .5f)), b.at(p));
+  return s ? s->radiance / s->pdf : C3(0);
+}
+
+TEST(Projector, ArrivesAsInMitsuba) {
+  for (const double size : {.01, 1., 300.})  // of the scene, and so of its units
+    for (const OracleRow& row : kOracle) {
+      ProjectorEmitter e;
+      e.to_world = test::look_at({1, 2, 5}, {1.5, 2, 0}, {0, 1, 0});
+      e.fov = kFov;
+      e.fov_axis = row.axis;
+      e.scale = kScale;
+      const LightBench b(projecting(image(), e, size));
+      const C3 got = arriving(b, row.p);
+      // Float32 on both sides: 1e-7 of the distance to the texels' edges is far from any of these points.
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], row.value[c], 3e-6 * row.value[c]) << row.p.x;
+    }
+}
+
+TEST(Projector, LightsAPlaneAsTheImageIs) {
+  ProjectorEmitter e;
+  e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});
+  e.fov = 90;
+  test::SkyImage grey(1, 1, .25f);
+  const LightBench b(projecting(grey, e));
+  for (const double distance : {.5, 1., 8.})
+    for (const double x : {-.9, 0., .6})
+      for (const double y : {-.3, .95}) {
+        const auto at = b.irradiance(V3d(x, y, 1) * distance, {0, 0, -1}, 2);
+        EXPECT_NEAR(at.mean, M_PI / 4 / (distance * distance), 1e-6 * M_PI / 4 / (distance * distance));
+      }
+  EXPECT_EQ(arriving(b, {1.01, 0, 1}), C3(0));
+  EXPECT_EQ(arriving(b, {0, 0, -1}), C3(0)) << "behind it";
+  EXPECT_EQ(arriving(b, {0, 0, 0}), C3(0)) << "in it";
+}
+
+TEST(Projector, StandsUpright) {
+  ProjectorEmitter e;
+  e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});  // its left is +x
+  e.fov = 90;
+  test::SkyImage corner(2, 2);
+  corner.set(0, 0, {1, 1, 1});
+  const LightBench b(projecting(corner, e));
+  EXPECT_GT(arriving(b, {.5, .5, 1}).x, 0) << "the upper left corner";
+  EXPECT_EQ(arriving(b, {-.5, .5, 1}), C3(0));
+  EXPECT_EQ(arriving(b, {.5, -.5, 1}), C3(0));
+}
+
+TEST(Projector, OfABlackImageIsLeftOut) {
+  const LightBench b(projecting(test::SkyImage(2, 2), ProjectorEmitter{}));
+  EXPECT_FALSE(b.world->lights.can_sample());
+  EXPECT_EQ(b.world->lights.left_out(), 1u);
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,268 @@
+// Light given off by media, against closed forms and quadrature.
+#include "worker/render/media/emission.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "tests/unit/render/grids.h"
+#include "worker/render/math/blackbody.h"
+
+namespace ls::render {
+namespace {
+
+constexpr C3 kEmission{1, 2.5f, .25f};
+
+Medium homogeneous(const C3& sigma) {
+  Medium m;
+  m.sigma_t = sigma;
+  m.emission_kind = EmissionKind::per_length;
+  m.emission = kEmission;
+  return m;
+}
+Medium of_grid(const Grid& density, const C3& sigma, EmissionKind emission_kind,
+               const C3& emission = kEmission) {
+  Medium m;
+  m.grid = true;
+  m.density = &density;
+  m.sigma_t = sigma;
+  m.emission_kind = emission_kind;
+  m.emission = emission;
+  return m;
+}
+void emit(Medium& m, const Grid& g) { m.emitter = {&g, &g, &g}; }
+
+TEST(MediumEmission, WithoutExtinctionIsEmissionTimesLength) {
+  const C3 light = emission_of_length(homogeneous(C3(0)), 3.5f);
+
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(light[c], kEmission[c] * 3.5f);
+}
+
+// STABILITY N2, N67: e L (1 - tau/2 + tau^2/6 - ...), where 1 - e^-tau of float32 is 0.
+TEST(MediumEmission, OfThinMediaHasFullPrecision) {
+  for (const double tau : {1e-30, 1e-12, 1e-9, 1e-6, 1e-3}) {
+    const C3 light = emission_of_length(homogeneous(C3(static_cast<float>(tau / 2))), 2);
+    const double expected = 2 * (1 - tau / 2 + tau * tau / 6);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c] / (kEmission[c] * expected), 1, 0x1p-22) << tau;
+  }
+}
+
+TEST(MediumEmission, OfOpaqueAndEndlessMediaIsEmissionOverExtinction) {
+  for (const float s : {1e-3f, 1.f, 1e20f}) {
+    const C3 light = emission_of_length(homogeneous(C3(s)), kInfinity);
+    for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(light[c], kEmission[c] / s);
+  }
+  EXPECT_FLOAT_EQ(emission_of_length(homogeneous(C3(1e20f)), 5).x, kEmission.x / 1e20f);
+  Medium half = homogeneous(C3(0));
+  half.emission = C3(1, 0, 0);
+  const C3 light = emission_of_length(half, kInfinity);
+  EXPECT_TRUE(std::isinf(light.x));  // light without end: the sample is rejected, and counted
+  EXPECT_EQ(light.y, 0);
+}
+
+// Every random number gives the closed form, per channel.
+TEST(MediumEmission, OfAConstantGridIsThatOfAHomogeneousMedium) {
+  const Grid one = voxel_grid({3, 3, 3}, std::vector<float>(27, 1), kTrilinear, Wrap::clamp);
+  for (const C3& sigma : {C3(0), C3(.3f), C3(0, 1, 16), C3(1e-9f, 1e3f, 1e9f)}) {
+    // In its cells of 4 voxels some of these are tracked and some followed exactly.
+    const Medium m = of_grid(one, sigma, EmissionKind::per_length);
+    const C3 expected = emission_of_length(homogeneous(sigma), 3);
+    for (int i = 0; i < 50; ++i) {
+      // From face to face: [-1/2, 5/2].
+      const C3 light = emission_of_grid(m, {-.5f, 1, 1}, {1, 0, 0}, 3, RandomStream(mix64(i)));
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(light[c] / expected[c], 1, 1e-5) << sigma << " " << c;
+    }
+  }
+}
+
+TEST(MediumEmission, PerLengthGoesOnAroundTheDensity) {
+  const Grid one = voxel_grid({3, 3, 3}, std::vector<float>(27, 1), kTrilinear, Wrap::clamp);
+  const Medium m = of_grid(one, C3(.5f), EmissionKind::per_length);
+
+  const C3 light = emission_of_grid(m, {-2.5f, 1, 1}, {1, 0, 0}, 10, RandomStream(1));
+
+  // 2 in front, 3 within, 5 behind.
+  const double through = std::exp(-1.5), within = (1 - through) / .5;
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c] / (kEmission[c] * (2 + within + 5 * through)), 1, 1e-5);
+}
+
+// Nothing is absorbed: the integral of the grid itself, without noise.
+TEST(MediumEmission, OfAGridInClearAirIsItsIntegral) {
+  const Grid none = unit_grid({2, 2, 2}, std::vector<float>(8, 0));
+  const Grid fire = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 3, true));
+  Medium m = of_grid(none, C3(1), EmissionKind::per_length);
+  emit(m, fire);
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  const double expected = fire.exact_integral(V3d(o), V3d(d), 0, 30);
+  ASSERT_GT(expected, .5);
+
+  for (int i = 0; i < 20; ++i) {
+    const C3 light = emission_of_grid(m, o, d, 30, RandomStream(mix64(i)));
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(light[c] / (kEmission[c] * expected), 1, 1e-5);
+  }
+}
+
+struct Mean {
+  double mean[3], error[3];
+};
+Mean mean_of(const Medium& m, const V3& o, const V3& d, int n) {
+  double sum[3] = {}, square[3] = {};
+  for (int i = 0; i < n; ++i) {
+    const C3 light = emission_of_grid(m, o, d, 40, RandomStream(mix64(i)));
+    for (int c = 0; c < 3; ++c) {
+      sum[c] += light[c];
+      square[c] += double{light[c]} * light[c];
+    }
+  }
+  Mean r{};
+  for (int c = 0; c < 3; ++c) {
+    r.mean[c] = sum[c] / n;
+    r.error[c] = std::sqrt(std::max(0., square[c] / n - r.mean[c] * r.mean[c]) / n);
+  }
+  return r;
+}
+
+// A source of one radiance B everywhere: B times what is not let through, whatever the density. Means within
+// 5 standard errors (6e-7 a check, 24 checks), and float32's rounding of 40 steps.
+TEST(MediumEmission, OfAnIsothermalGridIsWhatItDoesNotLetThrough) {
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  for (const bool sparse : {false, true})
+    for (const C3& sigma : {C3(.3f), C3(0, .3f, 6), C3(1e3f), C3(.1f, 1e2f, 1e7f)}) {
+      const Grid g = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, sparse), 0, max_component(sigma));
+      const Medium m = of_grid(g, sigma, EmissionKind::per_absorption);
+      const double depth = g.exact_integral(V3d(o), V3d(d), 0, 30);
+      const Mean r = mean_of(m, o, d, 4000);
+      for (int c = 0; c < 3; ++c) {
+        const double expected = kEmission[c] * -std::expm1(-sigma[c] * depth);
+        EXPECT_NEAR(r.mean[c], expected, 5 * r.error[c] + 40 * 0x1p-23 * expected) << sigma << " " << c;
+        // All the noise there is comes from roulette, where next to nothing is let through.
+        EXPECT_LE(r.error[c], 1e-4 * expected) << sigma << " " << c;
+      }
+    }
+}
+
+// Integral of e(t) exp(-sigma integral of rho), by Simpson's rule on fine steps.
+double quadrature(const Grid& density, double sigma, const std::function<double(const V3&)>& e, const V3& o,
+                  const V3& d, double length) {
+  constexpr int kSteps = 20000;
+  const double h = length / kSteps;
+  double sum = 0, depth = 0;
+  const auto rho = [&](double t) {
+    const V3 q = density.to_index(o + d * static_cast<float>(t));
+    for (int k = 0; k < 3; ++k)
+      if (q[k] < density.domain_lo()[k] || q[k] > density.domain_hi()[k]) return 0.;
+    return static_cast<double>(density.value_anywhere(q));
+  };
+  for (int i = 0; i < kSteps; ++i) {
+    const double t = i * h, a = rho(t), b = rho(t + h / 2), c = rho(t + h);
+    const auto at = [&](double x) { return e(o + d * static_cast<float>(x)); };
+    const double half = depth + h / 24 * (5 * a + 8 * b - c), full = depth + h / 6 * (a + 4 * b + c);
+    sum += h / 6 *
+           (at(t) * std::exp(-sigma * depth) + 4 * at(t + h / 2) * std::exp(-sigma * half) +
+            at(t + h) * std::exp(-sigma * full));
+    depth = full;
+  }
+  return sum;
+}
+
+// Grids of different places and sizes, channels of different depths. 5 standard errors and 1e-3 of the
+// quadrature, whose steps end beside the voxels.
+TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
+  const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, true), 0, 3);
+  const Affine finer = Affine::scale_translate(1.7, V3d(1, 2, 1.5));
+  const Grid fire({11, 8, 9}, random_values({11, 8, 9}, 8), finer, V3d(0), V3d(10, 7, 8), 1);
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  const auto inside = [&](const Grid& g, const V3& p) {
+    const V3 q = g.to_index(p);
+    for (int k = 0; k < 3; ++k)
+      if (q[k] < g.domain_lo()[k] || q[k] > g.domain_hi()[k]) return 0.;
+    return static_cast<double>(g.value_anywhere(q));
+  };
+  const C3 sigma(.2f, 1, 6);
+  for (const EmissionKind emission_kind :
+       {EmissionKind::per_length, EmissionKind::per_absorption, EmissionKind::black_body}) {
+    Medium m = of_grid(density, sigma, emission_kind);
+    m.sigma_s = sigma * .4f;
+    m.absorbing = C3(.6f);
+    m.kelvin_scale = 3000;
+    m.kelvin_offset = 500;
+    emit(m, fire);
+    const Mean r = mean_of(m, o, d, 20000);
+    for (int c = 0; c < 3; ++c) {
+      const double absorption = .6 * sigma[c];
+      const auto e = [&](const V3& p) {
+        const double value = inside(fire, p), rho = inside(density, p);
+        switch (emission_kind) {
+          case EmissionKind::per_length:
+            return kEmission[c] * value;
+          case EmissionKind::black_body:
+            return value > 0 ? kEmission[c] * absorption * rho *
+                                   black_body_radiance(static_cast<float>(500 + 3000 * value))[c]
+                             : 0.;
+          default:
+            return kEmission[c] * absorption * rho * value;
+        }
+      };
+      const double expected = quadrature(density, sigma[c], e, o, d, 25);
+      ASSERT_GT(expected, 0);
+      EXPECT_NEAR(r.mean[c], expected, 5 * r.error[c] + 1e-3 * expected)
+          << static_cast<int>(emission_kind) << " " << c;
+      EXPECT_LE(r.error[c], .01 * expected) << static_cast<int>(emission_kind) << " " << c;
+    }
+  }
+}
+
+TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
+  const Grid density = voxel_grid({7, 7, 7}, random_values({7, 7, 7}, 5), kNearest, Wrap::clamp, 3);
+  const Medium m = of_grid(density, C3(1), EmissionKind::per_absorption);
+  const V3 o(-1, 1.3f, 1.1f), d = normalize(V3(9, 3.1f, 4.2f));
+
+  const Mean r = mean_of(m, o, d, 4000);
+
+  const double expected = -std::expm1(-density.exact_integral(V3d(o), V3d(d), 0, 30));
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(r.mean[c] / kEmission[c], expected, 5 * r.error[c] + 1e-5);
+}
+
+TEST(MediumEmission, OfRaysThatAreNoneIsDark) {
+  const Grid g = unit_grid({3, 3, 3}, random_values({3, 3, 3}, 5));
+  const Medium m = of_grid(g, C3(1), EmissionKind::per_absorption);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(emission_of_grid(m, {nan, 0, 0}, {1, 0, 0}, 5, RandomStream(1)), C3(0));
+  EXPECT_EQ(emission_of_grid(m, {0, 0, 0}, {nan, 0, 0}, kInfinity, RandomStream(1)), C3(0));
+  EXPECT_EQ(emission_of_grid(m, {0, 9, 0}, {1, 0, 0}, kInfinity, RandomStream(1)), C3(0));
+}
+
+// CIE 15: illuminant A is a black body of 2856 K with x = .44758, y = .40745; the candela was once a sixtieth
+// of a square centimetre of platinum at its freezing point, 2041.4 K: 600,000 cd/m^2 within half a per cent,
+// with 683 lm/W at 555 nm and an observer whose y integrates to 106.857 nm.
+TEST(BlackBody, HasTheColourAndLuminanceOfItsTemperature) {
+  const auto luminance = [](const C3& c) {
+    return .212639005871510 * c.x + .715168678767756 * c.y + .072192315360734 * c.z;
+  };
+  const C3 a = black_body_radiance(2856);
+  // x, y of linear sRGB by the primaries' own matrix.
+  const double x = .412390799265959 * a.x + .357584339383878 * a.y + .180480788401834 * a.z, y = luminance(a),
+               z = .019330818715592 * a.x + .119194779794626 * a.y + .950532152249661 * a.z;
+  EXPECT_NEAR(x / (x + y + z), .44758, 2e-4);
+  EXPECT_NEAR(y / (x + y + z), .40745, 2e-4);
+  // Its blue is outside of sRGB and made 0, which adds less than .1 % of the luminance.
+  EXPECT_NEAR(luminance(black_body_radiance(2041.4f)) * 683.002 * 106.857 / 600000, 1, .006);
+}
+
+TEST(BlackBody, IsDarkWhereItIsColdAndNeverMoreThanRayleighAndJeans) {
+  for (const float t : {-5.f, 0.f, 199.f, -kInfinity, std::numeric_limits<float>::quiet_NaN()})
+    EXPECT_EQ(black_body_radiance(t), C3(0)) << t;
+  float before = 0;
+  for (float t = 200; t < 1e7f; t *= 1.07f) {
+    const C3 c = black_body_radiance(t);
+    EXPECT_TRUE(is_finite(c)) << t;
+    EXPECT_GE(c.x, before) << t;
+    before = c.x;
+  }
+  const C3 hot = black_body_radiance(1e6f), hotter = black_body_radiance(4e6f);
+  for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(hotter[c], 4 * hot[c]);
+}
+
+}  // namespace
+}  // namespace ls::render

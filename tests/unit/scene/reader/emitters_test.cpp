@@ -1,0 +1,110 @@
+// Lights as they are read: what is our own, what follows from what, what is refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/reader/xml_write.h"
+#include "tests/unit/scene/scene_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+template <class T>
+T emitter(const std::string& parameters, const std::string& type) {
+  const Scene s = must_read(with_sensor("<emitter type=\"" + type + "\">" + parameters + "</emitter>"));
+  return std::get<T>(s.emitters.at(0));
+}
+AreaEmitter area(const std::string& parameters) {
+  return *must_read(
+              with_sensor("<shape type=\"disk\"><emitter type=\"area\">" + parameters + "</emitter></shape>"))
+              .shapes.at(0)
+              .emitter;
+}
+std::string refusal(const std::string& objects) {
+  const ReadResult r = read(with_sensor(objects));
+  return r.scene ? "" : messages(r);
+}
+std::string float_named(const std::string& name, const std::string& value) {
+  return "<float name=\"" + name + "\" value=\"" + value + "\"/>";
+}
+
+TEST(Emitters, ASunHasAnAngularRadius) {
+  EXPECT_EQ(emitter<DirectionalEmitter>("", "directional").angular_radius, 0);
+  EXPECT_EQ(emitter<DirectionalEmitter>(float_named("angular_radius", ".267"), "directional").angular_radius,
+            .267);
+  EXPECT_THAT(refusal("<emitter type=\"directional\">" + float_named("angular_radius", "91") + "</emitter>"),
+              HasSubstr("out of its range 0 <= angular_radius <= 90"));
+}
+
+TEST(Emitters, AnAreaLightMayBeABeam) {
+  const AreaEmitter plain = area("");
+  EXPECT_EQ(plain.cutoff_angle, 90);
+  EXPECT_EQ(plain.beam_width, 90);
+  const AreaEmitter cut = area(float_named("cutoff_angle", "40")),
+                    both = area(float_named("cutoff_angle", "40") + float_named("beam_width", "10") +
+                                float_named("falloff", "2.5"));
+  EXPECT_EQ(cut.beam_width, 30);
+  EXPECT_EQ(both.beam_width, 10);
+  EXPECT_EQ(both.falloff, 2.5);
+  EXPECT_EQ(area(float_named("beam_width", "10")).cutoff_angle, 90);
+  const auto refused = [](const std::string& p) {
+    return refusal("<shape type=\"disk\"><emitter type=\"area\">" + p + "</emitter></shape>");
+  };
+  EXPECT_THAT(refused(float_named("cutoff_angle", "40") + float_named("beam_width", "50")),
+              HasSubstr("beam_width 50 is wider than cutoff_angle 40"));
+  EXPECT_THAT(refused(float_named("falloff", "2")), HasSubstr("'falloff' of emitter \"area\" lies between"));
+  EXPECT_THAT(refused(float_named("cutoff_angle", "120")), HasSubstr("out of its range"));
+}
+
+TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
+  const std::string disk = "<shape type=\"disk\"><emitter type=\"area\">", end = "</emitter></shape>";
+  const auto written = [](const std::string& objects) { return write_xml(must_read(with_sensor(objects))); };
+  const std::string plain = written(disk + end + "<emitter type=\"directional\"/>");
+  for (const char* name : {"angular_radius", "cutoff_angle", "beam_width", "falloff"})
+    EXPECT_THAT(plain, Not(HasSubstr(name)));
+  const std::string own =
+      written(disk + float_named("cutoff_angle", "30") + float_named("falloff", "3") + end +
+              "<emitter type=\"directional\">" + float_named("angular_radius", "5") + "</emitter>");
+  for (const char* name : {"angular_radius", "cutoff_angle", "beam_width", "falloff"})
+    EXPECT_THAT(own, HasSubstr(name));
+  EXPECT_EQ(must_read(own),
+            must_read(written(disk + float_named("cutoff_angle", "30") + float_named("falloff", "3") + end +
+                              "<emitter type=\"directional\">" + float_named("angular_radius", "5") +
+                              "</emitter>")));
+}
+
+const std::string kImage =
+    "<texture type=\"bitmap\" name=\"irradiance\"><string name=\"filename\" value=\"wood.png\"/></texture>";
+
+TEST(Emitters, AProjectorIsGivenAsACamera) {
+  const auto plain = emitter<ProjectorEmitter>(kImage, "projector");
+  EXPECT_EQ(plain.scale, 1);
+  EXPECT_EQ(plain.fov_axis, FovAxis::diagonal) << "50 mm, over the diagonal of 36 mm x 24 mm";
+  EXPECT_NEAR(plain.fov, 46.7930, 1e-3);
+  const auto given =
+      emitter<ProjectorEmitter>(kImage + float_named("fov", "30") + float_named("scale", "15") +
+                                    "<string name=\"fov_axis\" value=\"smaller\"/>",
+                                "projector");
+  EXPECT_EQ(given.fov, 30);
+  EXPECT_EQ(given.fov_axis, FovAxis::smaller);
+  EXPECT_EQ(given.scale, 15);
+  const Scene s = must_read(
+      with_sensor("<emitter type=\"projector\">" + kImage + float_named("fov", "30") + "</emitter>"));
+  EXPECT_EQ(must_read(write_xml(s)), s);
+  EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
+}
+
+TEST(Emitters, AProjectorNeedsAnImageAndIsNotStretched) {
+  EXPECT_THAT(refusal("<emitter type=\"projector\"/>"), HasSubstr("needs 'irradiance'"));
+  EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage +
+                      "<transform name=\"to_world\"><scale value=\"2\"/></transform></emitter>"),
+              HasSubstr("to_world of a projector may only move, turn and mirror"));
+  EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage + float_named("fov", "30") +
+                      "<string name=\"focal_length\" value=\"50mm\"/></emitter>"),
+              HasSubstr("gives both fov and focal_length"));
+}
+
+}  // namespace
+}  // namespace ls

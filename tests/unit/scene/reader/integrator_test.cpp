@@ -1,0 +1,55 @@
+// What a scene says of its integrator beyond its name, there and back.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/reader/xml_write.h"
+#include "tests/unit/scene/scene_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string integrator(const std::string& type, const std::string& inside) {
+  return with_sensor("<integrator type=\"" + type + "\">" + inside + "</integrator>");
+}
+
+TEST(Integrator, OfDistantMisHasItsSettingsThereAndBack) {
+  const IntegratorSettings plain = must_read(integrator("volpath_distant_mis", "")).integrator;
+  EXPECT_EQ(plain.distance, DistanceSampling::mis);
+  EXPECT_EQ(plain.heuristic, MisHeuristic::power);
+  const Scene s = must_read(
+      integrator("volpath_distant_mis",
+                 "<string name=\"distance\" value=\"equiangular\"/>"
+                 "<string name=\"heuristic\" value=\"balance\"/><integer name=\"max_depth\" value=\"3\"/>"));
+  EXPECT_EQ(s.integrator.distance, DistanceSampling::equiangular);
+  EXPECT_EQ(s.integrator.heuristic, MisHeuristic::balance);
+  EXPECT_EQ(s.integrator.max_depth, 3);
+  EXPECT_EQ(serialize(must_read(write_xml(s))), serialize(s));
+  EXPECT_NE(
+      digest_of(s),
+      digest_of(must_read(integrator("volpath_distant_mis", "<integer name=\"max_depth\" value=\"3\"/>"))));
+}
+
+TEST(Integrator, OfAnyOtherNameRefusesWhatItWouldIgnore) {
+  for (const char* type : {"volpath", "path", "volpathmis"}) {
+    for (const char* name : {"distance", "heuristic"}) {
+      const auto r = read(integrator(type, std::string("<string name=\"") + name + "\" value=\"mis\"/>"));
+      EXPECT_FALSE(r.scene);
+      ASSERT_FALSE(r.diagnostics.empty());
+      EXPECT_EQ(r.diagnostics[0].place.line, 2);
+      EXPECT_THAT(r.diagnostics[0].text,
+                  HasSubstr("a parameter of the integrator \"volpath_distant_mis\" alone"));
+    }
+    EXPECT_THAT(write_xml(must_read(integrator(type, ""))), ::testing::Not(HasSubstr("\"distance\"")));
+  }
+}
+
+TEST(Integrator, NamesTheSettingsThatThereAre) {
+  const auto r = read(integrator("volpath_distant_mis", "<string name=\"distance\" value=\"equi\"/>"));
+  EXPECT_FALSE(r.scene);
+  EXPECT_THAT(messages(r), HasSubstr("equiangular"));
+}
+
+}  // namespace
+}  // namespace ls

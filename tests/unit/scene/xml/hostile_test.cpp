@@ -1,0 +1,247 @@
+// Scene text from strangers: bounded work, bounded memory, always an answer.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/scene/limits.h"
+#include "common/scene/xml/source_text.h"
+#include "tests/unit/scene/nori_testing.h"
+#include "tests/unit/scene/scene_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string first(const ReadResult& r) { return r.diagnostics.empty() ? "" : r.diagnostics[0].text; }
+
+TEST(HostileScenes, AnIncludeOfItselfIsRefused) {
+  MemoryAssets assets;
+  assets.files["a.xml"] = "<scene version=\"3.0.0\"><include filename=\"a.xml\"/></scene>";
+  const auto r = read_scene("main.xml", with_sensor("<include filename=\"a.xml\"/>"), assets);
+  EXPECT_FALSE(r.scene);
+  EXPECT_THAT(first(r), HasSubstr("includes itself"));
+  EXPECT_EQ(r.diagnostics[0].place, (SourcePlace{"a.xml", 1, 43}));
+}
+
+TEST(HostileScenes, IncludesThatMultiplyAreRefusedEarly) {
+  MemoryAssets assets;
+  for (int i = 0; i < 14; ++i) {
+    std::string twice = fmt::format("<include filename=\"{}.xml\"/>", i + 1);
+    assets.files[fmt::format("{}.xml", i)] = "<scene version=\"3.0.0\">" + twice + twice + "</scene>";
+  }
+  assets.files["14.xml"] = "<scene version=\"3.0.0\"><shape type=\"cube\"/></scene>";
+  const auto r = read_scene("main.xml", with_sensor("<include filename=\"0.xml\"/>"), assets);
+  EXPECT_FALSE(r.scene);
+  EXPECT_THAT(first(r), HasSubstr("includes are limited"));
+  EXPECT_LE(assets.reads, 10 * scene::kMaxIncludes);
+}
+
+TEST(HostileScenes, IncludesAreNotFollowedForever) {
+  MemoryAssets assets;
+  for (int i = 0; i < 40; ++i)
+    assets.files[fmt::format("{}.xml", i)] =
+        fmt::format("<scene version=\"3.0.0\"><include filename=\"{}.xml\"/></scene>", i + 1);
+  EXPECT_THAT(first(read_scene("main.xml", with_sensor("<include filename=\"0.xml\"/>"), assets)),
+              HasSubstr("includes are limited"));
+}
+
+TEST(HostileScenes, IncludedBytesAreCountedTogether) {
+  MemoryAssets assets;
+  assets.files["big.xml"] =
+      "<scene version=\"3.0.0\">" + std::string(scene::kMaxTextBytes - 100, ' ') + "</scene>";
+  std::string many;
+  for (int i = 0; i < 4; ++i) many += "<include filename=\"big.xml\"/>";
+  EXPECT_THAT(first(read_scene("main.xml", with_sensor(many), assets)), HasSubstr("limited to"));
+}
+
+TEST(HostileScenes, EntitiesAreNotExpanded) {
+  const auto r = read(
+      "<!DOCTYPE s [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><scene version=\"3.0.0\"><shape "
+      "type=\"&b;\"/>" +
+      kSensor + "</scene>");
+  EXPECT_THAT(first(r), HasSubstr("there is no shape \"&b;\""));
+}
+
+TEST(HostileScenes, ParametersDoNotMultiply) {
+  std::string text = "<scene version=\"3.0.0\"><default name=\"a\" value=\"aaaaaaaaaa\"/>";
+  for (char c = 'b'; c <= 'k'; ++c) {
+    std::string tenfold;
+    for (int i = 0; i < 10; ++i) tenfold += fmt::format("${}", static_cast<char>(c - 1));
+    text += fmt::format("<default name=\"{}\" value=\"{}\"/>", c, tenfold);
+  }
+  EXPECT_THAT(first(read(text + kSensor + "</scene>")), HasSubstr("longer than"));
+}
+
+TEST(HostileScenes, AnOversizedFileIsRefused) {
+  const auto r = read(std::string(scene::kMaxTextBytes + 1, ' '));
+  EXPECT_THAT(first(r), HasSubstr("limited to 32 MiB"));
+}
+
+TEST(HostileScenes, TooManyElementsAreRefused) {
+  std::string text = "<scene version=\"3.0.0\">";
+  for (std::size_t i = 0; i <= scene::kMaxElements; ++i) text += "<a/>";
+  EXPECT_THAT(first(read(text + "</scene>")), HasSubstr("more than 500000 elements"));
+}
+
+TEST(HostileScenes, AnElementWithCountlessAttributesIsRefused) {
+  std::string text = "<shape type=\"cube\"";
+  for (int i = 0; i < 1'000'000; ++i) text += fmt::format(" a{}=\"\"", i);
+  EXPECT_THAT(first(read(with_sensor(text + "/>"))), HasSubstr("<shape> has more than 32 attributes"));
+}
+
+// Compared with every id, and each pair of names letter by letter, these would take days.
+TEST(HostileScenes, ManyUnresolvedReferencesBesideManyIdsAreSoonAnswered) {
+  const std::string filler(40, 'y');
+  std::string text;
+  for (int i = 0; i < 150'000; ++i) text += fmt::format("<bsdf type=\"null\" id=\"{}{}\"/>", filler, i);
+  text += "<bsdf type=\"twosided\">";
+  for (int i = 0; i < 150'000; ++i) text += fmt::format("<ref id=\"{}{}\"/>", std::string(40, 'x'), i);
+  const auto r = read(with_sensor(text + "</bsdf>"));
+  EXPECT_EQ(r.diagnostics.size(), scene::kMaxDiagnostics);
+  EXPECT_THAT(first(r), HasSubstr("no object has the id \"xxx"));
+}
+
+// The same in references of objects within objects, which are resolved when they are converted.
+TEST(HostileScenes, AFullReportEndsReadingWithinAnObject) {
+  const std::string filler(40, 'y');
+  std::string text, open, close;
+  for (int i = 0; i < 100'000; ++i) text += fmt::format("<bsdf type=\"null\" id=\"{}{}\"/>", filler, i);
+  text += "<shape type=\"cube\">";
+  for (int i = 0; i < 100'000; ++i)
+    text += fmt::format("<bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"{}{}\"/></bsdf>",
+                        std::string(40, 'x'), i);
+  EXPECT_LE(read(with_sensor(text + "</shape>")).diagnostics.size(), scene::kMaxDiagnostics);
+}
+
+TEST(HostileScenes, PlacesInOneLongLineAreNotCountedOutForWarningsThatAreNotShown) {
+  std::string text = std::string(std::size_t{12} << 20, ' ') + kSensor;
+  for (int i = 0; i < 300'000; ++i) text += "<sensor type=\"perspective\"/>";
+  const auto r = read("<scene version=\"3.0.0\">" + text + "</scene>");
+  EXPECT_TRUE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), scene::kMaxDiagnostics);
+  EXPECT_THAT(first(r), HasSubstr("a second sensor; the first (line 1) is used"));
+}
+
+TEST(HostileScenes, ALongRunAfterADollarIsNotTriedPrefixByPrefix) {
+  std::string text = "<default name=\"a\" value=\"\"/>";
+  const std::string run(65'000, 'a');
+  for (int i = 0; i < 450; ++i) text += "<bsdf type=\"null\" id=\"$" + run + "\"/>";
+  EXPECT_THAT(first(read(with_sensor(text))), HasSubstr("is given twice"));
+}
+
+// Each compared with all before it, these would take half an hour.
+TEST(HostileScenes, ANoriObjectOfCountlessElementsIsRefusedBeforeAnyIsLookedAt) {
+  std::string text = "<mesh type=\"sphere\">";
+  for (int i = 0; i < 400'000; ++i) text += fmt::format("<float name=\"a{}\" value=\"1\"/>", i);
+  const auto r = read(nori_scene(text + "</mesh>"));
+  EXPECT_FALSE(r.scene);
+  ASSERT_EQ(r.diagnostics.size(), 1u);  // of none of the elements
+  EXPECT_THAT(first(r), HasSubstr("mesh \"sphere\" has 400000 elements in it; 4096 are allowed"));
+}
+
+TEST(HostileScenes, NamesOfParametersAreBounded) {
+  const std::string name(scene::kMaxParameterNameBytes + 1, 'a');
+  EXPECT_THAT(first(read(with_sensor("<default name=\"" + name + "\" value=\"1\"/>"))),
+              HasSubstr("longer than 128 bytes"));
+  EXPECT_TRUE(read(with_sensor("<default name=\"" + name.substr(1) +
+                               "\" value=\"1\"/><bsdf type=\"null\" id=\"$" + name.substr(1) + "\"/>"))
+                  .scene);
+}
+
+TEST(HostileScenes, CountlessDefinesThatNothingAsksForAreSoonToldOf) {
+  std::map<std::string, std::string> defines;
+  std::string text;
+  for (int i = 0; i < 2000; ++i) {
+    defines[fmt::format("{}{}", std::string(58, 'x'), i)] = "1";
+    text += fmt::format("<default name=\"{}{}\" value=\"\"/>", std::string(58, 'y'), i);
+  }
+  const auto r = read(with_sensor(text), {.defines = defines});
+  EXPECT_TRUE(r.scene);
+  EXPECT_EQ(r.diagnostics.size(), scene::kMaxDiagnostics);
+}
+
+TEST(HostileScenes, AnIndexOfLinesStaysSmallBesideATextOfEmptyLines) {
+  const std::size_t size = std::size_t{1} << 20;
+  const scene::SourceText text("t", std::string(size, '\n'));
+  EXPECT_EQ(text.line(size - 1), static_cast<int>(size));
+  EXPECT_LT(text.index_bytes(), size / 512);
+}
+
+TEST(HostileScenes, LongChainsOfReferencesAreRefused) {
+  std::string chain;
+  for (int i = 0; i < 5000; ++i)
+    chain += fmt::format(
+        "<texture type=\"checkerboard\" id=\"t{}\"><ref name=\"color0\" id=\"t{}\"/></texture>", i, i + 1);
+  EXPECT_THAT(first(read(with_sensor(chain + "<texture type=\"checkerboard\" id=\"t5000\"/>"))),
+              HasSubstr("nested more than 64 deep"));
+}
+
+TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
+  std::string text = "<bsdf type=\"diffuse\">";
+  for (int i = 0; i < 100'000; ++i) text += fmt::format("<float name=\"n{}\" value=\"1\"/>", i);
+  EXPECT_EQ(read(with_sensor(text + "</bsdf>")).diagnostics.size(), scene::kMaxDiagnostics);
+}
+
+// Random damage to a good scene: it still reads, or says where it does not. What reads survives its own
+// serialisation.
+TEST(HostileScenes, RandomDamageIsAnsweredNeverACrash) {
+  std::mt19937 random(7);
+  const auto below = [&](std::size_t n) {
+    return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+  };
+  const std::string pieces[] = {"<",
+                                ">",
+                                "\"",
+                                "/>",
+                                "&#0;",
+                                "$",
+                                "$spp",
+                                "<ref id=\"fog\"/>",
+                                "-1e308",
+                                "nan",
+                                "\xc3",
+                                " ",
+                                "<!--",
+                                "]]>",
+                                "<include filename=\"cloud.vol\"/>"};
+  int good = 0;
+  for (int n = 0; n < 6000; ++n) {
+    std::string text = kExample;
+    for (std::size_t edits = 1 + below(3); edits > 0; --edits) {
+      const std::size_t at = below(text.size());
+      switch (below(4)) {
+        case 0:
+          text[at] = static_cast<char>(below(256));
+          break;
+        case 1:
+          text.erase(at, 1 + below(20));
+          break;
+        case 2:
+          text.insert(at, pieces[below(std::size(pieces))]);
+          break;
+        default:
+          text.insert(below(text.size()), text.substr(at, 1 + below(200)));
+      }
+    }
+    const auto r = read(text);
+    if (r.scene) {
+      ++good;
+      const auto again = deserialize_scene(serialize(*r.scene));
+      ASSERT_TRUE(again) << again.error().message;
+      EXPECT_EQ(*again, *r.scene);
+      continue;
+    }
+    ASSERT_FALSE(r.diagnostics.empty()) << text;
+    for (const Diagnostic& d : r.diagnostics) {
+      EXPECT_GT(d.place.line, 0);
+      EXPECT_GT(d.place.column, 0);
+      EXPECT_FALSE(format_diagnostic(d).empty());
+    }
+  }
+  EXPECT_GT(good, 20) << "damage within numbers and names of ids leaves scenes that read";
+}
+
+}  // namespace
+}  // namespace ls

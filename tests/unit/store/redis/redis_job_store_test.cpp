@@ -1,0 +1,401 @@
+// Against a real redis-server that is killed, emptied and started again. A store that is destroyed has told
+// Redis all it could: no test waits for time to pass.
+#include "coordinator/store/redis/redis_job_store.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <map>
+#include <random>
+#include <set>
+#include <thread>
+
+#include "coordinator/store/redis/redis_records.h"
+#include "tests/support/redis_server.h"
+#include "tests/unit/store/sample_job.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Looks again until it is true; a test that waits for what never comes fails after a minute.
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+struct Url {
+  const char* text;
+  std::optional<RedisAddress> address;
+};
+
+TEST(RedisAddress, IsReadFromAUrl) {
+  const Url urls[] = {
+      {"redis://", std::nullopt},
+      {"redis://cache", RedisAddress{"cache", 6379, 0, "", ""}},
+      {"redis://cache/", RedisAddress{"cache", 6379, 0, "", ""}},
+      {"redis://cache:7000/3", RedisAddress{"cache", 7000, 3, "", ""}},
+      {"redis://[::1]:7000/3", RedisAddress{"::1", 7000, 3, "", ""}},
+      {"redis://:p%40ss@cache", RedisAddress{"cache", 6379, 0, "", "p@ss"}},
+      {"redis://farm:a/b@cache:1/2", RedisAddress{"cache", 1, 2, "farm", "a/b"}},
+      {"redis://cache:0", std::nullopt},
+      {"redis://cache:65536", std::nullopt},
+      {"redis://cache:7x", std::nullopt},
+      {"redis://cache/x", std::nullopt},
+      {"redis://cache/-1", std::nullopt},
+      {"redis://user@cache", std::nullopt},
+      {"redis://u:%zz@cache", std::nullopt},
+      {"redis://[::1", std::nullopt},
+      {"rediss://cache", std::nullopt},
+      {"http://cache", std::nullopt},
+  };
+  for (const Url& url : urls) {
+    const auto read = parse_redis_url(url.text);
+    ASSERT_EQ(read.has_value(), url.address.has_value()) << url.text;
+    if (read) EXPECT_EQ(*read, *url.address) << url.text;
+  }
+}
+
+TEST(RedisAddress, NeverShowsThePassword) {
+  EXPECT_EQ(parse_redis_url("redis://farm:secret@[::1]:7000/3")->shown(), "redis://[::1]:7000/3");
+  EXPECT_EQ(parse_redis_url("redis://farm:secret@cache:99999").error().message.find("secret"),
+            std::string::npos);
+}
+
+class RedisStores : public testing::Test {
+ protected:
+  RedisStoreOptions options(std::string password = "") {
+    return {.address = {"127.0.0.1", redis_.port(), 0, "", std::move(password)},
+            .timeouts = {},
+            .first_retry = std::chrono::milliseconds(1),
+            .longest_retry = std::chrono::milliseconds(20)};
+  }
+  std::filesystem::path disk() const { return folder_.path() / ("jobs" + std::to_string(disk_) + ".sqlite"); }
+  Result<std::unique_ptr<JobStore>> try_open() {
+    return open_redis_job_store(open_sqlite_job_store(disk()).value(), options());
+  }
+  std::unique_ptr<JobStore> open() { return std::move(try_open()).value(); }
+  void lose_the_disk() { ++disk_; }
+
+  RedisReply ask(const RedisLink::Command& command) {
+    return RedisLink::connect(options().address, {}).value()->run(command).value();
+  }
+  std::optional<StoredJob> in_redis(const JobId& id) {
+    const auto fields = ask({"HGETALL", redis_job_key(id)});
+    if (fields.items.empty()) return {};
+    return parse_redis_job(fields).value().job;
+  }
+  static StoredJob without_revision(StoredJob job) {
+    job.revision = 0;
+    return job;
+  }
+  static std::vector<StoredJob> without_revisions(std::vector<StoredJob> jobs) {
+    for (auto& job : jobs) job.revision = 0;
+    return jobs;
+  }
+
+  TempFolder folder_;
+  int disk_ = 0;
+  test::RedisServer redis_;
+};
+
+TEST_F(RedisStores, GiveBackEverythingToAMachineThatLostItsDisk) {
+  const StoredJob first = sample_job("j-1"), second = [] {
+    StoredJob job = sample_job("a-later-one");
+    job.submitted_unix += 1;
+    return job;
+  }();
+  {
+    const auto store = open();
+    ASSERT_TRUE(store->put_jobs(std::vector{first, second}));
+    ASSERT_TRUE(store->add_point(first.id, {1, 2, 4, {.5, .25, .2, .3}}));
+    ASSERT_TRUE(store->add_log(first.id, {10, "submitted"}));
+    ASSERT_TRUE(store->reserve("starts", 7));
+  }
+  lose_the_disk();
+  const auto store = open();
+  EXPECT_EQ(without_revisions(store->jobs().value()), (std::vector{first, second}));
+  ASSERT_EQ(store->points(first.id).value().size(), 1u);
+  EXPECT_EQ(store->points(first.id).value()[0].error.relmse_hi, .3);
+  EXPECT_EQ(store->log(first.id).value().at(0).text, "submitted");
+  EXPECT_GE(store->reserve("starts", 1).value(), 7u);
+}
+
+TEST_F(RedisStores, TellARedisThatLostItsMemory) {
+  {
+    const auto store = open();
+    ASSERT_TRUE(store->put_job(sample_job("j-1")));
+    ASSERT_TRUE(store->add_log({"j-1"}, {10, "submitted"}));
+  }
+  redis_.kill();
+  redis_.start();
+  ASSERT_FALSE(in_redis({"j-1"}));
+  open().reset();
+  EXPECT_EQ(without_revision(in_redis({"j-1"}).value()), sample_job("j-1"));
+  EXPECT_EQ(parse_redis_job(ask({"HGETALL", redis_job_key({"j-1"})})).value().log.at(0).text, "submitted");
+}
+
+TEST_F(RedisStores, NoticeThatAnIdleRedisForgot) {
+  auto store = open();
+  ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}).has_value(); }));
+  ask({"FLUSHALL"});
+  store.reset();
+  EXPECT_TRUE(in_redis({"j-1"}));
+}
+
+TEST_F(RedisStores, TellAtTheEndThoughTheConnectionBrokeUnnoticed) {
+  for (int i = 0; i < 20; ++i) {
+    const JobId id{fmt::format("j-{}", i)};
+    auto store = open();
+    ASSERT_TRUE(store->put_job(sample_job(id.value)));
+    ASSERT_TRUE(eventually([&] { return in_redis(id).has_value(); }));
+    redis_.kill();
+    redis_.start();
+    store.reset();
+    EXPECT_TRUE(in_redis(id)) << i;
+  }
+}
+
+TEST_F(RedisStores, GoOnWithoutRedisAndTellItWhatItMissed) {
+  const auto store = open();
+  ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  redis_.kill();
+  ASSERT_TRUE(store->put_job(sample_job("j-2")));
+  ASSERT_TRUE(store->remove_job({"j-1"}));
+  EXPECT_EQ(store->jobs().value().size(), 1u);
+  redis_.start();
+  ASSERT_TRUE(eventually([&] { return in_redis({"j-2"}).has_value() && store->status().behind == 0; }));
+  EXPECT_FALSE(in_redis({"j-1"}));
+}
+
+TEST_F(RedisStores, SayThatRedisIsAway) {
+  const auto store = open();
+  EXPECT_NE(store->status().mirror.find(std::to_string(redis_.port())), std::string::npos);
+  redis_.kill();
+  ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  ASSERT_TRUE(eventually([&] { return !store->status().trouble.empty(); }));
+  EXPECT_GE(store->status().behind, 1u);
+  redis_.start();
+  EXPECT_TRUE(eventually([&] { return store->status().trouble.empty() && store->status().behind == 0; }));
+}
+
+TEST_F(RedisStores, DoNotBringBackWhatWasRemovedWhileRedisWasAway) {
+  {
+    const auto store = open();
+    ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  }
+  {
+    const auto before = open_sqlite_job_store(disk()).value();
+    ASSERT_EQ(before->jobs().value().size(), 1u);
+  }
+  const auto kept = ask({"HGETALL", redis_job_key({"j-1"})});
+  {
+    const auto store = open();
+    ASSERT_TRUE(store->remove_job({"j-1"}));
+  }
+  // As if Redis had come back with what it knew before.
+  ask({"SADD", kRedisJobs, "j-1"});
+  for (std::size_t i = 0; i + 1 < kept.items.size(); i += 2)
+    ask({"HSET", redis_job_key({"j-1"}), kept.items[i].text, kept.items[i + 1].text});
+
+  EXPECT_TRUE(open()->jobs().value().empty());
+  EXPECT_FALSE(in_redis({"j-1"}));
+}
+
+TEST_F(RedisStores, LeaveALaterRevisionOfAnotherWriterAlone) {
+  auto store = open();
+  ASSERT_TRUE(store->put_job(sample_job("j-1")));
+  ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}).has_value(); }));
+  StoredJob theirs = sample_job("j-1");
+  theirs.revision = 99;
+  theirs.name = "theirs.xml";
+  ask(put_command({theirs.id, theirs.revision, to_json(theirs), {}, {}}));
+
+  StoredJob mine = sample_job("j-1");
+  mine.name = "mine.xml";
+  ASSERT_TRUE(store->put_job(mine));
+  store.reset();
+  EXPECT_EQ(in_redis({"j-1"})->name, "theirs.xml");
+}
+
+TEST_F(RedisStores, TakeTheHigherRevisionAtTheStart) {
+  ASSERT_TRUE(open()->put_job(sample_job("j-1")));
+  StoredJob later = sample_job("j-1");
+  later.revision = 99;
+  later.state = JobState::done;
+  ask(put_command({later.id, later.revision, to_json(later), {}, {}}));
+  EXPECT_EQ(open()->jobs().value().at(0), later);
+}
+
+TEST_F(RedisStores, StartWithoutRedisOnlyWhereTheDiskKnowsJobs) {
+  redis_.kill();
+  const auto refused = try_open();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::unavailable);
+  EXPECT_NE(refused.error().message.find(std::to_string(redis_.port())), std::string::npos);
+
+  redis_.start();
+  ASSERT_TRUE(open()->put_job(sample_job("j-1")));
+  redis_.kill();
+  EXPECT_EQ(open()->jobs().value().size(), 1u);
+}
+
+TEST_F(RedisStores, LeaveADamagedRecordToPeopleAndTakeTheOthers) {
+  ASSERT_TRUE(open()->put_job(sample_job("j-1")));
+  ask({"SADD", kRedisJobs, "j-damaged", "j-of-another", "../../etc"});
+  ask({"HSET", redis_job_key({"j-damaged"}), "revision", "3", "record", "{"});
+  ask({"HSET", redis_job_key({"j-of-another"}), "revision", "3", "record", to_json(sample_job("j-1"))});
+  StoredJob outside = sample_job("../../etc");
+  ask({"HSET", redis_job_key({"../../etc"}), "revision", "3", "record", to_json(outside)});
+  lose_the_disk();
+  const auto jobs = open()->jobs().value();
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].id.value, "j-1");
+  EXPECT_EQ(ask({"HGET", redis_job_key({"j-damaged"}), "record"}).text, "{");
+}
+
+TEST_F(RedisStores, RememberQuarantinedWorkersThroughTheLossOfEither) {
+  ASSERT_TRUE(open()->quarantine({{"w-1"}, "evidence"}));
+  redis_.kill();
+  redis_.start();
+  open().reset();  // tells the Redis that forgot
+  lose_the_disk();
+
+  EXPECT_EQ(open()->quarantined().value(), (std::vector<QuarantinedWorker>{{{"w-1"}, "evidence"}}));
+}
+
+TEST_F(RedisStores, OneThatIsRefusedKeepsNoOtherFromBeingTold) {
+  ask({"SET", redis_job_key({"j-000"}), "of another type"});
+  auto store = open();
+  for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->put_job(sample_job(fmt::format("j-{:03}", i))));
+
+  // Both at once: between two tries of the refused one, others may have been told without trouble.
+  const auto only_it = [](const StoreStatus& s) { return s.behind == 1 && !s.trouble.empty(); };
+  ASSERT_TRUE(eventually([&] { return only_it(store->status()); }));
+  EXPECT_TRUE(in_redis({"j-199"}));
+}
+
+struct SharedStores : RedisStores {
+  std::unique_ptr<JobStore> open_node(const std::string& node) {
+    auto with = options();
+    with.node = node;
+    return open_redis_job_store(open_sqlite_job_store(folder_.path() / (node + ".sqlite")).value(), with)
+        .value();
+  }
+  // What another one would have done.
+  void give(const std::string& job, const std::string& from, const std::string& to, int fence) {
+    ask({"HSET", redis_job_key({job}), "owner", to, "from", from, "fence", std::to_string(fence)});
+    ask({"SMOVE", "lightshaft:owned:" + from, "lightshaft:owned:" + to, job});
+    ask({"RPUSH", "lightshaft:lost:" + from, fmt::format("{} {}", job, fence)});
+  }
+};
+
+TEST_F(SharedStores, WhoIsQuarantinedByOneIsToldToTheOther) {
+  const auto a = open_node("a"), b = open_node("b");
+
+  ASSERT_TRUE(a->quarantine({{"w-1"}, "evidence"}));
+
+  std::vector<QuarantinedWorker> told;
+  ASSERT_TRUE(eventually([&] { return !(told = b->moved().quarantined).empty(); }));
+  EXPECT_EQ(told, (std::vector<QuarantinedWorker>{{{"w-1"}, "evidence"}}));
+  EXPECT_EQ(b->quarantined().value(), told);
+  EXPECT_TRUE(a->moved().quarantined.empty());
+}
+
+TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  ASSERT_TRUE(a->add_log({"j-1"}, {1, "by a"}));
+  ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}) && a->status().behind == 0; }));
+  give("j-1", "a", "b", 2);
+  std::vector<JobId> lost;
+  ASSERT_TRUE(eventually([&] { return !(lost = a->moved().lost).empty(); }));
+
+  ASSERT_TRUE(a->add_log({"j-1"}, {2, "cancelled"}));  // what still stood in the queue
+  ASSERT_TRUE(a->add_point({"j-1"}, {1, 2, 4, {}}));
+  EXPECT_TRUE(a->log({"j-1"}).value().empty());
+  EXPECT_TRUE(a->points({"j-1"}).value().empty());
+  ask({"HSET", redis_job_key({"j-1"}), "log", R"([[3,"by b"]])"});
+  give("j-1", "b", "a", 3);
+  ask({"CLIENT", "KILL", "TYPE", "normal"});
+
+  std::vector<JobStore::Inherited> back;
+  ASSERT_TRUE(eventually([&] { return !(back = a->moved().inherited).empty(); }));
+  EXPECT_EQ(back[0].job.id.value, "j-1");
+  EXPECT_EQ(back[0].from, "b");
+  ASSERT_EQ(a->log({"j-1"}).value().size(), 1u);
+  EXPECT_EQ(a->log({"j-1"}).value()[0].text, "by b");
+}
+
+TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
+  test::RedisServer redis("secret");
+  RedisAddress address{"127.0.0.1", redis.port(), 0, "", ""};
+  const auto none = RedisLink::connect(address, {});
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, Errc::invalid_argument);
+  EXPECT_NE(none.error().message.find("password"), std::string::npos);
+  address.password = "secret";
+  EXPECT_TRUE(RedisLink::connect(address, {}));
+}
+
+// Random histories: changes, removals, a Redis that forgets all, a disk that is lost (never both at once
+// without a start in between that told the other). At the end both know what the history says.
+TEST_F(RedisStores, AgreeWithTheHistoryWhateverIsLost) {
+  for (std::uint32_t seed = 0; seed < 4; ++seed) {
+    std::mt19937 random(seed);
+    ask({"FLUSHALL"});
+    lose_the_disk();
+    std::map<JobId, StoredJob> reference_error;
+    std::set<JobId> removed;
+    auto store = open();
+    for (int step = 0; step < 40; ++step) {
+      switch (random() % 8) {
+        case 0:
+          if (reference_error.empty()) break;
+          removed.insert(reference_error.begin()->first);
+          ASSERT_TRUE(store->remove_job(reference_error.begin()->first));
+          reference_error.erase(reference_error.begin());
+          break;
+        case 1:  // Redis forgets while the store is open
+          redis_.kill();
+          redis_.start();
+          break;
+        case 2:  // the disk is lost
+          store.reset();
+          lose_the_disk();
+          store = open();
+          break;
+        case 3:
+          store.reset();
+          store = open();
+          break;
+        default: {
+          // A removed id never comes again: ids are not used twice.
+          StoredJob job = sample_job(fmt::format("j-{}-{}", step / 20, random() % 5));
+          if (removed.contains(job.id)) break;
+          job.name = std::to_string(step);
+          ASSERT_TRUE(store->put_job(job));
+          reference_error[job.id] = job;
+        }
+      }
+    }
+    store.reset();
+    store = open();
+    std::map<JobId, StoredJob> here;
+    for (StoredJob& job : without_revisions(store->jobs().value())) here[job.id] = job;
+    EXPECT_EQ(here, reference_error) << "seed " << seed;
+    store.reset();
+    for (const auto& [id, job] : reference_error)
+      EXPECT_EQ(without_revision(in_redis(id).value()), job) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace ls::coordinator

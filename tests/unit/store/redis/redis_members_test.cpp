@@ -1,0 +1,336 @@
+// Several coordinators against a real redis-server. Beats are made by hand and leases end by deleting what
+// would have expired: no test waits for time to pass, and how many looks a takeover takes is counted.
+#include "coordinator/store/redis/redis_members.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/redis_server.h"
+#include "tests/unit/store/sample_job.h"
+
+namespace ls::coordinator {
+namespace {
+
+TEST(FailureDetector, CountsLooksThatFollowEachOther) {
+  FailureDetector book(3);
+  const std::map<std::string, bool> away{{"a", false}, {"b", true}}, back{{"a", true}, {"b", true}};
+
+  EXPECT_TRUE(book.look(away).empty());
+  EXPECT_TRUE(book.look(away).empty());
+  EXPECT_TRUE(book.look(back).empty()) << "it lives";
+  EXPECT_TRUE(book.look(away).empty());
+  EXPECT_TRUE(book.look(away).empty());
+  EXPECT_EQ(book.look(away), std::vector<std::string>{"a"});
+}
+
+TEST(FailureDetector, BeginsAgainWhenItWasTheLookerThatWasAway) {
+  FailureDetector book(2);
+  const std::map<std::string, bool> away{{"a", false}};
+  EXPECT_TRUE(book.look(away).empty());
+
+  book.begin_again();
+
+  EXPECT_TRUE(book.look(away).empty());
+  EXPECT_EQ(book.look(away).size(), 1u);
+}
+
+struct OneMember {
+  std::vector<TakenJob> taken;
+  std::vector<LostJob> lost;
+  std::vector<std::vector<QuarantinedWorker>> quarantined;
+  std::set<JobId> known;
+  bool keeps = true;  // what it is told to take
+  std::unique_ptr<RedisMembers> members;
+};
+
+// From the death of a coordinator until another one takes its jobs. Its last sign of life lasts for a lease;
+// the looks that miss it follow, and the first of them may come a beat later.
+TEST(MemberOptions, HaveJobsTakenWithinTenSeconds) {
+  const MemberOptions usual;
+
+  EXPECT_LE(usual.lease + usual.looks * usual.beat, std::chrono::seconds(10));
+}
+
+class Members : public testing::Test {
+ protected:
+  static constexpr int kLooks = 2;
+
+  OneMember& add(const std::string& node) {
+    auto& one = all_[node];
+    MemberOptions options{.address = {"127.0.0.1", redis_.port(), 0, "", ""}, .node = node};
+    options.lease = std::chrono::hours(1);  // ends when a test says so
+    options.looks = kLooks;
+    one.members = std::make_unique<RedisMembers>(
+        options, RedisMembers::Callbacks{
+                     [&one](std::vector<TakenJob> jobs) {
+                       for (auto& job : jobs) {
+                         if (one.keeps) one.known.insert(job.job.job.id);
+                         one.taken.push_back(std::move(job));
+                       }
+                     },
+                     [&one](const std::vector<LostJob>& jobs) {
+                       one.lost.insert(one.lost.end(), jobs.begin(), jobs.end());
+                     },
+                     [&one](const std::vector<QuarantinedWorker>& all) { one.quarantined.push_back(all); },
+                     [&one](std::vector<JobId> ids) {
+                       std::erase_if(ids, [&](const JobId& id) { return one.known.contains(id); });
+                       return ids;
+                     }});
+    EXPECT_TRUE(one.members->join());
+    return one;
+  }
+  RedisReply ask(const RedisLink::Command& command) {
+    return RedisLink::connect({"127.0.0.1", redis_.port(), 0, "", ""}, {}).value()->run(command).value();
+  }
+  std::int64_t put(const std::string& node, const std::string& id, std::uint64_t fence,
+                   std::uint64_t revision = 1, const std::string& state = "running") {
+    return ask(put_command({.id = {id},
+                            .revision = revision,
+                            .record = to_json(sample_job(id)),
+                            .node = node,
+                            .fence = fence,
+                            .state = state}))
+        .number;
+  }
+  void lease_ends(const std::string& node) { ask({"DEL", "lightshaft:alive:" + node}); }
+  std::string field(const std::string& id, const std::string& name) {
+    return ask({"HGET", redis_job_key({id}), name}).text;
+  }
+
+  test::RedisServer redis_;
+  std::map<std::string, OneMember> all_;
+};
+
+TEST_F(Members, TheJobsOfADeadOneAreTakenAtTheLookAfterWhichItCountsAsGone) {
+  add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(b.members->beat());
+  EXPECT_TRUE(b.taken.empty()) << "it lives";
+
+  lease_ends("a");
+  for (int look = 1; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+  EXPECT_TRUE(b.taken.empty());
+  ASSERT_TRUE(b.members->beat());
+
+  ASSERT_EQ(b.taken.size(), 1u);
+  EXPECT_EQ(b.taken[0].job.job.id.value, "j-1");
+  EXPECT_EQ(b.taken[0].fence, 2u);
+  EXPECT_EQ(b.taken[0].from, "a");
+  EXPECT_EQ(field("j-1", "owner"), "b");
+}
+
+TEST_F(Members, AJobIsToldAsTakenThoughTheAnswerToItsTakingWasLost) {
+  add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  ASSERT_TRUE(b.members->beat());
+  // What Redis does of a takeover, before the connection breaks.
+  ask({"HINCRBY", redis_job_key({"j-1"}), "fence", "1"});
+  ask({"HSET", redis_job_key({"j-1"}), "owner", "b", "from", "a"});
+  ask({"SMOVE", "lightshaft:owned:a", "lightshaft:owned:b", "j-1"});
+  ask({"CLIENT", "KILL", "TYPE", "normal"});
+  EXPECT_FALSE(b.members->beat()) << "its connection has broken";
+
+  ASSERT_TRUE(b.members->beat());
+  ASSERT_TRUE(b.members->beat());
+
+  ASSERT_EQ(b.taken.size(), 1u) << "once";
+  EXPECT_EQ(b.taken[0].job.job.id.value, "j-1");
+  EXPECT_EQ(b.taken[0].fence, 2u);
+  EXPECT_EQ(b.taken[0].from, "a");
+}
+
+TEST_F(Members, AJobThatCouldNotBeKeptIsToldAgainUntilItIs) {
+  add("a");
+  auto& b = add("b");
+  b.keeps = false;
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  lease_ends("a");
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+  ASSERT_EQ(b.taken.size(), 1u);
+
+  ASSERT_TRUE(b.members->beat());
+  EXPECT_EQ(b.taken.size(), 2u);
+  b.keeps = true;
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(b.members->beat());
+
+  ASSERT_EQ(b.taken.size(), 3u);
+  EXPECT_EQ(b.taken[2].fence, 2u);
+  EXPECT_EQ(b.taken[2].from, "a");
+}
+
+TEST_F(Members, WhatCannotBeReadOrIsNoIdStaysWhereItIs) {
+  add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  ask({"HSET", redis_job_key({"j-1"}), "record", "{"});
+  ASSERT_EQ(put("a", "../../x", 1), 1);
+  ask({"RPUSH", "lightshaft:lost:b", "../../y 7"});
+  lease_ends("a");
+
+  for (int look = 0; look < 3 * kLooks; ++look) ASSERT_TRUE(b.members->beat());
+
+  EXPECT_TRUE(b.taken.empty());
+  EXPECT_TRUE(b.lost.empty());
+  EXPECT_EQ(field("j-1", "owner"), "a");
+  EXPECT_EQ(field("../../x", "owner"), "a");
+  EXPECT_EQ(ask({"LLEN", "lightshaft:lost:b"}).number, 0) << "dealt with";
+}
+
+TEST_F(Members, TellWhoIsQuarantinedWheneverThereAreMore) {
+  auto& a = add("a");
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_TRUE(a.quarantined.empty());
+
+  ask({"HSET", kRedisQuarantined, "w-1", "evidence"});
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(a.members->beat());
+  ask({"HSET", kRedisQuarantined, "w-2", "evidence"});
+  ASSERT_TRUE(a.members->beat());
+
+  ASSERT_EQ(a.quarantined.size(), 2u);
+  EXPECT_EQ(a.quarantined[0], (std::vector<QuarantinedWorker>{{{"w-1"}, "evidence"}}));
+  EXPECT_EQ(a.quarantined[1].size(), 2u);
+}
+
+TEST_F(Members, WhoWakesAfterItsLeaseWritesNothingAndIsToldWhatItLost) {
+  auto& a = add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  lease_ends("a");
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+  ASSERT_EQ(b.taken.size(), 1u);
+  const std::string before = field("j-1", "record");
+
+  EXPECT_EQ(put("a", "j-1", 1, 1'000'000, "done"), static_cast<int>(PutAnswer::lost));
+  for (const auto& command : remove_commands({"j-1"}, "a")) ask(command);
+  EXPECT_EQ(field("j-1", "record"), before);
+  EXPECT_EQ(field("j-1", "state"), "running");
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_EQ(a.lost, (std::vector<LostJob>{{{"j-1"}, 2}}));
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_EQ(a.lost.size(), 1u) << "told once";
+
+  EXPECT_EQ(put("b", "j-1", 2, 1), 1) << "the new owner writes";
+}
+
+TEST_F(Members, OneThatComesBackBetweenTwoLooksKeepsItsJobs) {
+  auto& a = add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  lease_ends("a");
+  for (int look = 1; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+
+  ASSERT_TRUE(a.members->beat());
+  for (int look = 0; look < 10; ++look) ASSERT_TRUE(b.members->beat());
+
+  EXPECT_TRUE(b.taken.empty());
+  EXPECT_TRUE(a.lost.empty());
+}
+
+TEST_F(Members, OfSeveralHeirsOneTakesEachJob) {
+  add("a");
+  auto &b = add("b"), &c = add("c");
+  for (int i = 0; i < 20; ++i) ASSERT_EQ(put("a", "j-" + std::to_string(i), 1), 1);
+  lease_ends("a");
+
+  for (int look = 0; look < 2 * kLooks; ++look)
+    for (auto* one : {&b, &c}) ASSERT_TRUE(one->members->beat());
+
+  EXPECT_EQ(b.taken.size() + c.taken.size(), 20u);
+  EXPECT_EQ(ask({"SCARD", "lightshaft:owned:a"}).number, 0);
+}
+
+TEST_F(Members, AnHeirThatDiesIsInheritedFrom) {
+  add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  lease_ends("a");
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+  lease_ends("b");
+  auto& c = add("c");
+
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(c.members->beat());
+
+  ASSERT_EQ(c.taken.size(), 1u);
+  EXPECT_EQ(c.taken[0].fence, 3u);
+  EXPECT_EQ(put("b", "j-1", 2, 99), static_cast<int>(PutAnswer::lost));
+}
+
+TEST_F(Members, JobsThatHaveEndedStayAndASequenceGoesWhole) {
+  add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-done", 1, 1, "done"), 1);
+  ASSERT_EQ(put("a", frame_job({"j-film"}, 1).value, 1, 1, "done"), 1);
+  ASSERT_EQ(put("a", frame_job({"j-film"}, 2).value, 1, 1, "paused"), 1);
+  lease_ends("a");
+
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+
+  ASSERT_EQ(b.taken.size(), 2u);
+  EXPECT_EQ(field("j-done", "owner"), "a");
+  const auto film = b.members->owner_of({"j-film"}).value();
+  ASSERT_TRUE(film);
+  EXPECT_EQ(film->node, "b");
+  for (int frame : {1, 2})
+    for (const auto& command : remove_commands(frame_job({"j-film"}, frame), "b")) ask(command);
+  EXPECT_FALSE(b.members->owner_of({"j-film"}).value()) << "removed with its frames";
+}
+
+TEST_F(Members, ARedisThatForgotMakesNobodyAnHeirAndTheHigherFenceWins) {
+  auto& a = add("a");
+  auto& b = add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+  redis_.kill();
+  EXPECT_FALSE(b.members->beat());
+  redis_.start();
+  for (int look = 0; look < 10; ++look) ASSERT_TRUE(b.members->beat());
+  EXPECT_TRUE(b.taken.empty());
+
+  EXPECT_FALSE(a.members->beat()) << "its connection has broken";
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_EQ(put("a", "j-1", 1, 50), 1) << "an earlier owner tells first what it knows";
+  EXPECT_EQ(put("b", "j-1", 2, 3), 1) << "the owner since has the higher fence, if fewer changes";
+  EXPECT_EQ(put("a", "j-1", 1, 51), static_cast<int>(PutAnswer::lost));
+}
+
+TEST_F(Members, AJobOfTheSameNameElsewhereIsNotOverwritten) {
+  add("a");
+  add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+
+  EXPECT_EQ(put("b", "j-1", 1, 9), static_cast<int>(PutAnswer::lost));
+  EXPECT_EQ(field("j-1", "owner"), "a");
+}
+
+TEST_F(Members, SayWhoHasAJobAndWhetherItLives) {
+  auto& a = add("a");
+  auto& b = add("b");
+  a.members->announce("http://here:1", "here:2");
+  ASSERT_TRUE(a.members->beat());
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+
+  const auto owner = b.members->owner_of({"j-1"}).value();
+  ASSERT_TRUE(owner);
+  EXPECT_EQ(owner->http, "http://here:1");
+  EXPECT_EQ(owner->grpc, "here:2");
+  EXPECT_TRUE(owner->alive);
+  lease_ends("a");
+  EXPECT_FALSE(b.members->owner_of({"j-1"}).value()->alive);
+  EXPECT_FALSE(b.members->owner_of({"j-2"}).value());
+}
+
+TEST_F(Members, StartsAreNumbersThatNobodyElseHas) {
+  auto &a = add("a"), &b = add("b");
+
+  EXPECT_EQ(a.members->unique_start(7).value(), 8u);
+  EXPECT_EQ(b.members->unique_start(0).value(), 9u);
+  redis_.kill();
+  redis_.start();
+  EXPECT_FALSE(b.members->beat()) << "its connection has broken";
+  ASSERT_TRUE(b.members->beat()) << "it tells the number it has";
+  auto& c = add("c");
+  EXPECT_EQ(c.members->unique_start(0).value(), 10u);
+}
+
+}  // namespace
+}  // namespace ls::coordinator

@@ -1,0 +1,96 @@
+// Three bugs that other renderers have had, each with cases that fail for it (docs/design/validation.md
+// describes the check): a phase function clamped to |g| = 0.99, 1 - exp of a thin depth, and 0 / 0 at null
+// collisions.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/checks.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+// Textbook sampling and density lose their digits from 0.999 on, so other renderers clamp at 0.99: the peak
+// is then four orders of magnitude too low.
+void clamped_g(Table& t) {
+  for (const double g : {.9995, -.9995})
+    t.mean(fmt::format("bug-g-clamped-to-.99/homogeneous/volpath{}", g > 0 ? "" : "-backward"), "N18 bug",
+           "Light scattered straight on at |g| = .9995: clamped to .99 it would be a 400th of this.",
+           [=] { return head_on({}, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
+           {.slack = 2 * 0x1p-25 / (1 - std::abs(g))});
+}
+
+// 1 - expf(-tau) is 0 in float32 below 6e-8, and has lost half of its digits at 2e-7.
+void one_minus_exp(Table& t) {
+  constexpr Configuration kDistant{false, true}, kDistantGrid{true, true};
+  for (const Configuration& configuration : {kDistant, kDistantGrid})
+    t.mean(
+        "bug-one-minus-exp" + configuration.name(), "N2 bug",
+        "The truncated exponential by expm1: 1 - exp in float32 would lose half of this depth's precision.",
+        [=] { return lit_cube(configuration, rgb(2e-7), rgb(1)); }, grey(lit_cube_answer(2e-7, 1)),
+        {.band = 1e-4});
+}
+
+// A row of purely absorbing voxels, empty or full, without interpolation, in front of a white environment, or
+// between the sun and a white disk.
+constexpr int kVoxels = 16, kFull = 7;
+SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
+  std::vector<float> values(kVoxels, 0);
+  for (const std::size_t i : {1, 2, 5, 6, 7, 11, 14}) values[i] = density;
+  SceneBuilder builder;
+  const VolumeIndex v = builder.grid({kVoxels, 1, 1}, values, Transform{});
+  std::get<GridVolume>(builder.scene.volumes[v.value]).filter = VolumeFilter::nearest;
+  builder.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), builder.null(),
+                    builder.heterogeneous(v, rgb(0), sigma));
+  if (by_shadow) {
+    builder.shape(DiskShape{}, translate({4, .5, .5}) * rotate_y(-90) * scale(.01), builder.diffuse(.5));
+    builder.scene.emitters.push_back(DirectionalEmitter{{1, 0, 0}, rgb(1)});
+    builder.scene.integrator.max_depth = kOnce;
+    builder.look({3.9, .9, .5}, {4, .5, .5});
+  } else {
+    builder.environment();
+    builder.look({-2, .5, .5}, {0, .5, .5}, 1e-5);
+  }
+  return builder;
+}
+
+// At a tentative collision in a voxel at its cell's bound there are no null collisions, and, if nothing
+// scatters either, probabilities normalised by "scattered or null" are 0 / 0. This renderer's bounds are 4
+// ulps above the voxels, so the null share is never exactly 0; for densities of 2e-32 it is 1e-38, which
+// becomes 0 when denormals are flushed (as in every renderer's threads).
+void null_collisions(Table& t) {
+  for (const bool by_shadow : {false, true})
+    for (const bool tiny : {false, true}) {
+      const float density = tiny ? 2e-32f : 1.f;
+      const double sigma = tiny ? 2e29 : 2, depth = sigma * density * kFull / kVoxels;
+      t.mean(fmt::format("bug-null-collision-0-over-0{}/grid/{}", tiny ? "-exactly" : "",
+                         by_shadow ? "shadow" : "volpath"),
+             "N3 N9 bug",
+             "Tentative collisions where the density is its own bound, or nothing: 0 / 0 in others.",
+             [=] { return row_of_voxels(density, sigma, by_shadow); },
+             grey(std::exp(-depth) * (by_shadow ? .5 / kPi : 1)), {.band = tiny ? 3e-4 : .003});
+    }
+  // The factor of null collisions in a channel without extinction is 0 to the power of their number: without
+  // any, 0 to the 0th.
+  for (const Configuration& configuration : {Configuration{true, false}, Configuration{true, true}})
+    t.mean("bug-null-collision-0-to-the-0th" + configuration.name(), "N15 N9 bug",
+           "A grid without extinction in red: its light passes, whichever channel decides flights.",
+           [=] {
+             SceneBuilder builder = unit_cube(configuration, {0, 1, 4});
+             builder.environment();
+             return builder;
+           },
+           {1, std::exp(-1.), std::exp(-4.)});
+}
+
+}  // namespace
+
+void add_bugs(Table& t) {
+  clamped_g(t);
+  one_minus_exp(t);
+  null_collisions(t);
+}
+
+}  // namespace ls::cases

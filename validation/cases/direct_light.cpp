@@ -1,0 +1,120 @@
+// Direct light on a white floor, and light reflected between surfaces.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kGreyReflectance = .5;
+
+// The point of the floor at the origin, seen from the side; radiance = reflectance / pi x irradiance.
+SceneBuilder floor() {
+  SceneBuilder builder;
+  const BsdfIndex white = builder.diffuse(kGreyReflectance);
+  builder.shape(RectangleShape{}, scale(3), white);
+  builder.scene.integrator.max_depth = 2;
+  builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+  return builder;
+}
+
+void direct(Table& t) {
+  // BSDF sampling hits the smallest light once in 40,000 paths, with a correspondingly small share of its
+  // light.
+  const auto add = [&](const char* name, SceneBuilder builder, double irradiance) {
+    t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
+           std::move(builder), grey(irradiance * kGreyReflectance / kPi), {.slack = 5e-5});
+  };
+  const auto area = [](SceneBuilder& builder, const Geometry& g, const Transform& t) {
+    const TextureIndex one = builder.texture(rgb(1));
+    const BsdfIndex black = builder.diffuse(0);
+    builder.shape(g, t, black).emitter = AreaEmitter{one};
+  };
+  {
+    // A square of half side a at height h above its centre: four corners, each by Lambert's formula with x =
+    // a/h, E = x / sqrt(1 + x^2) atan(x / sqrt(1 + x^2)).
+    SceneBuilder builder = floor();
+    area(builder, RectangleShape{}, translate({0, 0, 1.25}) * rotate_x(180) * scale(.8));
+    const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
+    add("direct-square", builder, 4 * x / s * std::atan(x / s));
+  }
+  {
+    SceneBuilder builder = floor();
+    area(builder, DiskShape{}, translate({0, 0, 1.5}) * rotate_x(180) * scale(.7));
+    add("direct-disk", builder, kPi * .49 / (.49 + 2.25));
+  }
+  {
+    SceneBuilder builder = floor();
+    area(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5));
+    add("direct-sphere", builder, kPi * .25 / 4);
+  }
+  {
+    SceneBuilder builder = floor();  // solid angle 8e-5 sr
+    area(builder, SphereShape{}, translate({0, 0, 1000}) * scale(5));
+    add("direct-distant-sphere", builder, kPi * 25 / 1e6);
+  }
+  {
+    SceneBuilder builder = floor();
+    builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
+    add("direct-point", builder, 3 / std::pow(1.25, 1.5));
+  }
+  {
+    // Halfway between beam (10 degrees) and cutoff (30): half the intensity; aimed along -z, with the point
+    // 20 degrees off the axis.
+    const double tangent = std::tan(20 * kPi / 180), cosine = std::cos(20 * kPi / 180);
+    SceneBuilder builder = floor();
+    builder.scene.emitters.push_back(
+        SpotEmitter{translate({tangent, 0, 1}) * rotate_x(180), rgb(2), 30, 10, {}});
+    add("direct-spot-falloff", builder, .5 * 2 * cosine * cosine * cosine);
+  }
+  {
+    // All kinds at once, to test the choice among lights.
+    SceneBuilder builder = floor();
+    area(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5));
+    builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(.3)});
+    builder.scene.emitters.push_back(DirectionalEmitter{{1, 0, -1}, rgb(.2)});
+    add("direct-three-lights", builder, kPi * .25 / 4 + .3 / std::pow(1.25, 1.5) + .2 / std::sqrt(2.));
+  }
+}
+
+// The radiance of a white environment through m plates of n = 1.5 at normal incidence is 1 minus their
+// reflectance: each face reflects r = 0.04, T = (1 - r) / (1 + (2 m - 1) r); for 500, a thousand interfaces,
+// 3 / 128. Half a per cent of R is a fifth of T, and paths have a thousand vertices on average.
+void plates(Table& table, int m) {
+  SceneBuilder builder;
+  const BsdfIndex glass = builder.glass(1.5), black = builder.diffuse(0);
+  for (int i = 0; i < m; ++i) builder.shape(CubeShape{}, translate({0, 0, 1. * i}) * scale(9, 9, .25), glass);
+  builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), black);
+  builder.environment();
+  builder.look({0, 0, m + 1.}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  const double r = .04, t = (1 - r) / (1 + (2 * m - 1) * r);
+  table.mean(
+      fmt::format("N42-{}-plates-of-glass", m), "N42 7.6g",
+      "A thousand interfaces at normal incidence: R = 1 - T, T = (1 - r) / (1 + (2 m - 1) r) = 3 / 128.",
+      builder, grey(1 - t),
+      {.band = .005, .why_band = "paths of a thousand interfaces on average", .slow = true});
+}
+
+}  // namespace
+
+void add_direct_light(Table& t) {
+  direct(t);
+  plates(t, 500);
+  for (const bool sphere : {false, true}) {
+    // A closed room that emits 1 and reflects half: 1 / (1 - .5).
+    SceneBuilder builder;
+    const TextureIndex one = builder.texture(rgb(1));
+    const BsdfIndex white = builder.diffuse(kGreyReflectance);
+    Shape& s = sphere ? builder.shape(SphereShape{}, {}, white) : builder.shape(CubeShape{}, {}, white);
+    s.flip_normals = true;
+    s.emitter = AreaEmitter{one};
+    builder.look({.2, -.3, .1}, {.5, .9, 0}, 60);
+    t.mean(sphere ? "7.6c-grey-room-sphere" : "7.6c-grey-room-cube", "7.6c N39",
+           "A closed room: Le / (1 - rho).", builder, grey(2));
+  }
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,133 @@
+// Emissive media: closed forms of emission with absorption, and equilibria with scattering, in which
+// everything is as bright as the source.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr Rgb kSigma{0, 1, 16}, kEmission{1, 2.5, 4};
+
+// Homogeneous media or constant volumes, with emission given in either of the two ways.
+void set_emission(SceneBuilder& builder, MediumIndex m, const Rgb& emission, bool per_absorption) {
+  if (auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value])) {
+    (per_absorption ? h->source_radiance : h->emission) = emission;
+    return;
+  }
+  const VolumeIndex v = builder.constant(emission);
+  auto& h = std::get<HeterogeneousMedium>(builder.scene.media[m.value]);
+  (per_absorption ? h.source_radiance : h.emission) = v;
+}
+
+std::vector<float> hills(std::size_t n) {
+  std::vector<float> v(n);
+  for (std::size_t i = 0; i < n; ++i) v[i] = static_cast<float>((i * 7919) % 13) / 6;
+  return v;
+}
+
+// A cube of an absorbing medium in the dark, seen through its middle: a path length of 1.
+void absorbing(Table& t) {
+  const auto add = [&](const char* name, bool grid, bool per_absorption, const Rgb& sigma) {
+    SceneBuilder builder;
+    const MediumIndex m =
+        grid ? builder.heterogeneous(builder.constant(sigma), rgb(0)) : builder.homogeneous(sigma, rgb(0));
+    set_emission(builder, m, kEmission, per_absorption);
+    builder.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), builder.null(), m);
+    builder.look({-3, .5, .5}, {.5, .5, .5});
+    Channels expected;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double absorbed = -std::expm1(-sigma[k]);
+      expected[k] = kEmission[k] * (per_absorption ? absorbed : sigma[k] > 0 ? absorbed / sigma[k] : 1);
+    }
+    t.mean(std::string("7.6b-") + name, "7.6b N67",
+           "Light given off by a unit of an absorber, in two ways to tell it.", builder, expected,
+           {.band = .001});
+  };
+  add("without-extinction", false, false, rgb(0));
+  add("per-length/homogeneous", false, false, kSigma);
+  add("per-length/grid", true, false, kSigma);
+  add("per-absorption/homogeneous", false, true, {.5, 1, 16});
+  add("per-absorption/grid", true, true, {.5, 1, 16});
+}
+
+// Walls of radiance B around a medium of source B that also scatters: B in every direction (an isothermal
+// enclosure). Mirror walls give the same.
+void enclosures(Table& t) {
+  const auto add = [&](const char* name, bool mirrors, auto medium, bool per_absorption) {
+    SceneBuilder builder;
+    const MediumIndex m = medium(builder);
+    Channels expected;
+    Rgb emission{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      expected[k] = kEmission[k];
+      const auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value]);
+      emission[k] = kEmission[k] * (per_absorption ? 1 : h->sigma_t[k] * (1 - h->albedo[k]));
+    }
+    set_emission(builder, m, emission, per_absorption);
+    const BsdfIndex walls = mirrors ? builder.mirror() : builder.diffuse(0);
+    const TextureIndex light = builder.texture(kEmission);
+    Shape& s = builder.shape(CubeShape{}, {}, walls);
+    s.flip_normals = true;
+    if (!mirrors) s.emitter = AreaEmitter{light};
+    builder.scene.sensor.medium = m;
+    builder.look({.2, -.3, .1}, {.5, .9, 0}, 60);
+    for (const bool distant : {false, true}) {
+      const Configuration configuration{false, distant};
+      configuration.choose(builder);
+      t.mean(fmt::format("7.6b-{}/{}", name, configuration.integrator_name()), "7.6b",
+             "Isothermal: walls and a medium of one source, in every direction as bright as that.", builder,
+             expected,
+             {.band = mirrors ? .005 : kBand,
+              .why_band = mirrors ? "nothing shines but the medium, and paths end by roulette alone" : "",
+              .slow = mirrors});
+    }
+  };
+  const auto chromatic = [](SceneBuilder& k) { return k.homogeneous({.5, 1, 3}, {.8, .5, .9}, .6); };
+  const auto grid = [](SceneBuilder& k) {
+    return k.heterogeneous(k.grid({8, 8, 8}, hills(512), translate({-2, -2, -2}) * scale(4)), {.6, .6, .6}, 1,
+                           .4);
+  };
+  add("enclosure-per-length/homogeneous", false, chromatic, false);
+  add("enclosure-source/homogeneous", false, chromatic, true);
+  add("enclosure/grid", false, grid, true);
+  add("enclosure-of-mirrors/homogeneous", true, chromatic, true);
+}
+
+// A scattering slab of source 1 in front of black: 1 - R - T (docs/measurements/stability.md 7.6b). Mirrors
+// at the sides make it infinite.
+void emitting_slabs(Table& t) {
+  const auto add = [&](const char* name, double albedo, double g, double tau, double expected) {
+    SceneBuilder builder;
+    const MediumIndex m = builder.homogeneous(rgb(1), rgb(albedo), g);
+    set_emission(builder, m, rgb(1), true);
+    const BsdfIndex mirror = builder.mirror(), null = builder.null();
+    const double top = tau + 3, bottom = -2, half = (top - bottom) / 2, middle = (top + bottom) / 2;
+    for (const double x : {-.5, .5}) {
+      builder.shape(RectangleShape{}, translate({x, 0, middle}) * rotate_y(90) * scale(half, .6, 1), mirror);
+      builder.shape(RectangleShape{}, translate({0, x, middle}) * rotate_x(90) * scale(.6, half, 1), mirror);
+    }
+    builder.container(RectangleShape{}, translate({0, 0, tau}) * scale(.6), null, m);
+    builder.container(RectangleShape{}, rotate_x(180) * scale(.6), null, m);
+    builder.look({.1, .15, tau + 1}, {.1, .15, 0}, 1e-3, {0, 1, 0});
+    t.mean(std::string("7.6b-") + name, "7.6b 7.2",
+           "A scattering slab of source 1 before the dark: 1 - R - T.", builder, grey(expected),
+           {.slack = 5e-6, .slow = true});
+  };
+  add("slab-a.9-tau1", .9, 0, 1, .140965);
+  add("slab-a.9-g.75-tau2", .9, .75, 2, .241647);
+  add("slab-a.5-tau1", .5, 0, 1, .454823);
+}
+
+}  // namespace
+
+void add_emission(Table& t) {
+  absorbing(t);
+  enclosures(t);
+  emitting_slabs(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,142 @@
+// Furnace tests: uniform light from all directions and no absorption make everything as bright as the light.
+#include <fmt/format.h>
+
+#include <random>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr Rgb kColours{1, 2.5, 4};
+
+std::vector<float> random_densities(std::size_t n, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::vector<float> v(n);
+  // Many empty voxels, some dense ones.
+  for (float& x : v) x = rng() % 3 == 0 ? static_cast<float>(rng() % 1000) / 250.f : 0.f;
+  return v;
+}
+
+void white_sky(Table& t) {
+  const auto add = [&](const char* name, SceneBuilder builder) {
+    builder.environment();
+    builder.look({.4, -6, .7}, {0, 0, 0}, 30);
+    for (const bool distant : {false, true}) {
+      const Configuration configuration{false, distant};
+      configuration.choose(builder);
+      t.mean(fmt::format("7.6c-{}/{}", name, configuration.integrator_name()), "7.6c N64",
+             "A white furnace: what absorbs nothing is as bright as the sky.", builder, grey(1),
+             {.channels = true});
+    }
+  };
+  {
+    SceneBuilder builder;
+    builder.container(SphereShape{}, {}, builder.null(), builder.homogeneous(rgb(2), rgb(1)));
+    add("sphere-isotropic", builder);
+  }
+  {
+    SceneBuilder builder;
+    builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous(kColours, rgb(1), .9));
+    add("cube-forward-chromatic", builder);
+  }
+  {
+    SceneBuilder builder;
+    const Transform box = translate({-1, -1, -1}) * scale(2);
+    const VolumeIndex v = builder.grid({12, 9, 7}, random_densities(12 * 9 * 7, 5), box);
+    builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 2, -.5));
+    add("grid-backward", builder);
+  }
+  {
+    SceneBuilder builder;
+    const Transform box = rotate_x(20) * translate({-.5, -.5, -.5});
+    const MediumIndex m =
+        builder.heterogeneous(builder.grid({6, 5, 4}, random_densities(120, 9), box), rgb(1), 3, .6);
+    builder.container(SphereShape{}, {}, builder.null(), m);
+    add("rotated-grid-in-sphere", builder);
+  }
+  {
+    SceneBuilder builder;
+    builder.shape(SphereShape{}, {}, builder.glass(1.5));
+    add("glass-sphere", builder);
+  }
+  {
+    SceneBuilder builder;
+    builder.container(SphereShape{}, {}, builder.glass(1.4), builder.homogeneous(rgb(2), rgb(1), .5));
+    add("glass-sphere-filled", builder);
+  }
+  {
+    SceneBuilder builder;
+    builder.shape(CubeShape{}, rotate_x(30) * rotate_y(20), builder.mirror());
+    add("mirror-cube", builder);
+  }
+}
+
+// Walls that emit 1 around a medium without absorption: light sampling, phase sampling and equi-angular
+// sampling all find the walls, and only correct weights add up to 1.
+void shining_walls(Table& t) {
+  const auto add = [&](const char* name, const Geometry& walls, const Transform& to_world, auto medium) {
+    SceneBuilder builder;
+    const MediumIndex m = medium(builder);
+    const BsdfIndex black = builder.diffuse(0);
+    const TextureIndex light = builder.texture(rgb(1));
+    Shape& s = builder.shape(walls, to_world, black);
+    s.flip_normals = true;
+    s.emitter = AreaEmitter{light};
+    builder.scene.sensor.medium = m;
+    builder.look({.2, -.3, .1}, {.5, .9, 0}, 60);
+    for (const bool distant : {false, true}) {
+      const Configuration configuration{false, distant};
+      configuration.choose(builder);
+      t.mean(fmt::format("7.6c-{}/{}", name, configuration.integrator_name()), "7.6c N27",
+             "Shining walls around a medium that absorbs nothing: as bright as they are.", builder, grey(1),
+             {.channels = true});
+    }
+  };
+  const auto thin = [](SceneBuilder& k) { return k.homogeneous(rgb(1), rgb(1), 0); };
+  const auto forward = [](SceneBuilder& k) { return k.homogeneous(rgb(1), rgb(1), .7); };
+  const auto chromatic = [](SceneBuilder& k) { return k.homogeneous(kColours, rgb(1), .3); };
+  const auto grid = [](SceneBuilder& k) {
+    return k.heterogeneous(k.grid({8, 8, 8}, random_densities(512, 3), translate({-2, -2, -2}) * scale(4)),
+                           rgb(1), 1, .4);
+  };
+  add("shining-sphere-isotropic", SphereShape{}, {}, thin);
+  add("shining-sphere-chromatic", SphereShape{}, {}, chromatic);
+  add("shining-cube-forward", CubeShape{}, {}, forward);
+  add("shining-cube-grid", CubeShape{}, {}, grid);
+  {
+    // Five emitting rectangles and the environment through a window: many lights, one of them never sampled.
+    SceneBuilder builder;
+    const MediumIndex m = builder.homogeneous(rgb(.8), rgb(1), .2);
+    const BsdfIndex black = builder.diffuse(0), open = builder.null();
+    const TextureIndex light = builder.texture(rgb(1));
+    const Transform sides[] = {Transform{},  rotate_x(90),  rotate_x(-90),
+                               rotate_y(90), rotate_y(-90), rotate_x(180)};
+    for (int i = 0; i < 6; ++i) {  // each at distance 1, facing the origin
+      const Transform to_world = sides[i] * translate({0, 0, -1});
+      if (i == 5) {
+        // The window to the environment, which ends the medium; its normal points inwards.
+        Shape& window = builder.shape(RectangleShape{}, to_world, open);
+        window.exterior = m;
+        window.is_medium_transition = true;
+      } else {
+        builder.shape(RectangleShape{}, to_world, black).emitter = AreaEmitter{light};
+      }
+    }
+    builder.environment();
+    builder.scene.sensor.medium = m;
+    builder.look({.2, -.3, .1}, {.5, .9, .3}, 60);
+    t.mean("7.6c-shining-room-with-window/volpath", "7.6c 7.7",
+           "Five shining walls and the sky: only right weights add up to 1.", builder, grey(1));
+  }
+}
+
+}  // namespace
+
+void add_furnaces(Table& t) {
+  white_sky(t);
+  shining_walls(t);
+}
+
+}  // namespace ls::cases

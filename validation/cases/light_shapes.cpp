@@ -1,0 +1,216 @@
+// Lamps of tiny and of huge solid angle, of zero area, of zero power, and of powers forty orders of magnitude
+// apart.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/checks.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kReflectance = .5;
+
+// The point of the floor at the origin, seen from the side; radiance = reflectance / pi x irradiance.
+SceneBuilder floor_point(double size = 3) {
+  SceneBuilder builder;
+  builder.shape(RectangleShape{}, scale(size), builder.diffuse(kReflectance));
+  builder.scene.integrator.max_depth = kOnce;
+  builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+  return builder;
+}
+void add_light(SceneBuilder& builder, const Geometry& g, const Transform& t, double radiance = 1) {
+  const TextureIndex light = builder.texture(rgb(radiance));
+  const BsdfIndex black = builder.diffuse(0);
+  builder.shape(g, t, black).emitter = AreaEmitter{light};
+}
+Channels reflected(double irradiance) { return grey(irradiance * kReflectance / kPi); }
+
+void tiny(Table& t) {
+  for (const double ratio : {1e-1, 1e-3, 1e-5}) {
+    const double r = 1000 * ratio, slack = 1e-6;
+    t.mean(fmt::format("N26-sphere-r/d-{:g}", ratio), "N26 7.6g", "A shining sphere: pi r^2 / d^2.",
+           [=] {
+             SceneBuilder builder = floor_point();
+             add_light(builder, SphereShape{}, translate({0, 0, 1000}) * scale(r));
+             return builder;
+           },
+           reflected(kPi * ratio * ratio), {.slack = slack});
+    t.mean(fmt::format("N26-disk-r/d-{:g}", ratio), "N26 7.6g", "A shining disk: pi sin^2 of its half angle.",
+           [=] {
+             SceneBuilder builder = floor_point();
+             add_light(builder, DiskShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+             return builder;
+           },
+           reflected(kPi * ratio * ratio / (1 + ratio * ratio)), {.slack = slack});
+    t.mean(
+        fmt::format("N26-square-a/d-{:g}", ratio), "N26 7.6g",
+        "A shining square: Lambert's formula at its corners.",
+        [=] {
+          SceneBuilder builder = floor_point();
+          add_light(builder, RectangleShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+          return builder;
+        },
+        reflected(4 * ratio / std::sqrt(1 + ratio * ratio) * std::atan(ratio / std::sqrt(1 + ratio * ratio))),
+        {.slack = slack});
+  }
+}
+
+void huge(Table& t) {
+  t.mean(
+      "N27-inside-a-shining-sphere", "N27", "A disk inside a shining sphere: irradiance pi.",
+      [] {
+        SceneBuilder builder;
+        builder.shape(DiskShape{}, scale(.1), builder.diffuse(kReflectance));
+        const TextureIndex light = builder.texture(rgb(1));
+        Shape& s = builder.shape(SphereShape{}, {}, builder.diffuse(0));
+        s.flip_normals = true;
+        s.emitter = AreaEmitter{light};
+        builder.scene.integrator.max_depth = kOnce;
+        builder.look({-.2, .1, .1}, {0, 0, 0}, 1e-3);
+        return builder;
+      },
+      reflected(kPi));
+  for (const double height : {1e-3, .1, 1.}) {
+    // A square of half side 1 at this height.
+    const double x = 1 / height, s = std::sqrt(1 + x * x);
+    t.mean(fmt::format("N27-square-at-{:g}", height), "N27 7.6g",
+           "A floor this close below a shining square: up to pi, where the square is all it sees.",
+           [=] {
+             SceneBuilder builder = floor_point(1);
+             add_light(builder, RectangleShape{}, translate({0, 0, height}) * rotate_x(180));
+             builder.look({-.9, .1, height / 2}, {0, 0, 0}, 1e-4);
+             builder.scene.sensor.near_clip = 1e-9;
+             return builder;
+           },
+           reflected(4 * x / s * std::atan(x / s)), {.slack = 1e-5});
+  }
+  // The foot of an emitting wall, 20 x 10 above the floor: atan(b / c) - c / r atan(b / r), r^2 = c^2 + h^2.
+  constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
+  t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
+         [] {
+           SceneBuilder builder;
+           builder.shape(RectangleShape{}, translate({1, 0, 0}), builder.diffuse(kReflectance));
+           add_light(builder, RectangleShape{}, rotate_y(90) * scale(kSide));
+           builder.scene.integrator.max_depth = kOnce;
+           builder.look({1, 0, 2}, {kFar, 0, 0}, 1e-4);
+           return builder;
+         },
+         reflected(std::atan(kSide / kFar) - kFar / kR * std::atan(kSide / kR)), {.slack = 1e-5});
+}
+
+// An OBJ file of triangles, given by their corners.
+AssetIndex obj(SceneBuilder& builder, const std::vector<std::array<Vec3, 3>>& triangles) {
+  std::string text;
+  for (const auto& triangle : triangles)
+    for (const Vec3& p : triangle) text += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    text += fmt::format("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
+  return text_file(builder, "lamp.obj", text);
+}
+
+void of_nothing(Table& t) {
+  // A square of half side 0.8 at height 1.25 as two triangles, with five degenerate ones among them.
+  const auto lamp = [](bool degenerate, bool proper) {
+    SceneBuilder builder = floor_point();
+    std::vector<std::array<Vec3, 3>> triangles;
+    const Vec3 a{-.8, -.8, 1.25}, b{.8, -.8, 1.25}, c{.8, .8, 1.25}, d{-.8, .8, 1.25};
+    if (degenerate) triangles.push_back({a, a, b});
+    if (proper) triangles.push_back({a, c, b});
+    if (degenerate) {
+      triangles.push_back({a, b, {0, -.8, 1.25}});
+      triangles.push_back({c, c, c});
+    }
+    if (proper) triangles.push_back({a, d, c});
+    MeshShape mesh;
+    mesh.file = obj(builder, triangles);
+    add_light(builder, mesh, {});
+    return builder;
+  };
+  const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
+  t.mean(
+      "N28-triangles-without-area-among-others", "N28 N40",
+      "They are left out, and the light is what it was.", [=] { return lamp(true, true); },
+      reflected(4 * x / s * std::atan(x / s)));
+  t.exact("N28-no-area-at-all", "N28", "A light of triangles without area: black, and nothing goes wrong.",
+          [=](const Bench& b) { return every_value(b, lamp(true, false), 16, grey(0), 0); });
+  t.exact("N29-light-of-no-power", "N29", "A black light is left out: the same bits as without it.",
+          [](const Bench& b) {
+            SceneBuilder with = floor_point();
+            with.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
+            const SceneBuilder without = with;
+            with.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
+            with.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(0)});
+            return same_bits(b, with, without, 16);
+          });
+  t.exact("N29-only-black-lights", "N29", "Lights of no power alone: black.", [](const Bench& b) {
+    SceneBuilder builder = floor_point();
+    builder.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
+    add_light(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5), 0);
+    return every_value(b, builder, 16, grey(0), 0);
+  });
+}
+
+void orders_apart(Table& t) {
+  // Lamps of intensities from 1e-20 to 1e20: the sum is that of the brightest few.
+  for (const bool tree : {false, true}) {
+    const int count = tree ? 1000 : 4;
+    double irradiance = 0;
+    std::vector<PointEmitter> lamps;
+    for (int i = 0; i < count; ++i) {
+      const double power = std::pow(10., -20 + 40. * i / (count - 1)), a = 2.4 * i;
+      const Vec3 p{std::cos(a) * .9, std::sin(a) * .9, 1 + .001 * i};
+      const double d2 = .81 + p[2] * p[2];
+      irradiance += power * p[2] / std::pow(d2, 1.5);
+      lamps.push_back({p, rgb(power)});
+    }
+    t.mean(
+        fmt::format("N30-{}-lamps-of-1e-20-to-1e20", count), "N30 N31",
+        "Lamps of powers forty orders apart: the brightest make up the sum, and none is lost.",
+        [=] {
+          SceneBuilder builder = floor_point();
+          for (const PointEmitter& lamp : lamps) builder.scene.emitters.push_back(lamp);
+          return builder;
+        },
+        reflected(irradiance));
+  }
+  // A delta light reflected by a delta lobe: no strategy finds it, and none divides by a density of 0.
+  t.exact("N32-lamp-in-a-mirror", "N32", "A point light in a mirror is not seen, and nothing goes wrong.",
+          [](const Bench& b) {
+            SceneBuilder builder;
+            builder.shape(RectangleShape{}, scale(3), builder.mirror());
+            builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
+            builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
+            return every_value(b, builder, 16, grey(0), 0);
+          });
+  for (const double s : {1e-15, 1e15}) {
+    t.same(
+        fmt::format("N32-lengths-of-{:g}", s), "N32",
+        "Densities a length of 1e15 or 1e-15 apart: strategies are weighed in a world of unit size.",
+        [=] {
+          Configuration configuration{false, true};
+          SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1), 0, {0, 0, 0}, s);
+          builder.scene.emitters = {PointEmitter{{0, 4 * s, 0}, rgb(s * s)}};
+          return builder;
+        },
+        [] {
+          SceneBuilder builder = lit_cube({false, true}, rgb(1), rgb(1));
+          builder.scene.emitters = {PointEmitter{{0, 4, 0}, rgb(1)}};
+          return builder;
+        });
+  }
+}
+
+}  // namespace
+
+void add_light_shapes(Table& t) {
+  tiny(t);
+  huge(t);
+  of_nothing(t);
+  orders_apart(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,114 @@
+// Phase functions up to |g| = 0.9999, where other renderers clamp.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/checks.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+// A light straight ahead: light travels against the view, so that it arrives scattered by 0 degrees. 4 pi
+// p(0) = (1 + g) / (1 - g)^2, 1.9999e8 at g = 0.9999.
+void phase_peaks(Table& t) {
+  const auto add = [&](const std::string& id, const char* rows, const Configuration& configuration,
+                       double g) {
+    t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
+           [=] { return head_on(configuration, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
+           // 1 - g is known with a relative error of 2^-24 / (1 - g), and enters squared.
+           {.band = .003, .slack = 2 * 0x1p-25 / (1 - std::abs(g))});
+  };
+  for (const Configuration& configuration : all_configurations()) {
+    for (const double g : {.99, .999, .9999, -.99, -.9999})
+      add(fmt::format("N18-peak-g-{:g}{}", g, configuration.name()), "N18", configuration, g);
+  }
+}
+
+// The share of singly scattered light that stays within an angle q of its direction, for a sun of that radius
+// behind the medium: found by phase-function sampling, by light sampling, or by both.
+double share_within(double g, double degrees) {
+  const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
+  return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
+}
+
+void cones(Table& t) {
+  struct Cone {
+    double g, degrees;
+  };
+  for (const Configuration& configuration : all_configurations()) {
+    for (const Cone c : {Cone{.9999, .0115}, Cone{.999, .115}, Cone{.99, .6}}) {
+      const double radius = c.degrees * kPi / 180, x = 2 * std::pow(std::sin(radius / 2), 2);
+      // Radiance 1: irradiance is the projected solid angle. The path length through the cube is the same for
+      // all angles up to radius^2 / 2, 5.5e-5 at 0.6 degrees.
+      const double irradiance = 2 * kPi * x * (1 - x / 2);
+      t.mean(fmt::format("N18-cone-g-{:g}{}", c.g, configuration.name()), "N18 N26",
+             "A sun of a few thousandths of a degree, seen directly and by light scattered into the view.",
+             [=] {
+               SceneBuilder builder = unit_cube(configuration, rgb(1), rgb(1), c.g);
+               builder.scene.emitters.push_back(DirectionalEmitter{{-1, 0, 0}, rgb(irradiance), c.degrees});
+               builder.scene.integrator.max_depth = kOnce;
+               builder.look({-3, .5, .5}, {.5, .5, .5}, 1e-5);
+               return builder;
+             },
+             grey(std::exp(-1.) * (1 + share_within(c.g, c.degrees))), {.slack = radius * radius});
+    }
+  }
+}
+
+void small_and_forbidden(Table& t) {
+  for (const Configuration& configuration : all_configurations()) {
+    for (const double g : {1e-7, -1e-7, 1e-30})
+      t.mean(
+          fmt::format("N18-all-but-isotropic-g-{:g}{}", g, configuration.name()), "N18",
+          "A g of next to nothing is isotropic scattering: there is no division by it.",
+          [=] {
+            SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
+            builder.scene.phases.push_back(HgPhase{g});
+            const PhaseIndex last{static_cast<std::uint32_t>(builder.scene.phases.size() - 1)};
+            std::visit([&](auto& m) { m.phase = last; }, builder.scene.media[0]);
+            return builder;
+          },
+          grey(lit_cube_answer(1, 1)));
+  }
+  for (const double g : {1., -1., .99999999999})
+    t.exact(fmt::format("N19-g-{:g}-is-refused{}", g, g < 1 && g > 0 ? "-too" : ""), "N19",
+            "A phase function that is a delta is refused, saying so.", [g](const Bench& b) {
+              return refused(b, unit_cube({}, rgb(1), rgb(1), g), {"between -1 and 1"});
+            });
+}
+
+// R and T of Henyey-Greenstein slabs (van de Hulst 1980), and backward scattering.
+void slabs(Table& t) {
+  struct Row {
+    Slab slab;
+    double r, t;
+  };
+  for (const Configuration& configuration : two_configurations()) {
+    for (const Row& row : {Row{{.9, .75, 2}, .097395, .660958}, Row{{1, .85, 8}, .358432, .641568},
+                           Row{{1, -.5, 2}, .620494, .379506}}) {
+      for (const bool through : {false, true}) {
+        // Reflection by forward-scattering slabs takes half a minute on grids; it is tested on homogeneous
+        // media only.
+        if (configuration.grid && !through && row.slab.g > 0) continue;
+        t.mean(fmt::format("7.2-slab-a{:g}-g{:g}-tau{:g}-{}{}", row.slab.albedo, row.slab.g, row.slab.tau,
+                           through ? "T" : "R", configuration.name()),
+               "7.2 N18", "A slab of Henyey-Greenstein scattering at normal incidence, tabulated.",
+               [=] { return column(configuration, row.slab, through); }, grey(through ? row.t : row.r),
+               {.slack = 1e-5, .slow = !through || configuration.grid || row.slab.tau > 4});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void add_phases(Table& t) {
+  phase_peaks(t);
+  cones(t);
+  small_and_forbidden(t);
+  slabs(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,172 @@
+// Surfaces at extreme parameters: smooth, rough, grazing, index-matched, transparent.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/checks.h"
+
+namespace ls::cases {
+namespace {
+
+BsdfIndex rough_mirror(SceneBuilder& builder, double alpha, Microfacet d = Microfacet::ggx) {
+  const TextureIndex a = builder.texture(rgb(alpha));
+  return builder.bsdf(RoughConductorBsdf{d, a, a, {0, 0, 0}, {1, 1, 1}, builder.texture(rgb(1))});
+}
+
+// A sheet in z = 0 seen from this many degrees off its normal, with something visible in it.
+SceneBuilder sheet(double degrees, auto make) {
+  SceneBuilder builder;
+  builder.shape(RectangleShape{}, scale(1e3), make(builder));
+  const double a = degrees * kPi / 180;
+  builder.look({5 * std::sin(a), 0, 5 * std::cos(a)}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  return builder;
+}
+SceneBuilder in_white(SceneBuilder builder) {
+  builder.environment();
+  return builder;
+}
+// A wall of two colours behind it and an environment, so that the ray's direction matters.
+SceneBuilder before_a_wall(SceneBuilder builder) {
+  const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});
+  builder.scene.textures.push_back(CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
+  const TextureIndex board{static_cast<std::uint32_t>(builder.scene.textures.size() - 1)};
+  builder.shape(RectangleShape{}, translate({0, 0, -3}) * scale(6), builder.diffuse(0)).emitter =
+      AreaEmitter{board};
+  builder.environment(.125);
+  builder.look({1, .5, 6}, {0, 0, 0}, 30, {0, 1, 0});
+  return builder;
+}
+
+// For a white GGX metal seen from this many degrees off its normal: the mean over its visible normals (Heitz
+// 2018) of the shadowing on the way out, 1 / (1 + lambda), by the midpoint rule; masking is separable, as in
+// Mitsuba.
+double unmasked_at(double degrees, double alpha) {
+  constexpr int kSteps = 400;
+  const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));
+  const double sine = alpha * std::sin(a) / l, cosine = std::cos(a) / l, tilt = (1 + cosine) / 2;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      const double r = std::sqrt((i + .5) / kSteps), p = 2 * kPi * (j + .5) / kSteps;
+      const double y = r * std::cos(p), q = (1 - tilt) * std::sqrt(1 - y * y) + tilt * r * std::sin(p),
+                   n = std::sqrt(std::max(0., 1 - y * y - q * q));
+      const Vec3 h = unit({alpha * (n * sine - q * cosine), alpha * y, n * cosine + q * sine});
+      const double twice = 2 * (std::sin(a) * h[0] + std::cos(a) * h[2]);
+      const Vec3 w{twice * h[0] - std::sin(a), twice * h[1], twice * h[2] - std::cos(a)};
+      const double slope2 = (w[0] * w[0] + w[1] * w[1]) / (w[2] * w[2]);
+      if (w[2] > 0) sum += 2 / (1 + std::sqrt(1 + alpha * alpha * slope2));
+    }
+  return sum / (kSteps * kSteps);
+}
+
+void microfacets(Table& t) {
+  t.exact(
+      "N33-alpha-0", "N33", "A metal without roughness, and one of 5e-4, are the smooth metal, bit for bit.",
+      [](const Bench& b) {
+        const auto ball = [](auto make) {
+          SceneBuilder builder;
+          builder.shape(SphereShape{}, {}, make(builder));
+          return before_a_wall(builder);
+        };
+        const SceneBuilder smooth = ball([](SceneBuilder& k) {
+          return k.bsdf(ConductorBsdf{{0, 0, 0}, {1, 1, 1}, k.texture(rgb(1))});
+        });
+        Figure all = same_bits(b, ball([](SceneBuilder& k) { return rough_mirror(k, 0); }), smooth, 16);
+        all.got += same_bits(b, ball([](SceneBuilder& k) { return rough_mirror(k, 5e-4); }), smooth, 16).got;
+        return all;
+      });
+  t.exact("N33-principled-roughness-0", "N33",
+          "A principled metal without roughness is one of alpha .001, roughness .0316, bit for bit.",
+          [](const Bench& b) {
+            const auto ball = [](double roughness) {
+              SceneBuilder builder;
+              const TextureIndex zero = builder.texture(rgb(0)), one = builder.texture(rgb(1)),
+                                 rough = builder.texture(rgb(roughness));
+              builder.shape(SphereShape{}, {},
+                            builder.bsdf(PrincipledBsdf{
+                                one, rough, zero, one, {}, 1.5, zero, zero, zero, zero, zero, zero}));
+              return before_a_wall(builder);
+            };
+            Figure f = same_bits(b, ball(0), ball(.0316), 16);
+            if (same_bits(b, ball(0), ball(.05), 16).got == 0)
+              f.why = "nor does a roughness above it change a bit";
+            return f;
+          });
+  for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
+    for (const double alpha : {1e-3, 2e-3, .01})
+      t.mean(fmt::format("N38-furnace-{:g}-{}", alpha, d == Microfacet::ggx ? "ggx" : "beckmann"),
+             "N33 N34 N38",
+             "A white metal this smooth in a white sky: masking takes less than alpha^2 of the light.",
+             [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return rough_mirror(k, alpha, d); })); },
+             grey(1), {.band = .002, .slack = alpha * alpha});
+  t.mean(
+      "N38-furnace-1", "N38 7.6g",
+      "A white metal of roughness 1 from above, scattered once: 1 - ln 2 (GGX, where one way masks nothing).",
+      [] { return in_white(sheet(0, [](SceneBuilder& k) { return rough_mirror(k, 1); })); },
+      grey(1 - std::log(2.)), {.band = .003});
+  for (const double degrees : {89., 89.99, 89.9999})
+    t.exact(fmt::format("N35-grazing-{:g}", degrees), "N35", "A perfect mirror at a grazing angle: 1.",
+            [=](const Bench& b) {
+              return every_value(b, in_white(sheet(degrees, [](SceneBuilder& k) { return k.mirror(); })), 16,
+                                 grey(1), 1e-6);
+            });
+  for (const double alpha : {.1, .3})
+    t.mean(fmt::format("N35-grazing-rough-{:g}", alpha), "N35",
+           "A rough white metal at 89.99 degrees: what facets leave of a white sky, by quadrature.",
+           [=] { return in_white(sheet(89.99, [=](SceneBuilder& k) { return rough_mirror(k, alpha); })); },
+           // The midpoint rule is accurate to 2e-5 for the square root at the rim.
+           grey(unmasked_at(89.99, alpha)), {.slack = 2e-5});
+}
+
+void indices(Table& t) {
+  for (const double n : {1.1, 1.5, 2.4, .7})
+    t.exact(fmt::format("N64-glass-sphere-{:g}", n), "N64 N36",
+            "Clear glass in a white sky is white in every sample.", [=](const Bench& b) {
+              SceneBuilder builder;
+              builder.shape(SphereShape{}, {}, builder.glass(n));
+              builder.environment();
+              builder.look({0, -5, .4}, {0, 0, 0}, 24);
+              return every_value(b, builder, 64, grey(1), 2e-5);
+            });
+  t.same(
+      "N36-index-matched", "N36", "Glass of its surroundings' index is not there.",
+      [] {
+        SceneBuilder builder;
+        builder.shape(SphereShape{}, {}, builder.glass(1));
+        return before_a_wall(builder);
+      },
+      [] { return before_a_wall(SceneBuilder()); }, {.band = .003, .channels = true});
+  t.exact("N36-conductor-of-air", "N36", "A metal of index 1 + 0i reflects nothing.", [](const Bench& b) {
+    return every_value(b,
+                       in_white(sheet(40,
+                                      [](SceneBuilder& k) {
+                                        return k.bsdf(ConductorBsdf{{1, 1, 1}, {0, 0, 0}, k.texture(rgb(1))});
+                                      })),
+                       16, grey(0), 1e-6);
+  });
+  t.exact("N36-conductor-of-nothing", "N36", "A metal of index 0 + 0i reflects all.", [](const Bench& b) {
+    return every_value(b,
+                       in_white(sheet(40,
+                                      [](SceneBuilder& k) {
+                                        return k.bsdf(ConductorBsdf{{0, 0, 0}, {0, 0, 0}, k.texture(rgb(1))});
+                                      })),
+                       16, grey(1), 1e-6);
+  });
+  t.exact("N36-fresnel-normal", "N36 7.6g",
+          "Glass of 1.5 reflects .04 of the light straight on: seen before black.", [](const Bench& b) {
+            SceneBuilder builder = sheet(0, [](SceneBuilder& k) {
+              return k.bsdf(PlasticBsdf{1.5, 1, false, k.texture(rgb(0)), k.texture(rgb(1))});
+            });
+            return every_value(b, in_white(builder), 16, grey(.04), 1e-6);
+          });
+}
+
+}  // namespace
+
+void add_surfaces(Table& t) {
+  microfacets(t);
+  indices(t);
+}
+
+}  // namespace ls::cases

@@ -1,0 +1,45 @@
+// A line of the table of `lightshaft validate`, with its verdict.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace ls::cli {
+
+struct ValidateCase {
+  std::string name;
+  double expected = 0, got = 0, standard_error = 0;
+  // got - expected, in units of sqrt(standard error^2 + allowance^2); for chi-square tests in standard
+  // errors.
+  double z = 0;
+  // Systematic deviation that is accepted: float32 rounding, and the uncertainty of the expected value.
+  double allowance = 0;
+  // The probability of a figure at least as far off if the program is correct, and the level below which the
+  // case fails.
+  double p = 1, level = 0;
+  // Level of the interval that must lie within the band; `level` is that of the one that must cover the
+  // answer.
+  double band_level = 0;
+  std::uint64_t nonfinite = 0;  // bad samples: any makes the case fail
+  double seconds = 0;
+  std::string why;  // of a failure
+  // For the table's own cases: a one-sentence description; "statistical", with the share of the answer that
+  // the interval must lie within, or "exact", with the tolerance.
+  std::string rows, about, kind;
+  double band = 0;
+  std::string why_band;  // reason for a wider band
+  std::uint64_t paths = 0;
+  bool too_wide = false;  // failed only because the interval is too wide: more paths may help
+  bool passed() const { return why.empty(); }
+};
+
+// Judges a case whose figures are known: sets z, p, allowance and why. `freedom`: degrees of freedom of the
+// standard error. `rounding`: deviation allowed for float32 in a figure whose samples are all equal.
+void judge(ValidateCase& c, double freedom, double rounding);
+
+// Judges by equivalence: the interval at the case's level, widened by `unknown`, must cover the answer, and
+// the one at its band_level must lie inside the band around it; too few samples fail. A standard error above
+// `rounding` with fewer than `least` degrees of freedom is rejected.
+void judge_equivalence(ValidateCase& c, double freedom, double unknown, double rounding, double least);
+
+}  // namespace ls::cli

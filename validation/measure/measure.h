@@ -1,0 +1,51 @@
+// Measures the mean of a scene's frame (for a spherical camera: over directions), rendered like a job
+// (submitted, sent to a worker, rendered in units), with a standard error that is valid for low-discrepancy
+// sequences: the two halves of every pixel and all pixels are independent, so that (A - B)^2 / 4 estimates
+// each pixel's squared error without bias.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "worker/render/render.h"
+
+namespace ls::cli {
+
+// Samples of all causes.
+std::uint64_t samples_gone_wrong(const render::Health& health);
+// The causes, with the first location: "1 majorant_violation, first at pixel (3, 5), sample 17".
+std::string told(const render::Health& health);
+void add(render::Health& sum, const render::Health& h);
+
+// Renders every pixel of `size`, one row per task; the planes of the sums cover the whole frame.
+render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples, int threads);
+
+// The scene as a worker receives it: pruned, written and read again.
+Result<Scene> as_sent(const Scene& scene);
+
+// The scene's settings with this seed.
+RenderSettings settings_of(const Scene& scene, std::uint64_t seed);
+
+struct Measured {
+  // luminance uses Nori's weights: 0.212671, 0.715160, 0.072169
+  enum Quantity { red, green, blue, luminance };
+  std::array<double, 4> mean{}, standard_error{};
+  std::array<double, 4> freedom{};  // degrees of freedom of the standard error (Satterthwaite)
+  render::Health health;
+  std::uint64_t paths = 0;
+  double seconds = 0;
+  std::uint64_t unhealthy() const { return samples_gone_wrong(health); }
+};
+
+// Renders at least `paths` samples, spread evenly over the frame whatever its filter. A frame of few pixels
+// is enlarged to as many independent pixels as a standard error needs; its mean does not change.
+Result<Measured> measure(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
+                         std::uint64_t seed, int threads);
+
+// The mean of this many (at least 2) such frames, each with its own seeds and its share of the paths. The
+// error is that of a mean of independent figures, with frames - 1 degrees of freedom.
+Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
+                                std::uint64_t seed, int threads, std::uint64_t frames);
+
+}  // namespace ls::cli

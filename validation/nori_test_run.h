@@ -1,0 +1,30 @@
+// Runs the tests of a Nori file as cases.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/scene/reader/nori_test.h"
+#include "validation/result_table.h"
+#include "worker/render/render.h"
+
+namespace ls::cli {
+
+struct ValidateOptions {
+  int threads = 1;
+  std::uint64_t seed = 0;
+  std::string only;  // runs only the cases whose names contain this; empty: all
+  std::function<void(const ValidateCase&)> done = {};  // called after each case
+};
+
+// Renders every case; the significance level of the whole file is shared by its cases. Returns an error if a
+// scene or file cannot be rendered.
+Result<std::vector<ValidateCase>> validate_test(const NoriTest& test, const render::AssetFiles& files,
+                                                const ValidateOptions& options);
+
+// A bsdf's weights are its radiance in an environment of radiance 1: the scene seen by a camera at this angle
+// (in degrees from the normal), with paths of two segments.
+Scene albedo_scene(const Scene& bsdf, double degrees);
+
+}  // namespace ls::cli

@@ -1,0 +1,76 @@
+// Renders units for an agent. Implemented by the renderer in this process, the renderer in a child process,
+// and the fake.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "common/base/error.h"
+#include "common/image/film/partial.h"
+#include "common/protocol/messages.h"
+#include "worker/render/render.h"
+
+namespace ls::worker {
+
+// A job with every blob as a local file.
+struct LocalJob {
+  JobBrief brief;
+  std::filesystem::path scene;                     // file of the canonical scene
+  std::map<Digest, std::filesystem::path> assets;  // files by digest
+};
+
+// Identifies the world in which a job is rendered. The job's id is not enough: a coordinator whose data were
+// replaced may reuse it for another job.
+struct WorldKey {
+  JobId job;
+  Digest scene, settings;
+  auto operator<=>(const WorldKey&) const = default;
+};
+inline WorldKey key_of(const JobBrief& brief) { return {brief.job, brief.scene, brief.settings_digest}; }
+
+struct RenderedUnit {
+  Partial partial;
+  double cpu_seconds = 0;
+  double wall_seconds = 0;  // from the first sample to the last
+  Health health;
+};
+
+// Blocking calls, made concurrently by the agent's render threads. `stop` asks for an early return, whose
+// result is then ignored. A UnitFailure says whether the scene is at fault.
+class RenderBackend {
+ public:
+  virtual ~RenderBackend() = default;
+  virtual Digest numeric_class() const = 0;
+  // Builds the job's world, or returns why it cannot. Does nothing if the world is already built.
+  virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
+  virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                         const std::atomic<bool>& stop) = 0;
+  virtual void forget(const JobId& job) = 0;  // frees all worlds of jobs with this id
+  virtual std::uint64_t rss_bytes() const = 0;
+  // Set when the backend can no longer render anything; the worker then ends with this error. Unit failures
+  // caused by it are not the units' fault.
+  virtual std::optional<Error> broken() const { return std::nullopt; }
+  // No further calls will be made; calls that are still blocked should return soon. May be called more than
+  // once.
+  virtual void shutdown() {}
+};
+
+// A backend that renders in this process and can report its position.
+class LocalBackend : public RenderBackend {
+ public:
+  // `where` may be null. It is written with relaxed stores and may be read by another process.
+  virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
+                                                                const std::atomic<bool>& stop,
+                                                                render::Breadcrumb* where) = 0;
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) final {
+    return render_marked(job, unit, stop, nullptr);
+  }
+};
+
+}  // namespace ls::worker

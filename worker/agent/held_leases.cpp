@@ -1,0 +1,140 @@
+#include "worker/agent/held_leases.h"
+
+#include <algorithm>
+
+namespace ls::worker {
+
+void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in) {
+  for (const LeaseUnit& unit : lease.units) {
+    const UnitKey key{lease.job, unit.tile, unit.round};
+    auto [it, is_new] = units_.try_emplace(key);
+    Entry& entry = it->second;
+    if (!is_new) leave(entry.held.lease, false);
+    ++leases_[lease.id].open;
+    entry.held.lease = lease.id;
+    if (!is_new) continue;
+    entry.held.key = key;
+    entry.held.unit = unit;
+    entry.held.state = handed_in(key) ? State::handed_in : State::waiting;
+    if (entry.held.state == State::waiting) enqueue(entry);
+  }
+}
+
+std::optional<HeldLeases::Held> HeldLeases::take(const std::function<bool(const JobId&)>& ready) {
+  for (auto it = queue_.begin(); it != queue_.end(); ++it) {
+    if (!ready(it->second.job)) continue;
+    Entry& entry = units_.at(it->second);
+    queue_.erase(it);
+    entry.held.state = State::running;
+    ++running_;
+    return entry.held;
+  }
+  return std::nullopt;
+}
+
+std::optional<LeaseId> HeldLeases::finish(const UnitKey& key) {
+  const auto it = units_.find(key);
+  if (it == units_.end() || it->second.held.state != State::running) return std::nullopt;
+  const LeaseId lease = it->second.held.lease;
+  --running_;
+  units_.erase(it);
+  leave(lease, true);
+  return lease;
+}
+
+void HeldLeases::acknowledged(const UnitKey& key, bool refused) {
+  const auto it = units_.find(key);
+  if (it == units_.end() || it->second.held.state != State::handed_in) return;
+  if (refused) {
+    it->second.held.state = State::waiting;
+    enqueue(it->second);
+    return;
+  }
+  const LeaseId lease = it->second.held.lease;
+  units_.erase(it);
+  leave(lease, true);
+}
+
+void HeldLeases::drop_job(const JobId& job) {
+  drop_if([&](const Held& held) { return held.key.job == job; });
+}
+
+void HeldLeases::drop_lease(const LeaseId& lease) {
+  drop_if([&](const Held& held) { return held.lease == lease; });
+}
+
+std::vector<LeaseReturned> HeldLeases::return_waiting(const JobId* job) {
+  std::map<LeaseId, LeaseReturned> returned;
+  for (auto it = queue_.begin(); it != queue_.end();) {
+    if (job && it->second.job != *job) {
+      ++it;
+      continue;
+    }
+    const LeaseId lease = units_.at(it->second).held.lease;
+    returned[lease].lease = lease;
+    returned[lease].unrendered.push_back(it->second);
+    units_.erase(it->second);
+    leave(lease, false);
+    it = queue_.erase(it);
+  }
+  std::vector<LeaseReturned> out;
+  for (auto& [id, r] : returned) out.push_back(std::move(r));
+  return out;
+}
+
+std::optional<HeldLeases::Held> HeldLeases::first_waiting(const JobId& job) const {
+  for (const auto& [order, key] : queue_)
+    if (key.job == job) return units_.at(key).held;
+  return std::nullopt;
+}
+
+bool HeldLeases::is_running(const UnitKey& key) const {
+  const auto it = units_.find(key);
+  return it != units_.end() && it->second.held.state == State::running;
+}
+
+bool HeldLeases::holds(const JobId& job) const {
+  const auto it = units_.lower_bound(UnitKey{job, 0, 0});
+  return it != units_.end() && it->first.job == job;
+}
+
+std::vector<JobId> HeldLeases::wanted() const {
+  std::vector<JobId> jobs;
+  for (const auto& [order, key] : queue_)
+    if (std::find(jobs.begin(), jobs.end(), key.job) == jobs.end()) jobs.push_back(key.job);
+  return jobs;
+}
+
+std::vector<WorkerProgress::Entry> HeldLeases::progress() const {
+  std::vector<WorkerProgress::Entry> entries;
+  for (const auto& [id, lease] : leases_) entries.push_back({id, lease.done});
+  return entries;
+}
+
+void HeldLeases::enqueue(Entry& entry) {
+  entry.order = next_order_++;
+  queue_.emplace(entry.order, entry.held.key);
+}
+
+void HeldLeases::leave(const LeaseId& lease, bool done) {
+  const auto it = leases_.find(lease);
+  if (it == leases_.end()) return;
+  if (done) ++it->second.done;
+  if (--it->second.open == 0) leases_.erase(it);
+}
+
+void HeldLeases::drop_if(const std::function<bool(const Held&)>& goes) {
+  for (auto it = units_.begin(); it != units_.end();) {
+    const Entry& entry = it->second;
+    if (!goes(entry.held)) {
+      ++it;
+      continue;
+    }
+    if (entry.held.state == State::waiting) queue_.erase(entry.order);
+    if (entry.held.state == State::running) --running_;
+    leave(entry.held.lease, false);
+    it = units_.erase(it);
+  }
+}
+
+}  // namespace ls::worker

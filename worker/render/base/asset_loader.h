@@ -1,0 +1,27 @@
+// Maps a scene's asset index to the local file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/error.h"
+#include "common/scene/scene.h"
+#include "worker/render/render.h"
+
+namespace ls::render {
+
+struct AssetLoader {
+  const Scene& scene;
+  const AssetFiles& files;
+
+  // internal: the caller did not supply the file that the scene names.
+  Result<std::filesystem::path> path(AssetIndex i) const {
+    const Asset& asset = scene.assets.at(i.value);
+    const auto it = files.find(asset.digest);
+    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + asset.name + "'");
+    return it->second;
+  }
+  const std::string& name(AssetIndex i) const { return scene.assets.at(i.value).name; }
+};
+
+}  // namespace ls::render

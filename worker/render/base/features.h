@@ -1,0 +1,49 @@
+// The features that a scene needs of the integrator. A variant may remove code, but never change the use of
+// random numbers or the order of arithmetic, so all variants that cover a scene give the same bits
+// (docs/decisions/0012-what-a-scene-needs.md).
+#pragma once
+
+#include "worker/render/base/built.h"
+
+namespace ls::render {
+
+struct Features {
+  bool media = false;      // any participating medium
+  bool grids = false;      // heterogeneous media
+  bool chromatic = false;  // extinction that differs between channels
+  bool emission = false;   // media that emit light
+  // nested or intersecting media (medium_stack.h); coincident surfaces, one of them null (coincident.h)
+  bool overlaps = false;
+  // surfaces that light passes straight through: index-matched ones, masks, thin sheets
+  bool passing = false;
+  bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
+  // Present in every variant unless built.h leaves them out: index-matched surfaces, null transmission,
+  // equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
+  bool boundaries = kBuilt.boundaries, null_transmission = kBuilt.null_transmission;
+  bool equiangular = kBuilt.equiangular, found_lights = kBuilt.found_lights, health = kBuilt.health;
+  bool operator==(const Features&) const = default;
+
+  constexpr bool covers(const Features& need) const {
+    return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
+           (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
+           (split || !need.split);
+  }
+};
+inline constexpr Features kEveryScene{
+    .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
+inline constexpr Features kEverything = [] {
+  Features all = kEveryScene;
+  all.split = true;
+  return all;
+}();
+
+// The features compiled into this build.
+inline constexpr Features kBuiltFeatures{.media = kBuilt.media,
+                                         .grids = kBuilt.grids,
+                                         .chromatic = kBuilt.chromatic,
+                                         .emission = kBuilt.emission,
+                                         .overlaps = kBuilt.overlaps,
+                                         .passing = true,
+                                         .split = true};
+
+}  // namespace ls::render

@@ -1,0 +1,37 @@
+// Work counters, for the tests and benchmarks that show that a scene pays nothing for features it does not
+// use. Only in builds with LIGHTSHAFT_COUNT; in all others LS_COUNT expands to nothing.
+#pragma once
+
+#include <cstdint>
+
+namespace ls::render {
+
+struct WorkCounters {
+  std::uint64_t density = 0;            // grid evaluations
+  std::uint64_t macro_cells = 0;        // visited by trackers
+  std::uint64_t phase = 0;              // phase function evaluations and samples
+  std::uint64_t transmittance = 0;      // evaluations in homogeneous media
+  std::uint64_t medium_emission = 0;    // segments integrated for medium emission
+  std::uint64_t equiangular = 0;        // segments sampled equi-angularly
+  std::uint64_t boundary_rays = 0;      // shadow-ray segments traced boundary by boundary
+  std::uint64_t null_transmission = 0;  // null-transmission evaluations
+  std::uint64_t texels = 0;             // image lookups
+  std::uint64_t instances = 0;          // hits transformed through an instance
+  std::uint64_t user_geometry = 0;      // spheres, disks and cylinders tested by the BVH
+  std::uint64_t light_tree = 0;         // light-tree samples and pdf evaluations
+  std::uint64_t environment_map = 0;    // lookups and samples
+  std::uint64_t lens = 0;               // aperture samples
+  std::uint64_t shadow_rays = 0;
+};
+
+#ifdef LIGHTSHAFT_COUNT
+inline WorkCounters& work_counters() {
+  static thread_local WorkCounters counters;
+  return counters;
+}
+#define LS_COUNT(what) (++::ls::render::work_counters().what)
+#else
+#define LS_COUNT(what) static_cast<void>(0)
+#endif
+
+}  // namespace ls::render

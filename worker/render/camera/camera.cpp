@@ -1,0 +1,109 @@
+#include "worker/render/camera/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "worker/render/base/built.h"
+#include "worker/render/base/work_counters.h"
+#include "worker/render/camera/fov.h"
+
+namespace ls::render {
+
+Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const TextureTable* textures)
+    : projection_(s.projection), per_pixel_x_(1. / size.width), per_pixel_y_(1. / size.height) {
+  const auto& m = s.to_world.m;
+  axis_x_ = V3d(m[0], m[4], m[8]);
+  axis_y_ = V3d(m[1], m[5], m[9]);
+  axis_z_ = V3d(m[2], m[6], m[10]);
+  origin_ = V3((V3d(m[3], m[7], m[11]) - center) * scale);
+  const double aspect = static_cast<double>(size.width) / size.height;
+  const double tx = projection_ == Projection::perspective ? tan_half_fov_x(s.fov, s.fov_axis, aspect) : 1,
+               ty = tx / aspect;
+  // Maps a film position (fx, fy) in pixels to [0, 1] and then to camera space, x to the left and y up. The
+  // principal point offset shifts positions to the right and down by fractions of the film.
+  const double ox = s.principal_point_offset[0], oy = s.principal_point_offset[1];
+  x0_ = tx * (1 - 2 * ox);
+  dx_ = -2 * tx / size.width;
+  y0_ = ty * (1 - 2 * oy);
+  dy_ = -2 * ty / size.height;
+  aperture_ = static_cast<float>(s.aperture_radius);
+  focus_ = static_cast<float>(s.focus_distance);
+  near_ = static_cast<float>(s.near_clip * scale);
+  far_ = static_cast<float>(s.far_clip * scale);
+  lens_x_ = V3(axis_x_ * scale);
+  lens_y_ = V3(axis_y_ * scale);
+  pinhole_ = projection_ == Projection::perspective && !(aperture_ > 0);
+  if (s.aperture_scale) {
+    textures_ = textures;
+    aperture_scale_ = *s.aperture_scale;
+  }
+}
+
+bool Camera::usable() const {
+  // Rays depend linearly on positions on the film and the lens: the corners are the extremes.
+  for (const double fx : {0., 1.})
+    for (const double fy : {0., 1.})
+      for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
+        const CameraRay r = ray(fx / per_pixel_x_, fy / per_pixel_y_, lens);
+        const float length = dot(r.d, r.d);
+        if (!is_finite(r.o) || !(length > .99f && length < 1.01f) || std::isnan(r.t_max)) return false;
+      }
+  return true;
+}
+
+CameraRay Camera::ray(double fx, double fy, V2 lens) const {
+  const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;
+  if (pinhole_) return perspective_ray(origin_, {x, y, 1});
+  if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
+  if (projection_ == Projection::orthographic) return orthographic_ray(x, y);
+  return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
+}
+
+// Scales the aperture by the mean of the map's channels, clamped to [0, 1].
+float Camera::aperture_at(double u, double v) const {
+  const V2 uv(static_cast<float>(std::clamp(u, 0., 1.)), static_cast<float>(std::clamp(v, 0., 1.)));
+  return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);
+}
+
+CameraRay Camera::lens_ray(double x, double y, float aperture, V2 lens) const {
+  if (!kBuilt.lenses || !(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
+  LS_COUNT(lens);
+  const V2 p = concentric_disk(lens) * aperture;
+  // The point in focus does not depend on the lens sample.
+  return perspective_ray(origin_ + lens_x_ * p.x + lens_y_ * p.y,
+                         {x * focus_ - p.x, y * focus_ - p.y, focus_});
+}
+
+CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
+  const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
+  const double length = along.length();
+  const V3 d(along * (1 / length));
+  // Clip planes are measured along the axis; the ray starts at the near one.
+  const auto per_depth = static_cast<float>(length / local.z);
+  return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
+}
+
+float Camera::near_distance(const V3& d) const {
+  if (projection_ == Projection::spherical) return 0;
+  const double along = axis_z_.length();
+  if (projection_ == Projection::orthographic) return static_cast<float>(near_ * along);
+  return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
+}
+
+// As in Mitsuba the near plane is mapped by to_world, stretched or not, and from there the ray reaches far -
+// near.
+CameraRay Camera::orthographic_ray(double x, double y) const {
+  const V3d at = V3d(lens_x_) * x + V3d(lens_y_) * y;
+  return {V3(V3d(origin_) + at + axis_z_ * near_), V3(axis_z_.normalized()), far_ - near_};
+}
+
+// u: azimuth from -z by +x, v: from +y down. All directions start at the camera's position.
+CameraRay Camera::spherical_ray(double u, double v) const {
+  const double phi = u * 2 * 3.14159265358979323846, theta = v * 3.14159265358979323846;
+  const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);
+  return {origin_, V3((axis_x_ * x + axis_y_ * y + axis_z_ * z).normalized()),
+          std::numeric_limits<float>::infinity()};
+}
+
+}  // namespace ls::render

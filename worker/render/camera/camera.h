@@ -1,0 +1,57 @@
+// Perspective (with optional thin lens), orthographic and spherical cameras, in Mitsuba's conventions (looks
+// along +z, +x to the left of the image).
+#pragma once
+
+#include "common/image/frame/frame.h"
+#include "common/scene/scene.h"
+#include "worker/render/math/math.h"
+#include "worker/render/texture/texture.h"
+
+namespace ls::render {
+
+struct CameraRay {
+  V3 o, d;      // d has unit length
+  float t_max;  // far clip
+};
+
+class Camera {
+ public:
+  Camera() = default;
+  // `size`: the whole frame in pixels. `center` and `scale` map scene to world coordinates: p' = (p - center)
+  // * scale. `textures`, for sensors with an aperture_scale, must outlive the camera.
+  Camera(const Sensor& sensor, FrameSize size, V3d center, double scale,
+         const TextureTable* textures = nullptr);
+
+  // fx, fy: position on the whole frame in pixels, (0, 0) is its top left corner; lens in [0, 1)^2, unused by
+  // a pinhole.
+  CameraRay ray(double fx, double fy, V2 lens) const;
+  // True if all its rays have an origin and direction in the range of float32.
+  bool usable() const;
+  // Distance from the camera, or its lens, to the start of a ray in direction d.
+  float near_distance(const V3& d) const;
+  bool has_lens() const { return aperture_ > 0; }
+  Projection projection() const { return projection_; }
+
+ private:
+  // ray from o along `local`, in camera space
+  CameraRay perspective_ray(const V3& o, const V3d& local) const;
+  CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
+  CameraRay orthographic_ray(double x, double y) const;
+  CameraRay spherical_ray(double u, double v) const;
+  float aperture_at(double u, double v) const;
+
+  Projection projection_ = Projection::perspective;
+  bool pinhole_ = true;           // perspective without a lens
+  V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
+  V3 origin_;
+  V3 lens_x_, lens_y_;  // axes of the lens in world units
+  // Camera-space direction (x, y, 1) of a film position: x = x0 + dx * fx, y likewise.
+  double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
+  float aperture_ = 0, focus_ = 1;            // scene units
+  float near_ = 0, far_ = 0;                  // world units
+  double per_pixel_x_ = 1, per_pixel_y_ = 1;  // size of a pixel as a share of the frame
+  const TextureTable* textures_ = nullptr;    // with an aperture_scale only
+  TextureIndex aperture_scale_;
+};
+
+}  // namespace ls::render

@@ -1,0 +1,29 @@
+// Converts fields of view from the dialect's conventions.
+#pragma once
+
+#include <cmath>
+
+#include "common/scene/scene.h"
+
+namespace ls::render {
+
+// Tangent of half the horizontal field of view. fov: degrees along `axis` of a frame with this aspect (width
+// over height).
+inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
+  const double t = std::tan(fov * (3.14159265358979323846 / 360));
+  switch (axis) {
+    case FovAxis::x:
+      return t;
+    case FovAxis::y:
+      return t * aspect;
+    case FovAxis::smaller:
+      return aspect > 1 ? t * aspect : t;
+    case FovAxis::larger:
+      return aspect > 1 ? t : t * aspect;
+    case FovAxis::diagonal:
+      return t * aspect / std::sqrt(1 + aspect * aspect);
+  }
+  return t;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,315 @@
+#include "worker/render/geometry/accel.h"
+
+#include <embree3/rtcore.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstring>
+#include <deque>
+#include <optional>
+#include <tuple>
+
+#include "worker/render/base/built.h"
+#include "worker/render/geometry/accel_shapes.h"
+#include "worker/render/geometry/primitive_side.h"
+
+namespace ls::render {
+namespace {
+
+constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
+
+// Written in the 16-byte words in which Embree reads: a load that spans several smaller stores has to wait
+// for them.
+using F32x4 = float __attribute__((vector_size(16)));
+using U32x4 = std::uint32_t __attribute__((vector_size(16)));
+void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
+  static_assert(offsetof(RTCRay, tnear) == 12 && offsetof(RTCRay, dir_x) == 16 &&
+                offsetof(RTCRay, tfar) == 32 && offsetof(RTCRay, flags) == 44);
+  const F32x4 origin = {o.x, o.y, o.z, 0}, direction = {d.x, d.y, d.z, 0};
+  const U32x4 rest = {std::bit_cast<std::uint32_t>(t_max), ~0u, 0, 0};  // tfar, mask, id, flags
+  std::memcpy(&r.org_x, &origin, sizeof origin);
+  std::memcpy(&r.dir_x, &direction, sizeof direction);
+  std::memcpy(&r.tfar, &rest, sizeof rest);
+}
+
+// Embree is undefined on NaN, and Debian's build stops at rays from beyond 1.8e18 (for instances:
+// kLargestInverse).
+bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
+
+// The Embree scenes over one set of primitives. all == opaque if no primitive lets light pass.
+struct Scenes {
+  RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
+  std::uint32_t base[2 * kKinds] = {};  // first index of each kind on each side
+  ShapeSet<Sphere> spheres[2];
+  ShapeSet<Disk> disks[2];
+  ShapeSet<Cylinder> cylinders[2];
+
+  Scenes() = default;
+  Scenes(const Scenes&) = delete;  // the BVH points at the shape sets
+  Scenes& operator=(const Scenes&) = delete;
+  ~Scenes() {
+    for (RTCScene s : {all != opaque ? all : nullptr, opaque, boundary}) {
+      if (s) rtcReleaseScene(s);
+    }
+  }
+};
+
+}  // namespace
+
+struct Accel::State {
+  RTCDevice device = nullptr;
+  std::optional<Scenes> own;
+  std::deque<Scenes> groups;
+  std::vector<std::uint32_t> group_of;  // by instance
+  std::atomic<std::int64_t> bytes{0};
+  bool coincident = false;
+
+  ~State() {
+    own.reset();
+    groups.clear();
+    if (device) rtcReleaseDevice(device);
+  }
+};
+
+namespace {
+
+RTCGeometry triangle_geometry(RTCDevice device, const Geometry& g, std::uint32_t first, std::uint32_t count) {
+  RTCGeometry geom = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  // Embree reads 16 bytes per vertex: Geometry::build reserves the padding.
+  rtcSetSharedGeometryBuffer(geom, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, g.positions.data(), 0,
+                             sizeof(V3), g.positions.size());
+  rtcSetSharedGeometryBuffer(geom, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             g.indices.data() + std::size_t{3} * first, 0, 3 * sizeof(std::uint32_t), count);
+  rtcSetGeometryBuildQuality(geom, RTC_BUILD_QUALITY_MEDIUM);
+  rtcCommitGeometry(geom);
+  return geom;
+}
+
+template <class Shape>
+RTCGeometry shape_geometry(RTCDevice device, ShapeSet<Shape>& set) {
+  RTCGeometry geom = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geom, static_cast<unsigned>(set.shapes.size()));
+  rtcSetGeometryUserData(geom, &set);
+  rtcSetGeometryBoundsFunction(
+      geom, [](const RTCBoundsFunctionArguments* a) { bounds_callback<Shape>(a); }, nullptr);
+  rtcSetGeometryIntersectFunction(geom, intersect_callback<Shape>);
+  rtcSetGeometryOccludedFunction(geom, occluded_callback<Shape>);
+  rtcCommitGeometry(geom);
+  return geom;
+}
+
+RTCScene new_scene(RTCDevice device, bool coincident) {
+  RTCScene s = rtcNewScene(device);
+  rtcSetSceneFlags(s, coincident ? static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |
+                                                              RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION)
+                                 : RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
+  return s;
+}
+
+void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes& to, int side,
+            std::initializer_list<RTCScene> scenes) {
+  const unsigned first_id = static_cast<unsigned>(side) * kKinds;
+  const auto add = [&](RTCGeometry geom, unsigned kind) {
+    const unsigned id = first_id + kind + (&set == &g.own ? 0u : kInGroup);
+    for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, id);
+    rtcReleaseGeometry(geom);
+  };
+  const auto add_shapes = [&](const auto& all, const PrimitiveRange& range, auto& part, unsigned kind) {
+    const Side s = side_of(range, side);
+    to.base[first_id + kind] = s.first;
+    part.shapes = std::span(all).subspan(s.first, s.count());
+    part.instances = g.instances.data();
+    if (s.count() > 0) add(shape_geometry(device, part), kind);
+  };
+  const Side triangles = side_of(set.triangles, side);
+  to.base[first_id + kTriangles] = triangles.first;
+  if (triangles.count() > 0)
+    add(triangle_geometry(device, g, triangles.first, triangles.count()), kTriangles);
+  add_shapes(g.spheres, set.spheres, to.spheres[side], kSpheres);
+  add_shapes(g.disks, set.disks, to.disks[side], kDisks);
+  add_shapes(g.cylinders, set.cylinders, to.cylinders[side], kCylinders);
+}
+
+// Adds the set's primitives; the caller commits the scenes.
+void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
+  const RTCDevice device = st.device;
+  // between() traces `all`, which is this scene only if there are no boundaries.
+  to.opaque = new_scene(device, st.coincident && !boundaries);
+  if (!boundaries) {
+    to.all = to.opaque;
+    return attach(device, g, set, to, 0, {to.opaque});
+  }
+  to.all = new_scene(device, st.coincident);
+  to.boundary = new_scene(device, false);
+  attach(device, g, set, to, 0, {to.opaque, to.all});
+  attach(device, g, set, to, 1, {to.boundary, to.all});
+}
+
+void commit(const Scenes& s) {
+  if (s.all != s.opaque) rtcCommitScene(s.all);
+  if (s.boundary) rtcCommitScene(s.boundary);
+  rtcCommitScene(s.opaque);
+}
+
+void attach_instance(RTCDevice device, const Affine& to_world, RTCScene of, unsigned id,
+                     std::initializer_list<RTCScene> scenes) {
+  RTCGeometry geom = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geom, of);
+  const auto& a = to_world.a;
+  const V3 b(to_world.b);
+  const float matrix[12] = {
+      static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2]), b.x,
+      static_cast<float>(a[3]), static_cast<float>(a[4]), static_cast<float>(a[5]), b.y,
+      static_cast<float>(a[6]), static_cast<float>(a[7]), static_cast<float>(a[8]), b.z};
+  rtcSetGeometryTransform(geom, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, matrix);
+  rtcCommitGeometry(geom);
+  for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, id);
+  rtcReleaseGeometry(geom);
+}
+
+void attach_instances(const Geometry& g, Accel::State& st) {
+  Scenes& own = *st.own;
+  for (std::uint32_t i = 0; i < g.instances.size(); ++i) {
+    const PlacedInstance& instance = g.instances[i];
+    st.group_of.push_back(instance.group);
+    if (g.groups[instance.group].count() == 0) continue;
+    const Scenes& group = st.groups[instance.group];
+    const unsigned id = kFirstInstance + i;
+    if (own.all == own.opaque) {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque});
+    } else if (!group.boundary) {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque, own.all});
+    } else {
+      attach_instance(st.device, instance.to_world, group.all, id, {own.all});
+      attach_instance(st.device, instance.to_world, group.boundary, id, {own.boundary});
+      if (g.groups[instance.group].any_opaque())
+        attach_instance(st.device, instance.to_world, group.opaque, id, {own.opaque});
+    }
+  }
+}
+
+PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive, std::uint32_t instance) {
+  return {static_cast<PrimitiveId::Kind>(geometry % kKinds), in.base[geometry] + primitive, instance};
+}
+// Primitive of a hit in an instance; not inlined, to keep it out of the code for primitives outside of
+// groups.
+[[gnu::noinline]] PrimitiveId instanced(const Accel::State& st, const RTCHit& hit) {
+  const std::uint32_t instance = hit.instID[0] - kFirstInstance;
+  return primitive_in(st.groups[st.group_of[instance]], hit.geomID - kInGroup, hit.primID, instance);
+}
+// nullopt: the ray hit nothing.
+[[gnu::always_inline]] inline std::optional<PrimitiveId> primitive_of(const Accel::State& st,
+                                                                      const RTCHit& hit) {
+  static_assert(RTC_INVALID_GEOMETRY_ID >= kInGroup);
+  if (hit.geomID < kInGroup) return primitive_in(*st.own, hit.geomID, hit.primID, kNone);
+  if (!kBuilt.instances || hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return instanced(st, hit);
+}
+
+[[gnu::always_inline]] inline std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene,
+                                                               const V3& o, const V3& d, float t_max) {
+  if (!near_enough(o) || !is_finite(d)) return std::nullopt;
+  RTCRayHit rh;
+  set_ray(rh.ray, o, d, t_max);
+  rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  Tracing tracing(o, d);
+  rtcIntersect1(scene, &tracing.context, &rh);
+  return primitive_of(st, rh.hit);
+}
+
+}  // namespace
+
+Accel::Accel() = default;
+Accel::~Accel() = default;
+Accel::Accel(Accel&&) noexcept = default;
+Accel& Accel::operator=(Accel&&) noexcept = default;
+
+Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
+  Accel a;
+  a.state_ = std::make_unique<State>();
+  State& st = *a.state_;
+  st.coincident = coincident;
+  st.device =
+      rtcNewDevice(fmt::format("threads={},user_threads=0,{}", std::max(1, threads), kDeviceConfig).c_str());
+  if (!st.device)
+    return fail(Errc::internal,
+                fmt::format("Embree does not start (code {})", static_cast<int>(rtcGetDeviceError(nullptr))));
+  rtcSetDeviceMemoryMonitorFunction(
+      st.device,
+      [](void* p, ssize_t n, bool) {
+        static_cast<State*>(p)->bytes += n;
+        return true;
+      },
+      &st);
+  bool boundaries = g.own.any_passing();
+  for (const PrimitiveSet& set : g.groups) {
+    Scenes& scenes = st.groups.emplace_back();
+    fill(st, g, set, set.any_passing(), scenes);
+    commit(scenes);
+    boundaries = boundaries || set.any_passing();
+  }
+  fill(st, g, g.own, boundaries, st.own.emplace());
+  attach_instances(g, st);
+  commit(*st.own);
+  if (const RTCError e = rtcGetDeviceError(st.device); e != RTC_ERROR_NONE) {
+    return fail(e == RTC_ERROR_OUT_OF_MEMORY ? Errc::resource_exhausted : Errc::internal,
+                fmt::format("Embree could not build the scene's BVH (code {})", static_cast<int>(e)));
+  }
+  return a;
+}
+
+std::optional<PrimitiveId> Accel::nearest(const V3& o, const V3& d, float t_max) const {
+  return trace(*state_, state_->own->all, o, d, t_max);
+}
+
+std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, float t_max) const {
+  if (!state_->own->boundary) return std::nullopt;
+  return trace(*state_, state_->own->boundary, o, d, t_max);
+}
+
+CoincidentHits Accel::between(const V3& a, const V3& b) const {
+  CoincidentHits coincident_hits;
+  const V3 d = b - a;
+  if (!state_->coincident || !near_enough(a) || !near_enough(b)) return coincident_hits;
+  RTCRayHit rh;
+  set_ray(rh.ray, a, d, 1);
+  rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  Collecting all(a, d);
+  all.context.filter = collect_callback;
+  rtcIntersect1(state_->own->all, &all.context, &rh);
+  for (std::size_t i = 0; i < all.count; ++i) coincident_hits.ids[i] = *primitive_of(*state_, all.met[i]);
+  // A triangle may be reported once for every leaf that contains part of it.
+  const auto first = coincident_hits.ids.begin(), last = first + static_cast<std::ptrdiff_t>(all.count);
+  std::sort(first, last, [](const PrimitiveId& x, const PrimitiveId& y) {
+    return std::tie(x.kind, x.index, x.instance) < std::tie(y.kind, y.index, y.instance);
+  });
+  coincident_hits.count = static_cast<int>(std::unique(first, last) - first);
+  return coincident_hits;
+}
+
+bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
+  if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
+  RTCRay ray;
+  set_ray(ray, o, d, t_max);
+  Tracing tracing(o, d);
+  rtcOccluded1(state_->own->opaque, &tracing.context, &ray);
+  return ray.tfar < 0;
+}
+
+bool Accel::has_boundaries() const { return state_->own->boundary != nullptr; }
+std::uint64_t Accel::bytes() const {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
+}
+std::string Accel::describe() {
+  // The version of the loaded library, which the headers do not know.
+  const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
+  const auto version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
+  if (device) rtcReleaseDevice(device);
+  return fmt::format("embree {} {}", version, kDeviceConfig);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,120 @@
+// Part of accel.cpp: Embree callbacks for spheres, disks and cylinders, and for collecting all primitives
+// along a ray.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "worker/render/base/built.h"
+#include "worker/render/base/work_counters.h"
+#include "worker/render/geometry/accel.h"
+#include "worker/render/geometry/shape_boxes.h"
+
+namespace ls::render {
+
+// Geometry ids, the same in every scene that they are attached to: kind + side * kKinds; side 0 is opaque, 1
+// lets light pass. In the scenes of groups they are higher by kInGroup, so that a hit's id alone identifies
+// primitives outside of groups. In the world's scenes the instances follow in order from kFirstInstance on.
+enum : unsigned {
+  kTriangles = 0,
+  kSpheres = 1,
+  kDisks = 2,
+  kCylinders = 3,
+  kKinds = 4,
+  kInGroup = 2 * kKinds,
+  kFirstInstance = 2 * kKinds
+};
+
+// All primitives but triangles are user geometries, intersected by our own double-precision code.
+template <class Shape>
+struct ShapeSet {
+  std::span<const Shape> shapes;
+  const PlacedInstance* instances = nullptr;  // the world's instances
+};
+
+template <class Shape>
+void bounds_callback(const RTCBoundsFunctionArguments* args) {
+  const Shape& s = static_cast<const ShapeSet<Shape>*>(args->geometryUserPtr)->shapes[args->primID];
+  // Rounded outwards by more than the last digit of the coordinates.
+  const Box b = box_of(s);
+  const V3d margin = (b.hi - b.lo) * .5e-6 + V3d(1e-6);
+  const V3 lo(b.lo - margin), hi(b.hi + margin);
+  *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
+}
+
+// What a callback needs to know of the ray: Embree's context, and the ray in world space. In an instance
+// Embree passes the ray transformed to the group's space in float32.
+struct Tracing {
+  RTCIntersectContext context;
+  const V3 *o, *d;
+
+  Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) {
+    rtcInitIntersectContext(&context);
+  }
+};
+
+template <class Shape>
+double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context,
+                      const RTCRay& ray) {
+  LS_COUNT(user_geometry);
+  const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
+  const Shape& s = set.shapes[prim];
+  if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    // The same as Geometry::complete_instanced, so that both find the same hits.
+    const auto& tracing = *reinterpret_cast<const Tracing*>(context);
+    const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
+    return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
+                     ray.tfar);
+  }
+  return intersect(s, V3d(ray.org_x, ray.org_y, ray.org_z), V3d(ray.dir_x, ray.dir_y, ray.dir_z), ray.tnear,
+                   ray.tfar);
+}
+
+// A trace with a filter that accepts no hit, so that all hits along the ray are collected.
+struct Collecting : Tracing {
+  using Tracing::Tracing;
+  std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set
+  std::size_t count = 0;
+
+  static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
+    auto& c = static_cast<Collecting&>(*reinterpret_cast<Tracing*>(context));
+    if (c.count < c.met.size())
+      c.met[c.count++] = {.primID = primitive, .geomID = geometry, .instID = {instance}};
+  }
+};
+inline void collect_callback(const RTCFilterFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+  Collecting::keep(args->context, hit->geomID, hit->primID, hit->instID[0]);
+  args->valid[0] = 0;  // reject, so that the traversal continues
+}
+
+template <class Shape>
+void intersect_callback(const RTCIntersectFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  auto* rh = reinterpret_cast<RTCRayHit*>(args->rayhit);
+  const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, rh->ray);
+  const auto tf = static_cast<float>(t);
+  if (!(tf < rh->ray.tfar)) return;
+  if (args->context->filter)
+    return Collecting::keep(args->context, args->geomID, args->primID, args->context->instID[0]);
+  rh->ray.tfar = tf;
+  rh->hit.primID = args->primID;
+  rh->hit.geomID = args->geomID;
+  rh->hit.instID[0] = args->context->instID[0];
+}
+
+template <class Shape>
+void occluded_callback(const RTCOccludedFunctionNArguments* args) {
+  if (!args->valid[0]) return;
+  auto* ray = reinterpret_cast<RTCRay*>(args->ray);
+  if (shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, *ray) < ray->tfar) {
+    ray->tfar = -std::numeric_limits<float>::infinity();
+  }
+}
+
+}  // namespace ls::render

@@ -1,0 +1,219 @@
+#include "worker/render/geometry/shape_import.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/assets/mesh.h"
+#include "common/base/overloaded.h"
+#include "worker/render/geometry/vertex_attributes.h"
+
+namespace ls::render {
+namespace {
+
+LocalMesh rectangle() {
+  LocalMesh m;
+  m.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  m.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  m.indices = {0, 1, 2, 0, 2, 3};
+  return m;
+}
+
+// Six faces; each has the unit square as its uv, u along a and v along a x n (as in Mitsuba 3.9.1's cube).
+LocalMesh cube() {
+  struct Face {
+    V3d n, a;
+  };
+  const Face faces[6] = {{{0, -1, 0}, {0, 0, 1}}, {{0, 1, 0}, {-1, 0, 0}}, {{1, 0, 0}, {0, 1, 0}},
+                         {{0, 0, 1}, {0, 1, 0}},  {{-1, 0, 0}, {0, 1, 0}}, {{0, 0, -1}, {0, -1, 0}}};
+  const V2 corners[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  LocalMesh m;
+  for (const Face& f : faces) {
+    const auto base = static_cast<std::uint32_t>(m.positions.size());
+    const V3d b = f.a.cross(f.n);
+    for (const V2& uv : corners) {
+      m.positions.push_back(f.n + f.a * (2. * uv.x - 1) + b * (2. * uv.y - 1));
+      m.uvs.push_back(uv);
+    }
+    for (std::uint32_t k : {0u, 2u, 1u, 0u, 3u, 2u}) m.indices.push_back(base + k);
+  }
+  return m;
+}
+
+Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
+                       const std::vector<scene::AttributeUse>& uses) {
+  auto path = files.path(shape.file);
+  if (!path) return tl::unexpected(path.error());
+  auto data = load_mesh(*path, files.name(shape.file), shape.shape_index, attribute_names(files.scene, uses));
+  if (!data) return tl::unexpected(data.error());
+  if (auto ok = check_attributes(*data, files.name(shape.file), files.scene, uses); !ok)
+    return tl::unexpected(ok.error());
+  LocalMesh m;
+  m.attributes = std::move(data->attributes);
+  m.indices = std::move(data->indices);
+  m.face_normals = data->face_normals;
+  m.dropped_triangles = data->dropped_triangles;
+  const std::size_t n = data->vertex_count();
+  m.positions.reserve(n);
+  for (std::size_t i = 0; i < n; ++i)
+    m.positions.emplace_back(data->positions[3 * i], data->positions[3 * i + 1], data->positions[3 * i + 2]);
+  if (!shape.face_normals && !data->face_normals && !data->normals.empty()) {
+    for (std::size_t i = 0; i < n; ++i)
+      m.normals.emplace_back(data->normals[3 * i], data->normals[3 * i + 1], data->normals[3 * i + 2]);
+  }
+  for (std::size_t i = 0; 2 * i < data->uvs.size(); ++i) {
+    const float v = data->uvs[2 * i + 1];
+    m.uvs.emplace_back(data->uvs[2 * i], shape.flip_tex_coords ? 1 - v : v);
+  }
+  return m;
+}
+
+Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
+  // Uniform scaling: the columns are orthogonal and equally long, up to the rounding of composed transforms.
+  const V3d x = m.vector({1, 0, 0}), y = m.vector({0, 1, 0}), z = m.vector({0, 0, 1});
+  const double l = x.length(), tolerance = 1e-5 * l;
+  if (std::abs(y.length() - l) > tolerance || std::abs(z.length() - l) > tolerance ||
+      std::abs(x.dot(y)) > tolerance * l || std::abs(y.dot(z)) > tolerance * l ||
+      std::abs(z.dot(x)) > tolerance * l) {
+    return fail(Errc::invalid_argument, "a sphere can only be scaled uniformly; use a mesh for an ellipsoid");
+  }
+  Sphere r;
+  r.center = m.point(V3d(s.center[0], s.center[1], s.center[2]));
+  r.radius = s.radius * l;
+  const V3d rows[3] = {x / l, y / l, z / l};
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) r.to_local[3 * i + k] = rows[i][k];
+  return r;
+}
+
+// The start of the angle follows from the direction as written in the scene (Mitsuba: the frame of Duff et
+// al. 2017).
+Result<Cylinder> place_cylinder(const CylinderShape& s, const Affine& m) {
+  const V3d p0(s.p0[0], s.p0[1], s.p0[2]), d = V3d(s.p1[0], s.p1[1], s.p1[2]) - p0, n = d.normalized();
+  const double sign = std::copysign(1., n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+  const V3d x = m.vector({1 + sign * n.x * n.x * a, sign * b, -sign * n.x}),
+            y = m.vector({b, sign + n.y * n.y * a, -n.y}), z = m.vector(d);
+  const double l = x.length(), tolerance = 1e-5;
+  if (!(d.length() > 0)) return fail(Errc::invalid_argument, "a cylinder's p0 and p1 are the same point");
+  if (std::abs(y.length() - l) > tolerance * l || std::abs(x.dot(y)) > tolerance * l * l ||
+      std::max(std::abs(x.dot(z)), std::abs(y.dot(z))) > tolerance * l * z.length())
+    return fail(Errc::invalid_argument, "a cylinder can only be stretched along its axis; use a mesh");
+  Cylinder r;
+  r.p0 = m.point(p0);
+  r.length = z.length();
+  r.axis = z / r.length;
+  r.u = (x - r.axis * r.axis.dot(x)).normalized();
+  r.v = r.axis.cross(r.u);
+  if (r.v.dot(y) < 0) r.v = -r.v;
+  r.radius = s.radius * l;
+  return r;
+}
+
+void transform(LocalMesh& m, const Affine& to_scene) {
+  for (V3d& p : m.positions) p = to_scene.point(p);
+  for (V3d& n : m.normals) {
+    n = to_scene.normal(n);
+    if (const double l = n.length(); l > 0) n /= l;
+  }
+}
+
+// If a file has no normals, the dialect computes smooth ones: each vertex's triangles weighted by their angle
+// there (Thuermer and Wuethrich 1998).
+void smooth(LocalMesh& m) {
+  m.normals.assign(m.positions.size(), V3d(0));
+  for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
+    const std::uint32_t* v = &m.indices[i];
+    const V3d n = (m.positions[v[1]] - m.positions[v[0]]).cross(m.positions[v[2]] - m.positions[v[0]]);
+    const double l = n.length();
+    if (!(l > 0) || !std::isfinite(l)) continue;
+    for (int k = 0; k < 3; ++k) {
+      const V3d a = m.positions[v[(k + 1) % 3]] - m.positions[v[k]],
+                b = m.positions[v[(k + 2) % 3]] - m.positions[v[k]];
+      m.normals[v[k]] += n / l * std::atan2(a.cross(b).length(), a.dot(b));
+    }
+  }
+  for (V3d& n : m.normals) {
+    if (const double l = n.length(); l > 0) n /= l;
+  }
+}
+
+}  // namespace
+
+Result<Placed> place(const Shape& shape, const AssetLoader& files,
+                     const std::vector<scene::AttributeUse>& uses) {
+  const Affine m(shape.to_world);
+  if (!m.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
+  if (!uses.empty() && !std::holds_alternative<MeshShape>(shape.geometry))
+    return fail(Errc::invalid_argument,
+                fmt::format("a texture reads its attribute \"{}\", but only meshes have attributes",
+                            attribute_names(files.scene, uses).front()));
+  Placed out;
+  auto ok = std::visit(
+      overloaded{
+          [&](const RectangleShape&) -> Result<void> {
+            out.mesh = rectangle();
+            return {};
+          },
+          [&](const CubeShape&) -> Result<void> {
+            out.mesh = cube();
+            return {};
+          },
+          [&](const SphereShape& s) -> Result<void> {
+            auto r = place_sphere(s, m);
+            if (!r) return tl::unexpected(r.error());
+            out.sphere = *r;
+            return {};
+          },
+          [&](const DiskShape&) -> Result<void> {
+            Disk d;
+            d.center = m.point({0, 0, 0});
+            d.u = m.vector({1, 0, 0});
+            d.v = m.vector({0, 1, 0});
+            d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);  // +z, also mirrored
+            out.disk = d;
+            return {};
+          },
+          [&](const CylinderShape& s) -> Result<void> {
+            auto r = place_cylinder(s, m);
+            if (!r) return tl::unexpected(r.error());
+            out.cylinder = *r;
+            return {};
+          },
+          [&](const MeshShape& s) -> Result<void> {
+            auto r = load(s, files, uses);
+            if (!r) return tl::unexpected(r.error());
+            out.mesh = std::move(*r);
+            return {};
+          }},
+      shape.geometry);
+  if (!ok) return tl::unexpected(ok.error());
+  transform(out.mesh, m);
+  out.normals_given = !out.mesh.normals.empty();
+  const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
+  if (mesh && !mesh->face_normals && !out.mesh.face_normals && !out.normals_given) smooth(out.mesh);
+  return out;
+}
+
+void add_bounds(const Placed& p, Bounds& b) {
+  for (const V3d& v : p.mesh.positions) b.add(v);
+  if (p.sphere) {
+    b.add(p.sphere->center - V3d(p.sphere->radius));
+    b.add(p.sphere->center + V3d(p.sphere->radius));
+  }
+  if (p.cylinder) {
+    const Cylinder& c = *p.cylinder;
+    for (int k = 0; k < 3; ++k) {
+      // half extent of the circle along this axis of the world
+      const double r = c.radius * std::sqrt(c.u[k] * c.u[k] + c.v[k] * c.v[k]),
+                   end = c.p0[k] + c.axis[k] * c.length;
+      b.lo[k] = std::min(b.lo[k], std::min(c.p0[k], end) - r);
+      b.hi[k] = std::max(b.hi[k], std::max(c.p0[k], end) + r);
+    }
+  }
+  if (p.disk) {
+    for (int k = 0; k < 4; ++k)
+      b.add(p.disk->center + p.disk->u * (k & 1 ? 1. : -1.) + p.disk->v * (k & 2 ? 1. : -1.));
+  }
+}
+
+}  // namespace ls::render

@@ -1,0 +1,30 @@
+// Bounding boxes of a world's surfaces, one per instance.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "worker/render/geometry/geometry.h"
+
+namespace ls::render {
+
+struct SurfaceBox {
+  std::uint32_t surface = 0, instance = kNone;
+  V3 lo, hi;
+
+  // True if the boxes overlap or are within a few ulps of each other.
+  bool touches(const SurfaceBox& o) const {
+    const float margin =
+        0x1p-18f * std::max(std::max(largest(lo), largest(hi)), std::max(largest(o.lo), largest(o.hi)));
+    return lo.x - margin <= o.hi.x && o.lo.x - margin <= hi.x && lo.y - margin <= o.hi.y &&
+           o.lo.y - margin <= hi.y && lo.z - margin <= o.hi.z && o.lo.z - margin <= hi.z;
+  }
+};
+
+// Boxes, in the world, of the wanted surfaces that have any primitives. nullopt if instances make the list
+// too long to be useful.
+std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
+                                                     const std::function<bool(const SurfaceInfo&)>& wanted);
+
+}  // namespace ls::render

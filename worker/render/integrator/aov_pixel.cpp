@@ -1,0 +1,158 @@
+#include "worker/render/integrator/aov_pixel.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/integrator/variant.h"
+#include "worker/render/math/rounded.h"
+
+namespace ls::render {
+namespace {
+
+constexpr AovSet kOfSurface = AovSet{}
+                                  .with(Aov::albedo)
+                                  .with(Aov::coverage)
+                                  .with(Aov::depth)
+                                  .with(Aov::geo_normal)
+                                  .with(Aov::normal)
+                                  .with(Aov::position)
+                                  .with(Aov::uv)
+                                  .with(Aov::shape_id)
+                                  .with(Aov::material_id);
+constexpr AovSet kOfLight = AovSet{}
+                                .with(Aov::direct)
+                                .with(Aov::emission)
+                                .with(Aov::indirect)
+                                .with(Aov::multiple)
+                                .with(Aov::single)
+                                .with(Aov::surface)
+                                .with(Aov::volume);
+static_assert((kOfSurface.bits() & kOfLight.bits()) == 0 &&
+              (kOfSurface.bits() | kOfLight.bits()) == (1u << kAovs) - 1);
+
+V2 uv_of_sphere(const Geometry& g, const SurfaceHit& hit) {
+  const Sphere& s = g.spheres[hit.primitive.index];
+  V3d p(hit.p);
+  if (hit.primitive.instance != kNone) p = g.instances[hit.primitive.instance].to_local.point(p);
+  return sphere_uv(s, (p - s.center).normalized());
+}
+
+// Directional albedo of a surface, estimated from one sampled direction: without the brightening by
+// refraction, and without the light that passed straight through.
+C3 albedo_of(const World& w, const FirstSurface& first, const SampleStream& stream, const V3& d) {
+  const SurfaceHit& hit = first.hit;
+  const Group g = stream.group(0, Purpose::albedo);
+  const auto s = w.bsdfs.sample(w.geometry.surfaces[hit.surface].bsdf, hit.uv_point(),
+                                hit.shading.to_local(-d), g.u(2), {g.u(0), g.u(1)});
+  if (!s) return C3(0);
+  const C3 weight = s->weight * (s->transmitted ? s->eta * s->eta : 1.f) * first.not_passed;
+  return is_finite(weight) ? weight : C3(0);
+}
+
+}  // namespace
+
+V2 uv_of(const Geometry& g, const SurfaceHit& hit) {
+  return hit.primitive.kind == PrimitiveId::Kind::sphere ? uv_of_sphere(g, hit) : hit.uv;
+}
+
+AovPixel::AovPixel(const World& world)
+    : world_(world),
+      planes_(planes_of(world.aovs)),
+      wants_surface_(world.aovs.any_of(kOfSurface)),
+      wants_light_(world.aovs.any_of(kOfLight)) {}
+
+void AovPixel::begin_pixel() {
+  sums_ = {};
+  hits_ = 0;
+  shapes_.clear();
+  materials_.clear();
+}
+
+void AovPixel::add(Aov aov, double a, double b, double c) {
+  Sums& s = sums_[static_cast<std::size_t>(aov)];
+  s[0] += a;
+  s[1] += b;
+  s[2] += c;
+}
+
+void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
+  if (wants_light_ && usable) add_light();
+  if (!wants_surface_) return;
+  x += world_.origin_x;
+  y += world_.origin_y;
+  const SampleStream stream(world_.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
+                            sample);
+  const CameraRay ray = camera_ray(world_, stream, x, y);
+  const auto first = PathTracer<Features{.passing = true}>(world_, stream).first_surface(ray);
+  if (first) add_surface(*first, stream, ray);
+}
+
+// A component can be as large as the whole radiance, which is usable; one that is not finite counts as 0.
+void AovPixel::add_light() {
+  const auto part = [&](LightPart p) {
+    const C3& c = split_[static_cast<std::size_t>(p)];
+    return is_finite(c) ? V3d(c) : V3d(0);
+  };
+  const V3d e = part(LightPart::unscattered), s1 = part(LightPart::surface_once),
+            s2 = part(LightPart::surface_again), v1 = part(LightPart::volume_once),
+            v2 = part(LightPart::volume_again);
+  const auto put = [&](Aov aov, const V3d& c) { add(aov, c.x, c.y, c.z); };
+  put(Aov::emission, e);
+  put(Aov::direct, e + s1 + v1);
+  put(Aov::indirect, s2 + v2);
+  put(Aov::surface, s1 + s2);
+  put(Aov::volume, v1 + v2);
+  put(Aov::single, v1);
+  put(Aov::multiple, v2);
+}
+
+void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray) {
+  const SurfaceHit& hit = first.hit;
+  const AovSet wanted = world_.aovs;
+  hits_ += 1;
+  add(Aov::coverage, 1);
+  const double distance =
+      (V3d(hit.p) - V3d(ray.o)).dot(V3d(ray.d)) + double{world_.camera.near_distance(ray.d)};
+  add(Aov::depth, distance / world_.geometry.scale);
+  const V3d p = V3d(hit.p) / world_.geometry.scale + world_.geometry.center;
+  add(Aov::position, p.x, p.y, p.z);
+  add(Aov::normal, hit.shading.n.x, hit.shading.n.y, hit.shading.n.z);
+  add(Aov::geo_normal, hit.ng.x, hit.ng.y, hit.ng.z);
+  if (wanted.has(Aov::uv)) {
+    const V2 uv = uv_of(world_.geometry, hit);
+    add(Aov::uv, uv.x, uv.y);
+  }
+  if (wanted.has(Aov::albedo)) {
+    const C3 a = albedo_of(world_, first, stream, ray.d);
+    add(Aov::albedo, a.x, a.y, a.z);
+  }
+  const std::uint32_t instance = hit.primitive.instance;
+  if (wanted.has(Aov::shape_id))
+    add_id(shapes_, instance == kNone ? world_.shape_ids[hit.surface] : world_.instance_ids[instance]);
+  if (wanted.has(Aov::material_id)) add_id(materials_, world_.material_ids[hit.surface]);
+}
+
+void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {
+  const auto known = std::find_if(seen.begin(), seen.end(), [&](const IdSlot& s) { return s.id == id; });
+  if (known != seen.end())
+    known->n += 1;
+  else
+    seen.push_back({id, 1});
+}
+
+void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
+  for (std::size_t p = 0; p < planes_.sums.size(); ++p) {
+    const AovPlane& plane = planes_.sums[p];
+    const double sum =
+        plane.hits ? hits_
+                   : sums_[static_cast<std::size_t>(plane.aov)][static_cast<std::size_t>(plane.component)];
+    planes[p * pixels + i] = rounded(sum);
+  }
+  float* ids = planes + planes_.sums.size() * pixels + i;
+  for (const Aov aov : planes_.ids) {
+    store_slots(ranked(aov == Aov::shape_id ? shapes_ : materials_), ids, pixels);
+    ids += kIdPlanes * pixels;
+  }
+}
+
+}  // namespace ls::render

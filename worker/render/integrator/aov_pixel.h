@@ -1,0 +1,47 @@
+// Accumulates the AOVs of a pixel while its samples are rendered. Definitions: docs/reference/aovs.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/image/aov/id_slots.h"
+#include "worker/render/integrator/light_components.h"
+#include "worker/render/integrator/path_tracer.h"
+#include "worker/render/math/sampler.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// uv of a hit, even if the surface's material does not use it.
+V2 uv_of(const Geometry& geometry, const SurfaceHit& hit);
+
+class AovPixel {
+ public:
+  explicit AovPixel(const World& world);
+
+  LightSplit* split() { return &split_; }  // of the current sample
+  void begin_pixel();
+  void begin_sample() { split_.fill(C3(0)); }  // C3{} is not initialised
+  // Call after rendering the sample at the image's pixel (x, y). `usable`: its radiance counts.
+  void end_sample(int x, int y, std::uint64_t sample, bool usable);
+  // Writes index i of the planes of planes_of(world.aovs), `pixels` floats each.
+  void store(float* planes, std::size_t pixels, std::size_t i) const;
+
+ private:
+  using Sums = std::array<double, 3>;
+  void add(Aov aov, double a, double b = 0, double c = 0);
+  void add_light();
+  void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
+  void add_id(std::vector<IdSlot>& seen, float id);
+
+  const World& world_;
+  AovPlanes planes_;
+  bool wants_surface_, wants_light_;
+  LightSplit split_;
+  std::array<Sums, kAovs> sums_{};
+  double hits_ = 0;
+  std::vector<IdSlot> shapes_, materials_;
+};
+
+}  // namespace ls::render

@@ -1,0 +1,268 @@
+// Part of path_tracer.h, which includes it: flights through media, medium emission, and the media on either
+// side of a surface.
+//
+// Where several media overlap, their particles are independent: a flight ends at the first collision in any
+// of them, and the transmittance is the product of theirs. The phase function at a vertex is that of the
+// medium in which the collision occurred; no mixture is needed.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/base/work_counters.h"
+#include "worker/render/media/emission.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::fly(const SurfaceHit* end, float reach) -> Step {
+  if constexpr (F.overlaps) {
+    if (medium_.several()) return fly_through_several(end, reach);
+  }
+  return fly_through(world_.media[medium_.one()], end, reach);
+}
+
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* end, float reach) -> Step {
+  const float t_max = end ? ray_.length_to(*end) : reach;
+  const Segment segment{t_max, ray_.lead(), end};
+  if constexpr (F.emission) add_medium_emission(medium, t_max);
+  const auto plan = Light<F>::ahead(*this, medium, segment);
+  const Group numbers = stream_.group(segment_, Purpose::flight);
+  const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
+                                       stream_.stream(segment_, Purpose::track_flight), counters_);
+  if (!flight.scattered) {
+    apply(flight);
+    return {Collision::escaped};
+  }
+  if (!may_scatter()) return {Collision::absorbed};
+  last_ = Vertex{};
+  last_.delta = false;
+  if (plan.matters()) last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
+  begin_vertex(segment, flight);
+  Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
+  return scatter_by_phase(medium);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
+  ray_.advance_to(segment, flight.t);
+  last_.p = ray_.origin;
+  apply(flight);
+  if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
+  ++depth_;
+}
+
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
+  const Group direction = stream_.group(depth_, Purpose::direction);
+  const PhaseSample s = medium.phase.sample(ray_.d, {direction.u(0), direction.u(1)});
+  last_.pdf = s.pdf;
+  ray_.d = s.w;
+  return {Collision::scattered, direction.u(3)};
+}
+
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reach) -> Step {
+  const float t_max = end ? ray_.length_to(*end) : reach;
+  const Segment segment{t_max, ray_.lead(), end};
+  if constexpr (F.emission) add_medium_emission_among(t_max);
+  RandomStream streams = stream_.stream(segment_, Purpose::overlap);
+  const Medium* met = nullptr;
+  std::size_t winner = 0;
+  Flight flight;
+  flight.t = t_max;
+  const auto media = medium_.all();
+  for (std::size_t i = 0; i < media.size(); ++i) {
+    const std::uint32_t bits = streams.bits();
+    const Medium& m = world_.media[media[i]];
+    const Flight f =
+        free_flight<F>(m, hero_, bits, ray_.start, ray_.d, flight.t, RandomStream(streams.next()), counters_);
+    if (!f.scattered) continue;
+    flight = f;
+    met = &m;
+    winner = i;
+  }
+  for (std::size_t i = 0; i < media.size(); ++i)
+    if (!met || i != winner) apply(passed(world_.media[media[i]], hero_, ray_.start, ray_.d, flight.t));
+  if (!met) return {Collision::escaped};
+  if (!may_scatter()) return {Collision::absorbed};
+  last_ = Vertex{};
+  last_.delta = false;
+  begin_vertex(segment, flight);
+  light_vertex(*met, last_.p, ray_.d);
+  return scatter_by_phase(*met);
+}
+
+// Next-event estimation at a vertex, weighted against sampling the phase function only.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const V3& d) {
+  const Lights& lights = world_.lights;
+  if (!lights.can_sample()) return;
+  const Group g = stream_.group(depth_, Purpose::light);
+  const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
+  const auto light = lights.sample(choice, p);
+  if (!light) return;
+  const float phase = medium.phase.value(d, light->direction);
+  const float weight = light->delta ? 1 : light->pdf / (light->pdf + phase);
+  const C3 arriving =
+      unoccluded(ray_.start, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
+  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
+}
+
+// Emission of each medium up to the point where a flight through the other media ends: the probability of
+// reaching a point is the transmittance of the others. A channel with a different extinction gets its own
+// flight, with the same random numbers.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
+  if (depth_ == 0 && world_.hide_emitters) return;
+  RandomStream streams = stream_.stream(segment_, Purpose::overlap_emission);
+  const auto media = medium_.all();
+  for (std::size_t i = 0; i < media.size(); ++i) {
+    const std::uint64_t key = streams.next();
+    const Medium& m = world_.media[media[i]];
+    if (m.emission_kind == EmissionKind::none) continue;
+    C3 light(0);
+    float last = -1;
+    C3 up_to_last;
+    for (int c = 0; c < 3; ++c) {
+      const float t = others_end(i, c, t_max, RandomStream(key));
+      if (t != last) {
+        up_to_last = m.grid ? emission_of_grid(m, ray_.start, ray_.d, t, RandomStream(mix64(key)))
+                            : emission_of_length(m, t);
+        last = t;
+      }
+      light[c] = up_to_last[c];
+    }
+    if (!is_black(light)) add(beta_ * light);
+  }
+}
+
+template <Features F, template <Features> class Light>
+float PathTracer<F, Light>::others_end(std::size_t but, int hero, float t_max, RandomStream streams) {
+  const auto media = medium_.all();
+  for (std::size_t i = 0; i < media.size(); ++i) {
+    const std::uint32_t bits = streams.bits();
+    const RandomStream stream(streams.next());
+    if (i == but) continue;
+    const Flight f =
+        free_flight<F>(world_.media[media[i]], hero, bits, ray_.start, ray_.d, t_max, stream, counters_);
+    if (f.scattered) t_max = f.t;
+  }
+  return t_max;
+}
+
+// Adds the emission of the whole segment ahead towards the path, wherever its flight will end; light found at
+// the end of the flight is added to it. Like a light that is hit, it counts at the path's current depth.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max) {
+  if (medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)) return;
+  LS_COUNT(medium_emission);
+  const C3 light = medium.grid ? emission_of_grid(medium, ray_.start, ray_.d, t_max,
+                                                  stream_.stream(segment_, Purpose::emission))
+                               : emission_of_length(medium, t_max);
+  if (!is_black(light)) add(beta_ * light);
+}
+
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::start_medium() const -> Within {
+  Within in;
+  if constexpr (F.overlaps) {
+    if (world_.overlaps) return world_.camera_media;
+  }
+  in.only(world_.camera_medium);
+  return in;
+}
+
+// The media on the side that w points to, for a path that travels along `from` and is in `in`. Coincident
+// null surfaces are crossed together with this one; only scenes with F.overlaps have any.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
+                                  const V3& from, Within in) const -> Within {
+  if constexpr (F.media) {
+    if (!(F.overlaps ? surface.borders : surface.transition)) return in;
+    const bool outside = dot(w, hit.ng) > 0;
+    if constexpr (F.overlaps) {
+      const bool through = outside == (dot(from, hit.ng) > 0);
+      if (surface.coincident_reach > 0 && through) return through_all(hit, w, from, in);
+      stand(surface, outside, through, in);
+    } else {
+      in.only(outside ? surface.exterior : surface.interior);
+    }
+  }
+  return in;
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const {
+  if (world_.overlaps) return in.stand(s, outside, through, world_.media);
+  if (s.transition) in.only(outside ? s.exterior : s.interior);
+}
+
+// The primitives between the two sides of a surface: from in front of everything that may coincide with it,
+// but not from behind the ray's origin, to where the ray continues.
+template <Features F, template <Features> class Light>
+CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
+  const V3 back = offset_point(hit, -w) - hit.p;
+  const float share = hit.t * std::abs(dot(from, back)) / dot(back, back);
+  CoincidentHits all = world_.accel.between(hit.p + back * std::min(1.f, share), offset_point(hit, w));
+  const auto end = std::remove(all.ids.begin(), all.ids.begin() + all.count, hit.primitive);
+  all.count = static_cast<int>(end - all.ids.begin());
+  return all;
+}
+
+// Leaves all bodies before entering any, so that a path is never inside more bodies than exist: cells of one
+// mesh that share a wall are one body.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
+    -> Within {
+  const CoincidentHits others = others_at(hit, from, w);
+  const V3 o = offset_point(hit, -w), d = normalize(offset_point(hit, w) - o);
+  for (const bool outside : {true, false}) {
+    const SurfaceInfo& own = world_.geometry.surfaces[hit.surface];
+    if ((dot(w, hit.ng) > 0) == outside) stand(own, outside, true, in);
+    for (int i = 0; i < others.count; ++i) {
+      SurfaceHit other;
+      if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], o, d, other)) continue;
+      const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
+      if (s.null && (dot(d, other.ng) > 0) == outside) stand(s, outside, true, in);
+    }
+  }
+  return in;
+}
+
+// Of coincident surfaces, replaces a null one by the one that scatters light, whichever the ray from o along
+// d found first: otherwise fog on a floor would let light through the floor, and a pane on a boundary would
+// not attenuate it. Shadow rays end at t_max, in front of the surface that their light is on.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
+  const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
+  if (!s.null || !(s.coincident_reach > 0)) return;
+  const CoincidentHits others = others_at(hit, d, d);
+  for (int i = 0; i < others.count; ++i) {
+    SurfaceHit other;
+    const PrimitiveId id = others.ids[static_cast<std::size_t>(i)];
+    if (!world_.geometry.complete(id, o, d, other) || world_.geometry.surfaces[other.surface].null ||
+        other.t > t_max)
+      continue;
+    hit = other;
+    return;
+  }
+}
+
+// Adds the emission of null surfaces that coincide with this hit, whichever of them the ray found: next-event
+// estimation, against which this light is weighted, finds them too.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
+  const CoincidentHits others = others_at(hit, ray_.d, ray_.d);
+  for (int i = 0; i < others.count; ++i) {
+    SurfaceHit other;
+    if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], ray_.origin, ray_.d, other))
+      continue;
+    const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
+    if (s.null && s.light != kNone) add_emission(other);
+  }
+}
+
+}  // namespace ls::render

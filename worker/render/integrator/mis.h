@@ -1,0 +1,18 @@
+// Weights of two strategies that sample the same light, by their densities (multiple importance sampling:
+// Veach 1997, section 9.2). Any two weights that add up to 1 give the right mean: a wrong one shows only in
+// the variance, so the tests check weights and second moments (tests/unit/render/integrator/mis_test.cpp).
+#pragma once
+
+#include "common/scene/scene_camera.h"
+
+namespace ls::render {
+
+// Weight of the strategy with density `own`.
+inline float balance_weight(float own, float other) { return own / (own + other); }
+
+inline float mis_weight(MisHeuristic heuristic, float own, float other) {
+  const float ratio = other / own;
+  return 1 / (1 + (heuristic == MisHeuristic::power ? ratio * ratio : ratio));
+}
+
+}  // namespace ls::render

@@ -1,0 +1,72 @@
+// A ray whose origin is moved off the surface it leaves, so that it does not meet that surface again.
+//
+// `start` is the point on the path; `origin` is where the ray is traced from. A medium fills the gap between
+// the two as well: at an optical depth of 1e6 it may be longer than a mean free path. So lengths within media
+// are measured from `start`.
+#pragma once
+
+#include <algorithm>
+
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/media/segment.h"
+
+namespace ls::render {
+
+struct OffsetRay {
+  V3 start{0, 0, 0}, origin{0, 0, 0}, d{0, 0, 1};
+
+  // How far `origin` is ahead of `start` along the ray; negative: it was moved backwards.
+  float lead() const { return dot(origin - start, d); }
+
+  // From `start` to the surface that the ray from `origin` met. If `origin` is farther from it than `start`
+  // (a vertex in a medium that was moved away from this very surface), the length is measured to the
+  // surface's plane.
+  float length_to(const SurfaceHit& hit) const {
+    const float ahead = lead();
+    if (ahead < 0) [[unlikely]]
+      return std::min(hit.t, std::max(0.f, dot(hit.p - start, hit.ng) / dot(d, hit.ng)));
+    return hit.t + ahead;
+  }
+
+  // `p`, the point at t of the segment, moved as far off the surfaces at both ends of the segment as rays
+  // that leave them: rounding must not put it on the other side.
+  V3 moved_off_ends(V3 p, Segment s, float t) const {
+    const V3 from_end = s.end ? missing_offset(offset_point(*s.end, -d) - s.end->p, p - s.end->p) : V3(0);
+    if (s.lead > 0) p += missing_offset(origin - start, d * t);
+    p += from_end;
+    if (s.lead < 0 && !(dot(from_end, from_end) > 0)) [[unlikely]]
+      p += remaining_lead(t);
+    return p;
+  }
+
+  // Continues from the vertex at t of the segment, in the direction it had.
+  void advance_to(Segment s, float t) {
+    const V3 p = start + d * t;
+    origin = moved_off_ends(p, s, t);
+    start = p;
+  }
+  // Leaves a surface in the direction w.
+  void leave(const SurfaceHit& hit, const V3& w) {
+    start = hit.p;
+    origin = offset_point(hit, w);
+    d = w;
+  }
+
+ private:
+  // How much of a surface's offset is still missing at a point with this displacement from the surface; zero
+  // once the point is clear. Behind the surface more than all of it is missing: a line nearly parallel to a
+  // curved surface leaves the surface earlier than the line from the moved start does, along which the length
+  // was measured.
+  static V3 missing_offset(const V3& offset, const V3& from_surface) {
+    const float share = dot(from_surface, offset) / dot(offset, offset);
+    return share < 1 ? offset * (1 - share) : V3(0);
+  }
+  // For a ray towards the surface that its start was moved away from, but that ends before it: the part of
+  // that displacement that remains at t.
+  V3 remaining_lead(float t) const {
+    const V3 offset = origin - start;
+    return offset * (1 - t * dot(offset, d) / dot(offset, offset));
+  }
+};
+
+}  // namespace ls::render

@@ -1,0 +1,349 @@
+// The path tracer: one sample of radiance along a camera ray.
+//
+// State of a path: `beta`, its weight relative to the hero channel, and `density`, each channel's sampling
+// density relative to the hero's (see medium.h). A contribution is beta * light / mean(density): the balance
+// heuristic over channels. Direct light is found both by BSDF or phase-function sampling and by next-event
+// estimation, combined by the balance heuristic. At surfaces next-event estimation starts from the path's own
+// vertices. In media it is a strategy, `Light` (vertex_nee.h: the default; segment_nee.h), with these
+// members:
+//   Plan ahead(path, medium, segment)               called before each flight through a medium: adds light
+//                                                   scattered once, anywhere on the segment;
+//   Plan::matters()                                 true if vertices on this segment need a Vertex;
+//   Vertex vertex(path, medium, plan, t)            the data kept for the vertex at distance t;
+//   void at_vertex(path, medium, p, d)              adds light scattered at that vertex;
+//   Vertex::found_as_light(), (pivot)               total density of next-event estimation over that of the
+//                                                   flight, for lights without a position and for lights with
+//                                                   this pivot. 1 if default-constructed, as on surfaces.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+
+#include "worker/render/base/features.h"
+#include "worker/render/integrator/light_components.h"
+#include "worker/render/integrator/mis.h"
+#include "worker/render/integrator/offset_ray.h"
+#include "worker/render/integrator/termination.h"
+#include "worker/render/integrator/vertex_nee.h"
+#include "worker/render/math/sampler.h"
+#include "worker/render/media/medium_stack.h"
+#include "worker/render/media/segment.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+struct SampleOutcome {
+  C3 radiance{0, 0, 0};
+  HealthCause cut_off = HealthCause::none;  // first cause for rejecting the sample, whatever its radiance
+  std::uint64_t majorant_violations = 0;
+
+  void reject(HealthCause cause) {
+    if (cut_off == HealthCause::none) cut_off = cause;
+  }
+};
+struct FirstSurface {
+  SurfaceHit hit;
+  float not_passed = 1;  // 1 / (1 - null transmission): compensates the decision not to pass straight through
+};
+
+enum class Collision : std::uint8_t {
+  escaped,    // the path reached the end of the segment
+  absorbed,   // the path ends here
+  scattered,  // the path goes on in a new direction, if it survives Russian roulette
+};
+
+template <Features F, template <Features> class Light = VertexNee>
+class PathTracer {
+ public:
+  // `split` receives the components of the radiance; required with F.split, ignored otherwise.
+  PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr)
+      : world_(world), stream_(stream), split_(split) {}
+
+  SampleOutcome trace(const CameraRay& ray);
+  // The first surface at which the path would be scattered if there were no media; for AOVs.
+  std::optional<FirstSurface> first_surface(const CameraRay& ray);
+
+ private:
+  friend class Light<F>;
+  struct Vertex {  // where the current ray was scattered
+    V3 p{0, 0, 0};
+    V3 n{0, 0, 0};      // normal of its surface; 0 in a medium
+    float pdf = 0;      // of the sampled direction
+    bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
+    typename Light<F>::Vertex in_medium;
+  };
+
+  struct Step {
+    Collision collision;
+    float roulette = 1;  // random number for Russian roulette, if scattered
+  };
+  using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
+
+  // Free flight up to the surface at `end`, or up to `reach` if there is none.
+  Step fly(const SurfaceHit* end, float reach);
+  Step fly_through(const Medium& medium, const SurfaceHit* end, float reach);
+  Step fly_through_several(const SurfaceHit* end, float reach);
+  void begin_vertex(Segment segment, const Flight& flight);
+  Step scatter_by_phase(const Medium& medium);
+  void light_vertex(const Medium& medium, const V3& p, const V3& d);
+  void add_medium_emission_among(float t_max);
+  float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
+  void add_medium_emission(const Medium& medium, float t_max);
+  Step scatter_on_surface(const SurfaceHit& hit);
+  bool passes_null(const SurfaceHit& hit);
+  bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
+  // True if the depth limit allows another segment after so many scatterings and so many passed null
+  // boundaries and null-transmitting surfaces.
+  bool may_go_on(int scatterings, int passed) const {
+    return world_.depth_allows(scatterings + (world_.passing_counts ? passed : 0));
+  }
+  void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
+  void light_surface(const SurfaceHit& hit, const V3& wo);
+  void add_emission(const SurfaceHit& hit);
+  void add_environment();
+  C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
+                RandomStream stream);
+  [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
+                                                      float left, Within medium, RandomStream stream);
+  C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
+  Within start_medium() const;
+  // `surface` is that of the hit.
+  [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
+                                              const V3& from, Within in) const;
+  void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
+  CoincidentHits others_at(const SurfaceHit& hit, const V3& from, const V3& w) const;
+  [[gnu::noinline]] Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
+  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
+  [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
+  bool survives(float u);
+
+  // `ahead`: the light was scattered once more than the path so far, in the medium ahead.
+  void add(const C3& weighted, bool ahead = false) {
+    C3 light = weighted;
+    if constexpr (F.chromatic) light = weighted / mean(density_);
+    outcome_.radiance += light;
+    if constexpr (F.split) {
+      const bool in_medium = depth_ == 0 ? ahead : first_in_medium_;
+      (*split_)[static_cast<std::size_t>(part_of(depth_ + ahead, in_medium))] += light;
+    }
+  }
+  static float mean(const C3& c) { return (c.x + c.y + c.z) / 3; }
+  void apply(const Flight& f) {
+    beta_ *= f.weight;
+    if constexpr (F.chromatic) density_ *= f.density;
+  }
+
+  const World& world_;
+  const SampleStream& stream_;
+  LightSplit* split_;
+  OffsetRay ray_;
+  C3 beta_{1, 1, 1}, density_{1, 1, 1};
+  float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
+  int hero_ = 0;
+  int depth_ = 0;    // scatterings so far
+  int passed_ = 0;   // null boundaries and null transmissions so far
+  int segment_ = 0;  // rays so far, null crossings included
+  Within medium_;
+  bool first_in_medium_ = false;  // with F.split: the first scattering was in a medium
+  Vertex last_;
+  SampleOutcome outcome_;
+  MediumCounters counters_;
+};
+
+template <Features F, template <Features> class Light>
+SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
+  if (!world_.depth_allows(0)) return outcome_;
+  ray_ = {ray.o, ray.o, ray.d};
+  last_.p = ray.o;
+  if constexpr (F.media) medium_ = start_medium();
+  if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
+  float t_max = ray.t_max;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if constexpr (F.overlaps) {
+      if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    }
+    if constexpr (F.media) {
+      if (medium_.any()) {
+        const Step step = fly(met ? &hit : nullptr, t_max);
+        if (step.collision == Collision::scattered) {
+          if (!survives(step.roulette)) break;
+          continue;
+        }
+        if (step.collision == Collision::absorbed || !world_.depth_allows(depth_) || is_black(beta_)) break;
+      }
+    }
+    if (!met) {
+      // A non-finite direction meets nothing: reject the sample. One that was cut off before keeps its cause.
+      if (!F.health || is_finite(ray_.d))
+        add_environment();
+      else
+        outcome_.reject(HealthCause::no_direction);
+      break;
+    }
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if constexpr (F.found_lights && F.overlaps) {
+      if (world_.lights_on_others && surface.coincident_reach > 0) add_emission_of_others(hit);
+    }
+    if (!surface.plain) {
+      if (F.found_lights && surface.light != kNone) add_emission(hit);
+      if constexpr (F.passing) {
+        if ((F.boundaries && surface.null) ||
+            (F.null_transmission && surface.null_transmission && passes_null(hit))) {
+          if (!may_go_on(depth_, ++passed_)) break;
+          pass_boundary(hit, surface);
+          if (is_black(beta_)) break;
+          continue;
+        }
+      }
+    }
+    const Step step = scatter_on_surface(hit);
+    if (step.collision == Collision::absorbed || !survives(step.roulette)) break;
+  }
+  if (segment_ == kMaxSegments) outcome_.reject(HealthCause::too_many_surfaces);
+  if constexpr (F.overlaps)
+    if (medium_.overflowed()) outcome_.reject(HealthCause::nested_media);
+  outcome_.majorant_violations = counters_.majorant_violations;
+  return outcome_;
+}
+
+// Passes index-matched surfaces, and null-transmitting ones with their probability, using the same random
+// numbers as the path itself as long as both meet the same surfaces.
+template <Features F, template <Features> class Light>
+std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
+  ray_ = {ray.o, ray.o, ray.d};
+  float t_max = ray.t_max;
+  FirstSurface first;
+  SurfaceHit& hit = first.hit;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
+    if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return std::nullopt;
+    if (world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    beta_ = C3(1);
+    if (!surface.null && !(surface.null_transmission && passes_null(hit))) {
+      first.not_passed = beta_.x;
+      return first;
+    }
+    ray_.origin = offset_point(hit, ray_.d);
+  }
+  return std::nullopt;
+}
+
+// Next-event estimation at a surface.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
+  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+  if (!world_.lights.can_sample() || !surface.smooth) return;
+  const Group g = stream_.group(depth_, Purpose::light);
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n);
+  const auto light = world_.lights.sample(choice, hit.p);
+  if (!light) return;
+  const V3 wi = hit.shading.to_local(light->direction);
+  // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
+  // directions are checked likewise.
+  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
+  const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
+  if (is_black(f.f_cos)) return;
+  const float weight = !F.found_lights || light->delta ? 1 : balance_weight(light->pdf, f.pdf);
+  const V3 p = offset_point(hit, light->direction);
+  const Within medium = beyond(hit, surface, light->direction, ray_.d, medium_);
+  const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
+  if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
+}
+
+// absorbed: by the surface, or because the path has reached its maximum depth.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
+  if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
+  ++depth_;
+  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+  const V3 wo = hit.shading.to_local(-ray_.d);
+  light_surface(hit, wo);
+  const Group g = stream_.group(depth_, Purpose::direction);
+  const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
+  if (!s) return {Collision::absorbed};
+  const V3 w = normalize(hit.shading.to_world(s->wi));
+  // the direction crosses the geometric surface
+  if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return {Collision::absorbed};
+  beta_ *= s->weight;
+  if (s->transmitted) eta_scale_ *= s->eta * s->eta;
+  last_ = Vertex{};
+  last_.p = hit.p;
+  last_.n = hit.shading.n;
+  last_.pdf = s->pdf;
+  last_.delta = s->delta;
+  // For reflected rays too: the media on either side are those the scene declares (as for next-event
+  // estimation).
+  if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
+  ray_.leave(hit, w);
+  return {Collision::scattered, g.u(3)};
+}
+
+// Decides whether the path passes straight through a null-transmitting surface. If so it is not scattered
+// there: it gets no vertex and no extra depth, and a light that it hits is weighted against next-event
+// estimation from the previous vertex, whose shadow rays pass the surface with the same transmission
+// (through_boundaries). The random numbers are keyed by segment: those of a vertex would be used again at the
+// next one.
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::passes_null(const SurfaceHit& hit) {
+  const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
+  const NullTransmission null_transmission =
+      world_.bsdfs.null_transmission(bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d));
+  if (!(null_transmission.probability > 0)) return false;
+  if (stream_.group(segment_, Purpose::null_transmission).u(0) < null_transmission.probability) {
+    beta_ *= null_transmission.transmission / null_transmission.probability;
+    return true;
+  }
+  beta_ /= 1 - null_transmission.probability;
+  return false;
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit, [[maybe_unused]] const SurfaceInfo& surface) {
+  ray_.leave(hit, ray_.d);
+  if constexpr (F.media) medium_ = beyond(hit, surface, ray_.d, ray_.d, medium_);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
+  if (depth_ == 0 && world_.hide_emitters) return;
+  const C3 emitted = world_.lights.emitted(hit, -ray_.d);
+  if (is_black(emitted)) return;
+  float weight = 1;
+  if (!last_.delta) {
+    const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n);
+    weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
+  }
+  add(beta_ * emitted * weight);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_environment() {
+  if (!F.found_lights || !world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  const float pdf = last_.pdf / last_.in_medium.found_as_light();
+  add(beta_ * world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf));
+}
+
+// Russian roulette; false ends the path.
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::survives(float u) {
+  if (is_black(beta_)) return false;
+  if (depth_ < world_.rr_depth) return true;
+  float size = max_component(beta_) * eta_scale_;
+  if constexpr (F.chromatic) size /= mean(density_);
+  const float q = std::min(size, forced_survival(depth_));
+  if (q >= 1) return true;
+  if (!(u < q)) return false;
+  beta_ /= q;
+  return true;
+}
+
+}  // namespace ls::render
+
+#include "worker/render/integrator/medium_crossing.h"
+#include "worker/render/integrator/shadow_ray.h"

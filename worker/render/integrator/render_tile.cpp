@@ -1,0 +1,201 @@
+#include "worker/render/render.h"
+
+#include <immintrin.h>
+
+#include <bit>
+#include <cmath>
+
+#include "worker/render/integrator/aov_pixel.h"
+#include "worker/render/integrator/variant.h"
+#include "worker/render/math/rounded.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+// Treats denormals as zero while rays are traced, as Embree requires, but not beyond: folding needs them.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned saved_;
+};
+
+// Cheapest first; the last covers every scene.
+constexpr Variant kVariants[] = {
+    variant<Features{}>("surfaces"),
+    variant<Features{.passing = true}>("surfaces that light passes"),
+    variant<Features{.media = true, .passing = true}>("homogeneous grey media"),
+    variant<Features{.media = true, .chromatic = true, .passing = true}>("homogeneous chromatic media"),
+    variant<Features{.media = true, .grids = true, .passing = true}>("grey grids"),
+    variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
+    variant<kEveryScene>("everything"),
+};
+static_assert(std::end(kVariants)[-1].covers == kEveryScene);
+
+std::span<const Variant> variants_for(const World& w) {
+  return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
+}
+const Variant& split_variant(const World& w) { return w.distant_mis ? kDistantSplitVariant : kSplitVariant; }
+const Variant& choose(const World& w) {
+  for (const Variant& v : variants_for(w)) {
+    if (v.covers.covers(w.need)) return v;
+  }
+  return split_variant(w);
+}
+
+// The largest radiance of which 2^31 samples can be summed in float32. A larger sample is an error of the
+// scene; adding it would make the whole unit infinite, which no retry can fix. NaN fails the test too. The
+// limit applies to single samples, so that rejection does not depend on how samples are grouped.
+constexpr float kLargestRadiance = 0x1p96f;
+bool usable(const SampleOutcome& s) {
+  const C3& c = s.radiance;
+  return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
+         std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
+}
+// True if usable and nothing needs to be counted, as for nearly every sample. Floats from 0 up to the limit
+// have the same order as their bit patterns; negative ones and NaN lie beyond the limit.
+bool clean(const SampleOutcome& s) {
+  const auto fine = [](float x) {
+    return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(kLargestRadiance);
+  };
+  const C3& c = s.radiance;
+  return fine(c.x) && fine(c.y) && fine(c.z) && s.cut_off == HealthCause::none && s.majorant_violations == 0;
+}
+bool negative(const SampleOutcome& s) { return s.radiance.x < 0 || s.radiance.y < 0 || s.radiance.z < 0; }
+
+// Why the sample is not usable; none if it is.
+HealthCause rejected_for(const SampleOutcome& s) {
+  if (usable(s) || s.cut_off != HealthCause::none) return s.cut_off;
+  const C3& c = s.radiance;
+  if (std::isnan(c.x) || std::isnan(c.y) || std::isnan(c.z)) return HealthCause::not_a_number;
+  return is_finite(c) ? HealthCause::too_large : HealthCause::infinite;
+}
+
+// Not inlined, to keep it out of the code for good samples.
+[[gnu::cold, gnu::noinline]] void count(const SampleOutcome& s, const HealthLocation& spot, Health& health) {
+  health.add(HealthCause::majorant_violation, s.majorant_violations, spot);
+  const HealthCause cause = rejected_for(s);
+  health.add(cause, 1, spot);
+  if (cause == HealthCause::none && negative(s)) health.add(HealthCause::negative, 1, spot);
+}
+
+struct PixelSums {
+  double half[2][3] = {};
+};
+
+// AOV accumulators beside the colour sums: this one, which does nothing, or an AovPixel.
+struct NoAovs {
+  static LightSplit* split() { return nullptr; }
+  static void begin_pixel() {}
+  static void begin_sample() {}
+  static void end_sample(int, int, std::uint64_t, bool) {}
+  static void store(float*, std::size_t, std::size_t) {}
+};
+
+template <class Aovs>
+PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range, Health& health,
+                       Breadcrumb* crumb, Aovs& aovs) {
+  PixelSums sums;
+  for (std::uint64_t s = range.s0; s < range.s1; ++s) {
+    if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
+    aovs.begin_sample();
+    const SampleOutcome out = sample(w, x, y, s, aovs.split());
+    aovs.end_sample(x, y, s, usable(out));
+    // A bad sample is counted, contributes zero and stays in N; it is never drawn again.
+    if (kBuilt.health && !clean(out)) [[unlikely]] {
+      count(out, {x, y, s}, health);
+      if (!usable(out)) continue;
+    }
+    for (int c = 0; c < 3; ++c) sums.half[s & 1][c] += static_cast<double>(out.radiance[c]);
+  }
+  return sums;
+}
+
+template <class Aovs>
+TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+                            const std::atomic<bool>* stop, Breadcrumb* crumb, Aovs aovs) {
+  const FlushDenormals mode;
+  TileResult r;
+  const auto pixels = static_cast<std::size_t>(tile.pixels());
+  r.sums.assign((6 + planes_of(w.aovs).count()) * pixels, 0.f);
+  std::size_t i = 0;
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    if (stop && stop->load(std::memory_order_relaxed)) {
+      r.stopped = true;
+      return r;
+    }
+    for (int x = tile.x0; x < tile.x1; ++x, ++i) {
+      if (crumb) {
+        crumb->x.store(x, std::memory_order_relaxed);
+        crumb->y.store(y, std::memory_order_relaxed);
+      }
+      aovs.begin_pixel();
+      const PixelSums sums = render_pixel(w, sample, x, y, range, r.health, crumb, aovs);
+      aovs.store(r.sums.data() + 6 * pixels, pixels, i);
+      for (std::size_t h = 0; h < 2; ++h)
+        for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
+    }
+  }
+  return r;
+}
+TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+                            const std::atomic<bool>* stop, Breadcrumb* crumb) {
+  if (w.aovs.empty()) return render_tile_with(w, sample, tile, range, stop, crumb, NoAovs{});
+  return render_tile_with(w, sample, tile, range, stop, crumb, AovPixel(w));
+}
+
+// For a variant that splits the light, whether or not the settings request it.
+TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
+  return render_tile_with(w, v.sample, tile, range, nullptr, nullptr, AovPixel(w));
+}
+
+}  // namespace
+
+TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
+                       Breadcrumb* breadcrumb) {
+  return render_tile_with(world, choose(world).sample, tile, samples, stop, breadcrumb);
+}
+
+std::vector<std::string> all_variants(const World& world) {
+  std::vector<std::string> names;
+  for (const Variant& v : variants_for(world)) names.emplace_back(v.name);
+  names.emplace_back(split_variant(world).name);
+  return names;
+}
+
+std::vector<std::string> covering_variants(const World& world) {
+  std::vector<std::string> names;
+  for (const Variant& v : variants_for(world)) {
+    if (v.covers.covers(world.need)) names.emplace_back(v.name);
+  }
+  names.emplace_back(split_variant(world).name);
+  return names;
+}
+
+TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
+  for (const Variant& v : variants_for(world)) {
+    if (name == v.name) return render_tile_with(world, v.sample, tile, samples, nullptr, nullptr);
+  }
+  const Variant& split = split_variant(world);
+  if (name == split.name) return render_split(world, split, tile, samples);
+  return {};
+}
+
+SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
+  const FlushDenormals mode;
+  LightSplit split;
+  split.fill(C3(0));
+  const SampleOutcome out = choose(world).sample(world, x, y, sample, &split);
+  SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
+  count(out, {x, y, sample}, value.health);
+  return value;
+}
+
+const Health& changed_inputs(const World& world) { return world.inputs; }
+
+}  // namespace ls::render

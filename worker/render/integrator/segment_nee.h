@@ -1,0 +1,183 @@
+// The integrator `volpath_distant_mis` as a strategy of path_tracer.h: on every segment through a medium,
+// light scattered once on it is found by next-event estimation from points sampled for that purpose, not from
+// the vertices at which the path's own flights end. Those have no next-event estimation.
+//
+// Points are sampled by (D) depth: the truncated exponential, in grids that of the macro cells' means
+// (optical_depth.h) mixed with a uniform density; and by (A) angle: equi-angularly about the light. Each
+// yields a point of its own; `heuristic` weights their densities e_D and e_A against each other. For lights
+// without a position and segments without an end (A) is undefined, and (D) is used alone.
+//
+// Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
+// that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
+// next-event estimation gets the weight e p_l / (e p_l + f p_s), where e is the sum of the densities used.
+// Any functions of the path alone would be unbiased; closer approximations give less variance. Channels are
+// combined as in path_tracer.h: densities are means over each channel as the hero.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/integrator/equiangular.h"
+#include "worker/render/integrator/mis.h"
+#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/math/sampler.h"
+#include "worker/render/media/optical_depth.h"
+#include "worker/render/media/segment.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+template <Features F>
+class SegmentNee {
+ public:
+  struct Plan {
+    OpticalDepthIn<F> depths;
+    bool angles = false;  // the segment is finite, so points can be sampled by angle
+
+    static bool matters() { return true; }
+  };
+  struct Vertex {  // default-constructed: not in a medium
+    bool by_depth = true, by_angle = false;
+    float depth_ratio = 1;  // e_D / f
+    float flight_pdf = 0, t = 0;
+    V3 o{0, 0, 0}, d{0, 0, 0};
+    float length = 0;
+
+    float found_as_light() const { return depth_ratio; }
+    float found_as_light(const V3& pivot) const {
+      if (!by_angle) return depth_ratio;
+      const float ratio = flight_pdf > 0 ? angle_pdf(pivot) / flight_pdf : kMaxRatio;
+      return std::min(by_depth ? depth_ratio + ratio : ratio, kMaxRatio);
+    }
+    float angle_pdf(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t); }
+  };
+
+  template <class Path>
+  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
+    Plan plan{OpticalDepthIn<F>(medium, path.ray_.start, path.ray_.d, segment.length)};
+    const OpticalDepthIn<F>& s = plan.depths;
+    plan.angles =
+        path.world_.distance != DistanceSampling::exponential && std::isfinite(s.to()) && s.to() > s.from();
+    const Lights& lights = path.world_.lights;
+    if (!path.may_scatter() || !lights.can_sample() || !(s.total() > 0)) return plan;
+    if (path.world_.distance == DistanceSampling::mis || !plan.angles) {
+      const Group g = path.stream_.group(path.segment_, Purpose::distance);
+      const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+      propose(path, medium, segment, plan, choice, false, g.bits[3]);
+    }
+    if (plan.angles) {
+      const Group g = path.stream_.group(path.segment_, Purpose::segment);
+      const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+      if (choice.has_place || path.world_.distance == DistanceSampling::equiangular)
+        propose(path, medium, segment, plan, choice, choice.has_place, g.bits[3]);
+    }
+    return plan;
+  }
+
+  template <class Path>
+  static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
+    return vertex_at(path, medium, plan, plan.depths.at(t));
+  }
+
+  template <class Path>
+  static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}  // all done in ahead()
+
+ private:
+  // The mean of a density over channels, weighted by the channel densities of the path so far.
+  template <class Path, class Fn>
+  static float over_channels(const Path& path, const Medium& medium, Fn density) {
+    if constexpr (F.chromatic) {
+      float sum = 0;
+      for (int c = 0; c < 3; ++c) sum += path.density_[c] * density(medium.sigma_t[c]);
+      return sum / 3 / Path::mean(path.density_);
+    } else {
+      const float e = density(medium.sigma_t.x);
+      return (e + e + e) / 3;
+    }
+  }
+
+  // Density of (D), per unit of x.
+  template <class Path>
+  static float depth_pdf(const Path& path, const Medium& medium, const Plan& plan, float x) {
+    const float total = plan.depths.total();
+    return over_channels(path, medium, [&](float sigma) {
+      return F.grids && medium.grid ? mixed_depth_pdf(sigma, total, x) : truncated_pdf(sigma, total, x);
+    });
+  }
+  static float depth_sample(const Medium& medium, const Plan& plan, int hero, std::uint32_t bits) {
+    const float total = plan.depths.total();
+    if (!(F.grids && medium.grid))
+      return truncated_sample(medium.sigma_t[hero], total, (bits + .5) * 0x1p-32);
+    return mixed_depth_sample(medium.sigma_t[hero], total, bits);
+  }
+
+  template <class Path>
+  static Vertex vertex_at(const Path& path, const Medium& medium, const Plan& plan,
+                          const OpticalDepth::Point& at_point) {
+    const float flight =
+        over_channels(path, medium, [&](float sigma) { return sigma * std::exp(-sigma * at_point.x); });
+    const DistanceSampling distance = path.world_.distance;
+    Vertex v;
+    v.by_angle = plan.angles;
+    v.by_depth = distance != DistanceSampling::equiangular || !plan.angles;
+    v.depth_ratio =
+        flight > 0 ? std::min(depth_pdf(path, medium, plan, at_point.x) / flight, kMaxRatio) : kMaxRatio;
+    v.flight_pdf = at_point.rate * flight;
+    v.t = at_point.t - plan.depths.from();
+    v.o = path.ray_.start + path.ray_.d * plan.depths.from();
+    v.d = path.ray_.d;
+    v.length = plan.depths.to() - plan.depths.from();
+    return v;
+  }
+
+  // Light scattered once, from one sampled point.
+  template <class Path>
+  static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
+                      const LightChoice& choice, bool by_angle, std::uint32_t bits) {
+    const OpticalDepthIn<F>& s = plan.depths;
+    const V3 pivot = choice.has_place ? path.world_.lights.pivot(choice) : V3(0);
+    OpticalDepth::Point at_point;
+    V3 p;
+    float e_angle = 0;
+    if (by_angle) {
+      const V3 o = path.ray_.start + path.ray_.d * s.from();
+      const auto a = EquiAngular(o, path.ray_.d, s.to() - s.from(), pivot).sample(unit_float(bits));
+      at_point = s.at(s.from() + a.t);
+      p = a.p;
+      e_angle = a.pdf;
+    } else {
+      const float x = depth_sample(medium, plan, path.hero_, bits);
+      if (!std::isfinite(x)) return;  // the hero has no extinction, in a medium without end
+      at_point = s.after(x);
+      p = path.ray_.start + path.ray_.d * at_point.t;
+    }
+    const V3 start = p;
+    p = path.ray_.moved_off_ends(p, segment, at_point.t);
+    const C3 scattering = at_point.rate > 0 ? s.scattering(at_point, p) : C3(0);
+    if (is_black(scattering)) return;
+    const auto light = path.world_.lights.sample(choice, p);
+    if (!light) return;
+
+    const Vertex v = vertex_at(path, medium, plan, at_point);
+    const bool both = choice.has_place && v.by_angle && v.by_depth;
+    const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
+    if (both && !by_angle) e_angle = v.angle_pdf(pivot);
+    const float own = by_angle ? e_angle : e_depth;
+    if (!(own > 0)) return;
+    float weight = both ? mis_weight(path.world_.heuristic, own, by_angle ? e_depth : e_angle) : 1.f;
+    const float phase = medium.phase.value(path.ray_.d, light->direction);
+    if (!light->delta) {
+      const float found = choice.has_place ? v.found_as_light(pivot) : v.found_as_light();
+      weight *= 1 / (1 + phase / (light->pdf * found));
+    }
+    RandomStream stream =
+        path.stream_.stream(path.segment_, by_angle ? Purpose::track_segment : Purpose::track_distance);
+    const C3 arriving = path.unoccluded(start, p, *light, path.medium_, RandomStream(stream.next()));
+    if (is_black(arriving)) return;
+    const C3 through =
+        transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t, RandomStream(stream.next()));
+    path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)), true);
+  }
+};
+
+}  // namespace ls::render

@@ -1,0 +1,92 @@
+// Part of path_tracer.h, which includes it: the light carried by a shadow ray.
+#pragma once
+
+#include <algorithm>
+
+#include "worker/render/base/features.h"
+#include "worker/render/base/work_counters.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Light that reaches `start` from the sampled light through boundaries and media. p is `start` moved off its
+// surface after the light was sampled: the ray is re-aimed from p, so that it ends just before the light and
+// not on it.
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
+                                    const Within& medium, RandomStream stream) {
+  V3 d = light.direction;
+  float left = light.distance;
+  if (std::isfinite(left)) {
+    const V3 f = light.target - p;
+    left = std::sqrt(dot(f, f));
+    if (!(left > 0)) return light.radiance;
+    d = f / left;
+  }
+  LS_COUNT(shadow_rays);
+  if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
+  bool walk = F.passing && world_.shadows_walk;
+  if constexpr (F.media) walk = walk || medium.any();
+  return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
+}
+
+// Attenuates `value` along the unoccluded ray from p by null transmission at surfaces and transmittance of
+// media.
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
+                                            Within medium, RandomStream stream) {
+  OffsetRay ray{start, p, d};
+  for (int i = 0; i < kMaxShadowSegments; ++i) {
+    SurfaceHit hit;
+    LS_COUNT(boundary_rays);
+    const auto primitive = world_.accel.nearest_boundary(ray.origin, d, left);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, d, hit);
+    if constexpr (F.overlaps) {
+      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, d, left);
+    }
+    if constexpr (F.media) {
+      if (medium.any()) {
+        const float t = met && hit.t <= left ? ray.length_to(hit) : std::max(0.f, left + ray.lead());
+        value *= through_media(medium, ray.start, d, t, stream);
+        if (is_black(value)) return value;
+      }
+    }
+    if (!met) return value;
+    if (!may_go_on(depth_, passed_ + i + 1)) return {0, 0, 0};
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (F.null_transmission && surface.null_transmission) {
+      value *=
+          world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
+      if (is_black(value)) return value;
+    }
+    if constexpr (F.media) medium = beyond(hit, surface, d, d, medium);
+    if constexpr (F.overlaps) {
+      if (medium.overflowed()) {
+        outcome_.reject(HealthCause::nested_media);
+        return {0, 0, 0};
+      }
+    }
+    const V3 last = ray.origin;
+    ray.leave(hit, d);
+    if (std::isfinite(left)) left -= dot(ray.origin - last, d);
+    if (!(left > 0)) return value;
+  }
+  outcome_.reject(HealthCause::too_many_surfaces);
+  return {0, 0, 0};
+}
+
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::through_media(const Within& media, const V3& from, const V3& d, float t,
+                                       RandomStream& stream) const {
+  if constexpr (F.overlaps) {
+    if (media.several()) {
+      C3 value(1);
+      for (const std::uint32_t m : media.all())
+        value *= transmittance<F>(world_.media[m], from, d, 0, t, RandomStream(stream.next()));
+      return value;
+    }
+  }
+  return transmittance<F>(world_.media[media.one()], from, d, 0, t, RandomStream(stream.next()));
+}
+
+}  // namespace ls::render

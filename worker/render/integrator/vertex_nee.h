@@ -1,0 +1,155 @@
+// The default strategy of path_tracer.h for light in media: (1) next-event estimation at each vertex, and (3)
+// next-event estimation at points sampled equi-angularly about the light on each segment: in homogeneous
+// media for every light with a position; in grids, on the part of a segment that has any density, for point
+// lights (docs/decisions/0011-equi-angular-points-in-grids.md).
+//
+// (2) is phase-function sampling that hits a light. For a vertex at distance t of a segment, (1) and (2)
+// share the density f(t) of free flight and (3) has e(t). With p_l, p_s the solid-angle densities of light
+// and direction sampling, the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only the
+// ratio e / f matters: equiangular_ratio() below. In grids f is the density of flights through the macro
+// cells' means (optical_depth.h): weights need not use the true density, only the same function of the vertex
+// for all strategies.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/base/features.h"
+#include "worker/render/integrator/equiangular.h"
+#include "worker/render/math/sampler.h"
+#include "worker/render/media/optical_depth.h"
+#include "worker/render/media/segment.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Density of the free flight that ends at this point, averaged over channels as the hero. `density`: that of
+// the path so far, by channel, relative to the hero's.
+template <Features F>
+float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const OpticalDepth::Point& at_point) {
+  if constexpr (F.chromatic) {
+    float num = 0;
+    for (int c = 0; c < 3; ++c) num += density[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * at_point.x));
+    return at_point.rate * (num / 3 / ((density.x + density.y + density.z) / 3));
+  } else {
+    const float s = m.sigma_t.x * std::exp(-m.sigma_t.x * at_point.x);
+    return at_point.rate * ((s + s + s) / 3);
+  }
+}
+
+// e / f at one point. The macro cells' means may make f underflow to 0 where flights still end: then the
+// ratio is clamped, for all strategies alike.
+inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
+
+template <Features F>
+class VertexNee {
+ public:
+  struct Plan {
+    float length = 0;  // of a segment that is also sampled equi-angularly; else 0
+
+    bool matters() const { return F.equiangular && length > 0; }
+  };
+  struct Vertex {  // on such a segment: relative to the part inside the medium
+    bool equiangular = false, points_only = false;
+    V3 o{0, 0, 0}, d{0, 0, 0};
+    float length = 0, t = 0, flight_pdf = 0;
+
+    bool uses_equiangular(bool is_point) const {
+      return F.equiangular && equiangular && (is_point || !(F.grids && points_only));
+    }
+    // e / f for a light with this pivot, if such lights are sampled equi-angularly.
+    float equiangular_ratio(const V3& pivot) const {
+      return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
+    }
+    // For a light that was hit, so not a point light.
+    float found_as_light(const V3& pivot) const {
+      return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
+    }
+    static float found_as_light() { return 1; }
+  };
+
+  template <class Path>
+  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
+    if (!F.equiangular || medium.equiangular_mode == EquiangularMode::none) return {};
+    if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
+    sample_equiangular(path, medium, segment);
+    return {segment.length};
+  }
+
+  template <class Path>
+  static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
+    Vertex v;
+    const OpticalDepthIn<F> depths(medium, path.ray_.start, path.ray_.d, plan.length);
+    v.points_only = points_only(medium);
+    v.o = path.ray_.start + path.ray_.d * depths.from();
+    v.d = path.ray_.d;
+    v.length = depths.to() - depths.from();
+    v.t = t - depths.from();
+    const OpticalDepth::Point at_point = depths.at(t);
+    v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
+    // Also where the flight density underflows to 0: points are sampled there too (sample_equiangular).
+    v.equiangular = at_point.rate > 0 && v.length > 0;
+    return v;
+  }
+
+  // Strategy (1); d is the direction of travel before the scattering.
+  template <class Path>
+  static void at_vertex(Path& path, const Medium& medium, const V3& p, const V3& d) {
+    const Lights& lights = path.world_.lights;
+    if (!lights.can_sample()) return;
+    const Group g = path.stream_.group(path.depth_, Purpose::light);
+    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
+    const auto light = lights.sample(choice, p);
+    if (!light) return;
+    const float phase = medium.phase.value(d, light->direction);
+    const Vertex& v = path.last_.in_medium;
+    const float with_equiangular = v.uses_equiangular(choice.is_point) && choice.has_place
+                                       ? 1 + v.equiangular_ratio(lights.pivot(choice))
+                                       : 1.f;
+    const float weight = !F.found_lights || light->delta
+                             ? 1 / with_equiangular
+                             : light->pdf / (light->pdf * with_equiangular + phase);
+    const C3 arriving = path.unoccluded(path.ray_.start, p, *light, path.medium_,
+                                        path.stream_.stream(path.depth_, Purpose::track_shadow));
+    if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
+  }
+
+ private:
+  static bool points_only(const Medium& medium) {
+    return F.grids && medium.equiangular_mode == EquiangularMode::points;
+  }
+
+  // Strategy (3): light scattered once, at a point near the light. Not inlined, to keep it out of the code
+  // for media that do not use it.
+  template <class Path>
+  [[gnu::noinline]] static void sample_equiangular(Path& path, const Medium& medium, Segment segment) {
+    const Lights& lights = path.world_.lights;
+    const Group g = path.stream_.group(path.segment_, Purpose::segment);
+    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+    if (!choice.has_place || (points_only(medium) && !choice.is_point)) return;
+    const OpticalDepthIn<F> depths(medium, path.ray_.start, path.ray_.d, segment.length);
+    const float length = depths.to() - depths.from();
+    if (!(length > 0)) return;
+    const V3 o = path.ray_.start + path.ray_.d * depths.from();
+    const EquiAngular::Sample s = EquiAngular(o, path.ray_.d, length, lights.pivot(choice)).sample(g.u(3));
+    const OpticalDepth::Point at_point = depths.at(depths.from() + s.t);
+    const V3 p = path.ray_.moved_off_ends(s.p, segment, at_point.t);
+    const C3 scattering = at_point.rate > 0 ? depths.scattering(at_point, p) : C3(0);
+    if (is_black(scattering)) return;
+    const auto light = lights.sample(choice, p);
+    if (!light || !(s.pdf > 0)) return;
+    const float phase = medium.phase.value(path.ray_.d, light->direction);
+    const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));
+    const bool delta = !F.found_lights || light->delta;
+    const float weight =
+        delta ? ratio / (1 + ratio) : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
+    const C3 arriving = path.unoccluded(s.p, p, *light, path.medium_,
+                                        path.stream_.stream(path.segment_, Purpose::track_segment));
+    if (is_black(arriving)) return;
+    const C3 through = transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t,
+                                        path.stream_.stream(path.segment_, Purpose::track_distance));
+    path.add(path.beta_ * (scattering * through) * arriving * (phase * weight / (light->pdf * s.pdf)), true);
+  }
+};
+
+}  // namespace ls::render

@@ -1,0 +1,90 @@
+// An environment map: light from infinitely far away, by direction, from an image in latitude-longitude form.
+//
+// Mitsuba 3's convention (its plugin `envmap`). In the map's own space +y is up; u, from the left edge of the
+// image, and v, from its top, both in [0, 1], correspond to the direction
+//
+//   d = (sin(2 pi u) sin(pi v), cos(pi v), -cos(2 pi u) sin(pi v)),
+//
+// seen from the scene: the top row is +y; on the horizon the left edge is -z, u = 1/4 is +x, the middle +z
+// and u = 3/4 is -x. to_world maps d to the world. The centre of texel (x, y) is at u = (x + 1/2) / width,
+// where columns wrap around, and at v = y / (height - 1): the first and last rows are the poles themselves.
+// Between texels radiance is bilinear in u and v.
+//
+// Sampling. A cell lies between four neighbouring texels. One 32-bit word chooses a row of cells and another
+// a cell of the row, each in proportion to (mean luminance of the corners) x (solid angle), rounded to whole
+// words; within the cell the density is bilinear between the luminances at its corners, over the azimuth and
+// the cosine z of the polar angle. Per steradian it is, in row j and cell i,
+//
+//   p(d) = words(j) words(i) 2^-64 / solid angle x l(x, t) / mean of l at the corners,
+//
+// with t = (z_j - z) / (z_j - z_j+1), which is exactly the distribution of the samples. As solid angle is
+// uniform in z, p is nearly proportional to the luminance of the map: t and v differ only next to the poles.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "common/assets/data.h"
+#include "common/base/error.h"
+#include "common/scene/scene.h"
+#include "worker/render/math/math.h"
+#include "worker/render/texture/texels.h"
+
+namespace ls::render {
+
+// 8192 x 4096: texels and table take 16 bytes per pixel.
+inline constexpr std::uint64_t kMaxEnvironmentPixels = std::uint64_t{1} << 25;
+
+class EnvironmentMap {
+ public:
+  // `name` is for messages. Negative values become 0 and are counted. invalid_argument: a value that is not
+  // finite or (scaled) exceeds the largest value of a sample, fewer than 2 x 3 pixels, or a to_world other
+  // than a rotation, reflection, translation and uniform scale; resource_exhausted: more than
+  // kMaxEnvironmentPixels.
+  static Result<EnvironmentMap> build(std::string_view name, ImageData image, double scale,
+                                      const Transform& to_world);
+
+  struct Light {
+    C3 radiance;
+    float pdf;  // of sample(), per steradian
+  };
+  // Light from a direction, a finite unit vector that points away from the scene.
+  Light at(const V3& direction) const;
+  // Samples a direction from random words. The map must not be black.
+  V3 sample(std::uint32_t x, std::uint32_t y) const;
+
+  bool black() const { return used_rows_ == 0; }
+  // Luminance integrated over all directions, as the table has it: within each cell from its corners.
+  double flux() const { return flux_; }
+  std::uint64_t clamped() const { return texels_.clamped; }
+  std::uint64_t bytes() const;
+
+ private:
+  struct Row {                // a row of cells
+    double top = 1;           // cosine at its upper edge
+    double height = 0;        // difference of cosines
+    float density = 0;        // share of the words / solid angle of one cell
+    std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
+    std::uint32_t used = 0;   // number of cells up to the last one with a word
+  };
+  struct Corners {
+    float l00, l10, l01, l11;  // luminances: upper left, upper right, lower left, lower right
+  };
+
+  void build_table();
+  double build_row(std::uint32_t row, std::vector<double>& before);
+  std::uint32_t right_of(std::uint32_t x) const { return x + 1 == texels_.width ? 0 : x + 1; }
+  Corners corners(std::uint32_t x, std::uint32_t y) const;
+  float cell_share(std::uint32_t row, std::uint32_t cell) const;
+
+  Texels texels_;
+  float scale_ = 1;
+  Frame frame_;  // axes of the map in the world: right-handed or mirrored
+  std::vector<Row> rows_;
+  std::vector<std::uint32_t> first_;  // first of the words that choose a cell, row by row
+  std::uint32_t used_rows_ = 0;
+  double flux_ = 0;
+};
+
+}  // namespace ls::render

@@ -1,0 +1,259 @@
+#include "worker/render/media/emission.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "worker/render/math/blackbody.h"
+#include "worker/render/media/emission_points.h"
+
+namespace ls::render {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// Maximum length, in voxels of either grid, of an interval that gets an emission sample.
+constexpr double kOpticalDepthVoxels = 1;
+
+// A ray's position in a grid, by distance from the ray's origin: in a cell, in front of the grid, or past it.
+class Steps {
+ public:
+  Steps(const Grid& grid, const V3& o, const V3& d, float t_max) : walk_(grid, o, d, 0, t_max) {
+    more_ = walk_.next();
+    if (!more_) return;
+    const V3 v = walk_.direction();
+    longest_ = kOpticalDepthVoxels / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  }
+  void advance(double at) {
+    while (more_ && end() <= at) more_ = walk_.next();
+  }
+  bool past() const { return !more_; }
+  bool inside(double at) const { return more_ && begin() <= at; }
+  // Distance at which the next cell begins, or the current one ends.
+  double boundary(double at) const { return !more_ ? kInf : begin() <= at ? end() : begin(); }
+  double longest() const { return longest_; }
+  const MacroCell& cell() const { return walk_.cell(); }
+  // Conversion between distances from the ray's origin and from the grid's point of entry.
+  float local(double t) const { return static_cast<float>(t - walk_.entry()); }
+  double distance(float local) const { return walk_.entry() + local; }
+  V3 index(double t) const { return walk_.index(local(t)); }
+  Passage pass(const Grid& grid, double a, double b, double wanted = kInf) const {
+    return grid.pass(walk_.origin(), walk_.direction(), local(a), local(b), wanted);
+  }
+
+ private:
+  double begin() const { return walk_.entry() + walk_.begin(); }
+  double end() const { return walk_.entry() + walk_.end(); }
+
+  CellWalk walk_;
+  bool more_ = false;
+  double longest_ = kInf;
+};
+
+class EmissionWalk {
+ public:
+  EmissionWalk(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream)
+      : m_(m),
+        o_(o),
+        d_(d),
+        end_(t_max),
+        stream_(stream),
+        density_(*m.density, o, d, t_max),
+        channels_(m.chromatic() ? 3 : 1),
+        s_max_(max_component(m.sigma_t)) {
+    if (m.emitter[0]) emitter_.emplace(*m.emitter[0], o, d, t_max);
+  }
+
+  C3 run() {
+    for (double at = 0; at < end_;) {
+      density_.advance(at);
+      if (emitter_) emitter_->advance(at);
+      if ((emitter_ && emitter_->past()) || (m_.emission_kind != EmissionKind::per_length && density_.past()))
+        break;
+      const MacroCell* cell = density_.inside(at) ? &density_.cell() : nullptr;
+      const bool absorbs = cell && s_max_ * cell->hi > 0, shines = may_shine(at, cell);
+      const double to = end_of_constant_part(at, absorbs && shines ? cell : nullptr);
+      if (absorbs)
+        add_absorbed(at, to, shines, cell->residual == 0);
+      else if (shines)
+        add_clear(at, to);
+      if (!goes_on()) break;
+      at = to;
+    }
+    return C3(sum_);
+  }
+
+ private:
+  bool may_shine(double at, const MacroCell* cell) const {
+    if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
+    if (!emitter_) return true;
+    if (!emitter_->inside(at)) return false;
+    // With several channels only the first one's bound is available.
+    if (m_.emitter[1] != m_.emitter[0]) return true;
+    const float hi = emitter_->cell().hi;
+    return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
+                                                        : hi > 0;
+  }
+
+  // `sampled`: the density's cell, if the interval is to get an emission sample.
+  double end_of_constant_part(double at, const MacroCell* sampled) const {
+    double to = std::min(end_, density_.boundary(at));
+    if (emitter_) to = std::min(to, emitter_->boundary(at));
+    if (!sampled) return to;
+    if (emitter_) to = std::min(to, at + emitter_->longest());
+    const bool varies =
+        m_.emission_kind == EmissionKind::per_length ? sampled->residual > 0 : m_.albedo[0] != nullptr;
+    return varies ? std::min(to, at + density_.longest()) : to;
+  }
+
+  // Emission at t: radiance per length, or the radiance of the source.
+  V3d source(double t) const {
+    V3d e(m_.emission);
+    if (!emitter_) return e;
+    const V3 q = emitter_->index(t);
+    if (m_.emission_kind == EmissionKind::black_body)
+      return e *
+             V3d(black_body_radiance(m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q)));
+    for (int c = 0; c < 3; ++c) e[c] *= m_.emitter[c]->value_anywhere(q);
+    return e;
+  }
+  double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
+  double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
+
+  // Absorbed share of the extinction.
+  C3 absorbing_at(double t) const {
+    if (!m_.albedo[0]) return m_.absorbing;
+    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
+    C3 a(0);
+    for (int k = 0; k < 3; ++k)
+      if (m_.sigma_t[k] > 0) a[k] = std::max(0.f, m_.sigma_t[k] - scattering[k]) / m_.sigma_t[k];
+    return a;
+  }
+
+  // Adds a share of the light e of channel c, or of all channels if they have the same extinction.
+  void add(int c, const V3d& e, double share) {
+    if (channels_ == 1) {
+      sum_ = sum_ + e * (through_[0] * share);
+    } else {
+      sum_[c] += e[c] * (through_[c] * share);
+    }
+  }
+
+  // For intervals without density: only emission per length, whose integral over the grid is exact.
+  void add_clear(double a, double b) {
+    double field = b - a;
+    for (int c = 0; c < 3; ++c) {
+      if (emitter_ && (c == 0 || m_.emitter[c] != m_.emitter[c - 1]))
+        field = emitter_->pass(*m_.emitter[c], a, b).integral;
+      // A channel without emission stays 0 even over an infinite length.
+      if (m_.emission[c] > 0) sum_[c] += double{m_.emission[c]} * through_[channels_ == 1 ? 0 : c] * field;
+    }
+  }
+
+  void add_absorbed(double a, double b, bool shines, bool uniform) {
+    const double whole = depth(a, b);
+    if (shines) {
+      const double u = stream_.uniform(), v = stream_.uniform();
+      for (int c = 0; c < channels_; ++c) {
+        if (m_.emission_kind != EmissionKind::per_length)
+          add_source(c, a, b, whole, u);
+        else if (uniform || m_.sigma_t[c] * whole < 1)
+          add_thin(c, a, b, whole, u);
+        else
+          add_thick(c, a, b, whole, u, v);
+      }
+    }
+    for (int c = 0; c < channels_; ++c) through_[c] *= std::exp(-m_.sigma_t[c] * whole);
+  }
+
+  // Samples the point where this channel's light is absorbed on the interval.
+  double absorption_point(double a, double b, double s, double absorbed, double u) const {
+    const Passage p = density_.pass(*m_.density, a, b, absorption_depth(u, s, absorbed));
+    return p.reached ? density_.distance(p.t) : b;
+  }
+
+  // Emission per absorption, sampled proportionally to absorption: the density cancels, and a constant source
+  // has no noise at all.
+  void add_source(int c, double a, double b, double whole, double u) {
+    const double s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
+    if (!(absorbed > 0)) return;
+    const double t = absorption_point(a, b, s, absorbed, u);
+    V3d e = source(t);
+    const C3 absorbing = absorbing_at(t);
+    for (int k = 0; k < 3; ++k) e[k] = m_.sigma_t[k] > 0 ? e[k] * absorbing[k] : 0;
+    add(c, e, absorbed);
+  }
+
+  // Emission per length, sampled as if the density were constant along the interval; exact if it is.
+  void add_thin(int c, double a, double b, double whole, double u) {
+    const double h = b - a, s = m_.sigma_t[c], k = s * whole / h, t = truncated_exponential(u, k, h);
+    add(c, source(a + t), h * mean_transmittance(k * h) * std::exp(k * t - s * depth(a, a + t)));
+  }
+
+  // Two samples combined by the balance heuristic, one uniform and one proportional to absorption, so that
+  // emission is found both in the gaps of a dense cell and at its surface.
+  void add_thick(int c, double a, double b, double whole, double u, double v) {
+    const double h = b - a, s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
+    for (const double t : {a + u * h, absorption_point(a, b, s, absorbed, v)}) {
+      const double rest = std::exp(-s * depth(a, t));
+      add(c, source(t), rest / (1 / h + absorption_pdf(s, density_at(t), rest, absorbed)));
+    }
+  }
+
+  // Russian roulette, as for transmittance.
+  bool goes_on() {
+    double largest = 0;
+    for (int c = 0; c < channels_; ++c) largest = std::max(largest, through_[c]);
+    if (!(largest > 0)) return false;
+    if (largest >= detail::kRouletteTransmittance) return true;
+    const double q = largest / detail::kRouletteTransmittance;
+    if (!(stream_.uniform() < q)) return false;
+    for (double& x : through_) x /= q;
+    return true;
+  }
+
+  const Medium& m_;
+  const V3 o_, d_;
+  const double end_;
+  RandomStream stream_;
+  Steps density_;
+  std::optional<Steps> emitter_;
+  const int channels_;  // 1: all channels have the same extinction
+  const float s_max_;
+  double through_[3] = {1, 1, 1};
+  V3d sum_{0, 0, 0};
+};
+
+}  // namespace
+
+C3 emission_of_length(const Medium& m, float t_max) {
+  C3 light;
+  for (int c = 0; c < 3; ++c) {
+    const double e = m.emission[c], s = m.sigma_t[c], t = t_max;
+    if (!(e > 0))
+      light[c] = 0;
+    else if (std::isinf(t_max))
+      light[c] = static_cast<float>(e / s);
+    else
+      light[c] = static_cast<float>(e * t * mean_transmittance(s * t));
+  }
+  return light;
+}
+
+C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
+  if (m.by_channel[0]) {
+    // Each channel as if all channels had its density.
+    C3 light;
+    for (int c = 0; c < 3; ++c) {
+      Medium one = m;
+      one.density = m.by_channel[static_cast<std::size_t>(c)];
+      one.by_channel = {};
+      light[c] = EmissionWalk(one, o, d, t_max, stream).run()[c];
+    }
+    return light;
+  }
+  return EmissionWalk(m, o, d, t_max, stream).run();
+}
+
+}  // namespace ls::render

@@ -1,0 +1,20 @@
+// Medium emission along a ray: the integral of transmittance times emission over the whole segment, not only
+// where a flight happens to collide. So it works where nothing is absorbed (a tracker has no collisions
+// there) as well as deep inside an opaque medium.
+//
+// A homogeneous medium has a closed form. In a grid the ray is divided into intervals that are short in
+// voxels, each with its exact optical depth (Grid::pass: no tracking noise) and one emission sample per
+// channel; the sum of unbiased terms is unbiased.
+#pragma once
+
+#include "worker/render/media/medium.h"
+
+namespace ls::render {
+
+// Over the length t_max of a homogeneous medium; t_max may be infinite. Infinite if the integral diverges.
+C3 emission_of_length(const Medium& m, float t_max);
+
+// Along o + t d (d of unit length) up to t_max; an unbiased estimate.
+C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream);
+
+}  // namespace ls::render

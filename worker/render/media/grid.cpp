@@ -1,0 +1,263 @@
+#include "worker/render/media/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ls::render {
+namespace {
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+// Interpolating eight float32 numbers can exceed their maximum by a few ulps (docs/measurements/stability.md
+// N09).
+constexpr float kInflate = 1 + 4 * 0x1p-23f;
+
+// The part of [t0, t1] inside the box; empty if t0 > t1. A ray parallel to a face and outside of it has an
+// empty part; if inside, that face does not limit it.
+struct Interval {
+  double t0, t1;
+};
+Interval clip(const V3d& lo, const V3d& hi, const V3d& o, const V3d& d, double t0, double t1) {
+  for (int k = 0; k < 3; ++k) {
+    if (d[k] == 0) {
+      if (o[k] < lo[k] || o[k] > hi[k]) return {1, 0};
+      continue;
+    }
+    double a = (lo[k] - o[k]) / d[k], b = (hi[k] - o[k]) / d[k];
+    if (a > b) std::swap(a, b);
+    t0 = std::max(t0, a);
+    t1 = std::min(t1, b);
+  }
+  return {t0, t1};
+}
+
+}  // namespace
+
+Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
+           V3d domain_hi, double density_to_sigma, VolumeFilter filter, Wrap wrap)
+    : size_(size),
+      values_(std::move(values)),
+      lo_(domain_lo),
+      hi_(domain_hi),
+      exact_(world_to_index),
+      filter_(filter),
+      wrap_(wrap) {
+  // Within half a voxel of its ends a mirrored grid equals a clamped one, and without interpolation wrapping
+  // has no effect inside the domain.
+  if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
+  for (int k = 0; k < 3; ++k) {
+    last_[k] = std::max(0, size_[k] - 2);
+    top_[k] = static_cast<float>(size_[k] - 1);
+  }
+  // On an axis with one node the step is 0, so that the neighbour is the node itself.
+  step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
+           size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
+  for (float v : values_) max_value_ = std::max(max_value_, v);
+  use_cells(wanted_cell_size(density_to_sigma));
+}
+
+// Surrounds the grid by one layer of nodes from the opposite end, so that interpolation needs no test for the
+// end and macro cells bound these values too. Index coordinates grow by one.
+void Grid::repeat_ends() {
+  const std::array<int, 3> n = size_;
+  const std::vector<float> inner = std::move(values_);
+  for (int& s : size_) s += 2;
+  values_.clear();
+  values_.reserve(static_cast<std::size_t>(size_[0]) * size_[1] * size_[2]);
+  const auto from = [&](int i, int k) { return static_cast<std::size_t>((i - 1 + n[k]) % n[k]); };
+  for (int z = 0; z < size_[2]; ++z)
+    for (int y = 0; y < size_[1]; ++y) {
+      const float* row = inner.data() + (from(z, 2) * n[1] + from(y, 1)) * n[0];
+      values_.push_back(row[n[0] - 1]);
+      values_.insert(values_.end(), row, row + n[0]);
+      values_.push_back(row[0]);
+    }
+  exact_.b = exact_.b + V3d(1);
+  lo_ = lo_ + V3(1);
+  hi_ = hi_ + V3(1);
+  padded_ = true;
+}
+
+// Maps an index outside the domain to the point inside whose value continues the grid there.
+V3 Grid::wrapped(const V3& index) const {
+  V3 q = index;
+  for (int k = 0; k < 3; ++k) {
+    if (q[k] >= lo_[k] && q[k] <= hi_[k]) continue;
+    const float width = hi_[k] - lo_[k], turns = (q[k] - lo_[k]) / width, whole = std::floor(turns);
+    float part = turns - whole;
+    if (wrap_ == Wrap::mirror && std::fmod(whole, 2.f) != 0) part = 1 - part;
+    q[k] = lo_[k] + part * width;
+  }
+  return q;
+}
+
+std::uint64_t Grid::count_above(float limit) const {
+  const int skip = padded_ ? 1 : 0;
+  std::uint64_t n = 0;
+  for (int z = skip; z < size_[2] - skip; ++z)
+    for (int y = skip; y < size_[1] - skip; ++y) {
+      const float* row = values_.data() + (static_cast<std::size_t>(z) * size_[1] + y) * size_[0];
+      n += static_cast<std::uint64_t>(
+          std::count_if(row + skip, row + size_[0] - skip, [&](float v) { return v > limit; }));
+    }
+  return n;
+}
+
+Grid Grid::mean(const Grid& a, const Grid& b, const Grid& c) {
+  Grid m = a;
+  m.max_value_ = 0;
+  for (std::size_t i = 0; i < m.values_.size(); ++i) {
+    m.values_[i] = static_cast<float>((double{a.values_[i]} + b.values_[i] + c.values_[i]) / 3);
+    m.max_value_ = std::max(m.max_value_, m.values_[i]);
+  }
+  m.use_cells(a.cell_size_);
+  return m;
+}
+
+int Grid::wanted_cell_size(double density_to_sigma) const {
+  // Target: majorant x cell diagonal of about 1.44 (Fong et al. 2017, section 3.3), between 4 and 16 voxels:
+  // smaller cells cost more steps than the null collisions they save, larger ones bound too loosely.
+  const Affine inverse = exact_.inverse();
+  const double voxel = inverse.vector({1, 1, 1}).length();
+  const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
+  return wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+}
+
+void Grid::use_cells(int cell_size) {
+  cell_size_ = cell_size;
+  for (int k = 0; k < 3; ++k) {
+    cells_[k] = std::max(1, static_cast<int>(std::ceil((hi_[k] - lo_[k]) / static_cast<float>(cell_size_))));
+  }
+  macro_.resize(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2]);
+  std::size_t i = 0;
+  for (int z = 0; z < cells_[2]; ++z)
+    for (int y = 0; y < cells_[1]; ++y)
+      for (int x = 0; x < cells_[0]; ++x) macro_[i++] = bound_cell(x, y, z);
+}
+
+MacroCell Grid::bound_cell(int x, int y, int z) const {
+  // All nodes that interpolation inside the cell can touch: one more on each side than the cell covers,
+  // because the traversal's positions are rounded.
+  int a[3], b[3];
+  const int c[3] = {x, y, z};
+  for (int k = 0; k < 3; ++k) {
+    const float lo = lo_[k] + static_cast<float>(c[k] * cell_size_), hi = lo + static_cast<float>(cell_size_);
+    a[k] = std::clamp(static_cast<int>(std::floor(lo - .01f)), 0, size_[k] - 1);
+    b[k] = std::clamp(static_cast<int>(std::ceil(hi + .01f)), 0, size_[k] - 1);
+  }
+  float mn = kInf, mx = 0;
+  double sum = 0;
+  std::uint64_t n = 0;
+  for (int k = a[2]; k <= b[2]; ++k)
+    for (int j = a[1]; j <= b[1]; ++j) {
+      const float* row = values_.data() + (static_cast<std::size_t>(k) * size_[1] + j) * size_[0];
+      for (int i = a[0]; i <= b[0]; ++i) {
+        mn = std::min(mn, row[i]);
+        mx = std::max(mx, row[i]);
+        sum += row[i];
+        ++n;
+      }
+    }
+  MacroCell m;
+  m.hi = mx * kInflate;
+  // Constant cells need no residual: interpolating equal numbers has no rounding error.
+  m.control = mn == mx ? mn : std::clamp(static_cast<float>(sum / static_cast<double>(n)), mn, mx);
+  m.residual = std::max(m.hi - m.control, m.control - mn) * kInflate;
+  if (mn == mx) m.residual = 0;
+  return m;
+}
+
+Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, double wanted) const {
+  const V3d o(origin), d(direction);
+  const auto value_at = [&](double t) {
+    const V3 q(o + d * t);
+    return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
+  };
+  // Two-point Gauss-Legendre: exact for the cubic that a trilinear field is along a line.
+  const auto integral = [&](double a, double length) {
+    const double middle = a + length / 2, g = length * .28867513459481288;  // 1 / (2 sqrt 3)
+    return length / 2 * (value_at(middle - g) + value_at(middle + g));
+  };
+  // Planes that separate the field's patches: through nodes, or half way between them.
+  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
+  double plane[3], exit[3];
+  for (int k = 0; k < 3; ++k) {
+    exit[k] = std::numeric_limits<double>::infinity();
+    if (std::abs(d[k]) < 1e-20) continue;
+    const double q = o[k] + d[k] * t0 - offset;
+    plane[k] = d[k] > 0 ? std::floor(q) + 1 : std::ceil(q) - 1;
+    exit[k] = (plane[k] + offset - o[k]) / d[k];
+  }
+  Passage p;
+  for (double a = t0; a < t1;) {
+    const int k = exit[0] < exit[1] ? (exit[0] < exit[2] ? 0 : 2) : (exit[1] < exit[2] ? 1 : 2);
+    const double b = std::max(a, std::min<double>(t1, exit[k])), here = integral(a, b - a);
+    if (p.integral + here >= wanted) {
+      const double rest = wanted - p.integral;
+      // Newton's method with a bracket: the integral is monotonic.
+      double lo = 0, hi = b - a, h = here > 0 ? hi * std::min(1., rest / here) : 0;
+      for (int i = 0; i < 32; ++i) {
+        const double excess = integral(a, h) - rest;
+        (excess > 0 ? hi : lo) = h;
+        double next = h - excess / value_at(a + h);
+        if (!(next >= lo && next <= hi)) next = (lo + hi) / 2;
+        if (std::abs(next - h) <= 1e-7 * h) break;
+        h = next;
+      }
+      return {true, static_cast<float>(a + h), wanted};
+    }
+    p.integral += here;
+    if (!(exit[k] < t1)) break;
+    a = b;
+    plane[k] += d[k] > 0 ? 1 : -1;
+    exit[k] = (plane[k] + offset - o[k]) / d[k];
+  }
+  p.t = t1;
+  return p;
+}
+
+double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) const {
+  const V3d oi = exact_.point(o), di = exact_.vector(d);
+  const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
+  if (!(part.t0 < part.t1)) return 0;
+  // All crossings of these planes, in order; between two the field is one polynomial.
+  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
+  std::vector<double> cuts{part.t0, part.t1};
+  for (int k = 0; k < 3; ++k) {
+    if (di[k] == 0) continue;
+    for (int i = 0; i < size_[k]; ++i) {
+      const double t = (i + offset - oi[k]) / di[k];
+      if (t > part.t0 && t < part.t1) cuts.push_back(t);
+    }
+  }
+  std::sort(cuts.begin(), cuts.end());
+  const auto at = [&](double t) {
+    const V3d q = oi + di * t;
+    if (filter_ == VolumeFilter::nearest) return static_cast<double>(nearest(V3(q)));
+    double v = 0;
+    int c[3];
+    double f[3];
+    for (int k = 0; k < 3; ++k) {
+      const double x = std::clamp(q[k], 0., static_cast<double>(size_[k] - 1));
+      c[k] = std::min(static_cast<int>(x), last_[k]);
+      f[k] = x - c[k];
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+      const int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
+      const double w = (i ? f[0] : 1 - f[0]) * (j ? f[1] : 1 - f[1]) * (k ? f[2] : 1 - f[2]);
+      const std::size_t at = (static_cast<std::size_t>(c[2]) * size_[1] + c[1]) * size_[0] + c[0] +
+                             i * step_[0] + j * step_[1] + k * step_[2];
+      v += w * values_[at];
+    }
+    return v;
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double h = cuts[i + 1] - cuts[i], m = (cuts[i] + cuts[i + 1]) / 2, g = h / (2 * std::sqrt(3.));
+    sum += h / 2 * (at(m - g) + at(m + g));
+  }
+  return sum;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,248 @@
+// A dense scalar grid, interpolated or not, with macro cells that bound its values.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "common/scene/scene.h"
+#include "worker/render/base/work_counters.h"
+#include "worker/render/math/math.h"
+#include "worker/render/math/transform.h"
+
+namespace ls::render {
+
+// Bounds of the density over the cell, inflated so that interpolation in float32 stays inside, and the
+// control value for ratio tracking.
+struct MacroCell {
+  float hi = 0;        // >= any interpolated value
+  float control = 0;   // near the mean
+  float residual = 0;  // >= |value - control|
+};
+
+// Result of integrating the field along a ray interval: stops where the integral reaches the wanted value,
+// else at the end.
+struct Passage {
+  bool reached = false;
+  float t = 0;
+  double integral = 0;
+};
+
+class Grid {
+ public:
+  Grid() = default;
+  // Values at integer index coordinates, x fastest. `world_to_index` maps world points to index coordinates.
+  // The grid exists inside [domain_lo, domain_hi] (index coordinates, which may reach beyond the outermost
+  // nodes: there values are clamped) and is 0 outside. `density_to_sigma`: the largest extinction per unit of
+  // value (world units); determines the size of macro cells. `wrap`: how nodes continue beyond the ends;
+  // unless it is `clamp`, the domain must be that of cell centres, [-1/2, n - 1/2].
+  Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
+       V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
+       Wrap wrap = Wrap::clamp);
+
+  // In double: for a grid that is small in its world, the terms of the index coordinates are large and nearly
+  // cancel.
+  V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
+  VolumeFilter filter() const { return filter_; }
+  // Value at index coordinates inside the domain. kFilter must equal filter(); a template parameter so that
+  // callers decide once for many values.
+  template <VolumeFilter kFilter>
+  float value(const V3& index) const {
+    LS_COUNT(density);
+    if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
+    return nearest(index);
+  }
+  // Value at any index coordinates, with either filter: beyond the domain the grid continues as `wrap` says.
+  float value_anywhere(const V3& index) const {
+    LS_COUNT(density);
+    const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
+    return filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q);
+  }
+  float trilinear(const V3& index) const {
+    int cell[3];
+    float f[3];
+    const float q[3] = {index.x, index.y, index.z};
+    for (int k = 0; k < 3; ++k) {
+      const float c = std::min(std::max(0.f, q[k]), top_[k]);  // this order maps NaN to 0
+      cell[k] = std::min(static_cast<int>(c), last_[k]);
+      f[k] = c - static_cast<float>(cell[k]);
+    }
+    const float* v =
+        values_.data() + (static_cast<std::size_t>(cell[2]) * size_[1] + cell[1]) * size_[0] + cell[0];
+    const std::size_t dx = step_[0], dy = step_[1], dz = step_[2];
+    const float c00 = v[0] + f[0] * (v[dx] - v[0]), c10 = v[dy] + f[0] * (v[dy + dx] - v[dy]);
+    const float c01 = v[dz] + f[0] * (v[dz + dx] - v[dz]),
+                c11 = v[dz + dy] + f[0] * (v[dz + dy + dx] - v[dz + dy]);
+    const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
+    return std::max(0.f, c0 + f[2] * (c1 - c0));
+  }
+  // Value of the node whose cell contains the point; on a face between two cells, of the higher index.
+  float nearest(const V3& index) const {
+    std::size_t i[3];
+    const float q[3] = {index.x, index.y, index.z};
+    for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(0.f, q[k]), top_[k]) + .5f);
+    return values_[(i[2] * size_[1] + i[1]) * size_[0] + i[0]];
+  }
+
+  int cell_size() const { return cell_size_; }
+  std::array<int, 3> cells() const { return cells_; }
+  const MacroCell& cell(int x, int y, int z) const {
+    return macro_[(static_cast<std::size_t>(z) * cells_[1] + y) * cells_[0] + x];
+  }
+  const MacroCell& cell(std::size_t number) const { return macro_[number]; }
+  V3 domain_lo() const { return lo_; }
+  V3 domain_hi() const { return hi_; }
+  float max_value() const { return max_value_; }
+  std::uint64_t value_count() const { return values_.size(); }
+  std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
+  std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
+
+  // Sets the macro cells to this many voxels a side, regardless of density: for grids that are traversed
+  // together.
+  void use_cells(int size);
+  bool same_values(const Grid& other) const { return values_ == other.values_; }
+  // Requires grids of the same shape.
+  static Grid mean(const Grid& a, const Grid& b, const Grid& c);
+
+  // Number of values above `limit`.
+  std::uint64_t count_above(float limit) const;
+
+  // Integrates voxel by voxel along origin + t direction in index coordinates, over the finite interval [t0,
+  // t1]; exact up to float32 rounding. Used instead of tracking where that would meet more collisions than
+  // voxels.
+  Passage pass(const V3& origin, const V3& direction, float t0, float t1,
+               double wanted = std::numeric_limits<double>::infinity()) const;
+
+  // Integral of the field along o + t d, t in [t0, t1]: exact up to rounding (within a voxel the field is a
+  // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). Has no variance: the
+  // reference for tests of the trackers.
+  double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
+
+ private:
+  friend class CellWalk;
+  void repeat_ends();
+  V3 wrapped(const V3& index) const;
+  int wanted_cell_size(double density_to_sigma) const;
+  MacroCell bound_cell(int x, int y, int z) const;
+
+  std::array<int, 3> size_{}, last_{};
+  std::array<float, 3> top_{};
+  std::array<std::size_t, 3> step_{};
+  std::vector<float> values_;
+  V3 lo_, hi_;
+  Affine exact_;  // world to index, not rounded to float32
+  VolumeFilter filter_ = VolumeFilter::trilinear;
+  Wrap wrap_ = Wrap::clamp;
+  bool padded_ = false;  // a layer of nodes from the opposite end surrounds the given ones
+  float max_value_ = 0;
+  int cell_size_ = 8;
+  std::array<int, 3> cells_{};
+  std::vector<MacroCell> macro_;
+};
+
+// Traverses the macro cells along a ray: for (CellWalk w(grid, o, d, t0, t1); w.next();) use w.cell(),
+// [w.begin(), w.end()]. Distances and positions are relative to the point of entry, found in double: a
+// float32 distance from a far origin cannot resolve the voxels of a small grid
+// (docs/measurements/stability.md N11). Boundaries are computed from integer cell indices, never by
+// accumulating steps, and intervals never run backwards. A non-finite ray traverses nothing.
+class CellWalk {
+ public:
+  CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1);
+  bool next() {
+    if (!(end_ < stop_)) return false;
+    LS_COUNT(macro_cells);
+    if (started_) {
+      const int k = exit_[0] < exit_[1] ? (exit_[0] < exit_[2] ? 0 : 2) : (exit_[1] < exit_[2] ? 1 : 2);
+      if (--left_[k] < 0) return false;
+      cell_ += stride_[k];
+      plane_[k] += step_[k];
+      exit_[k] = boundary(k);
+    }
+    started_ = true;
+    begin_ = end_;
+    end_ = std::max(begin_, std::min(stop_, std::min(exit_[0], std::min(exit_[1], exit_[2]))));
+    return true;
+  }
+  const MacroCell& cell() const { return *cell_; }
+  // Index of the cell in the cell table of `walked`, the traversed grid.
+  std::size_t number(const Grid& walked) const {
+    return static_cast<std::size_t>(cell_ - walked.macro_.data());
+  }
+  // The cell's interval, measured from entry().
+  float begin() const { return begin_; }
+  float end() const { return end_; }
+  // Distance from the ray's origin to the point of entry.
+  double entry() const { return entry_; }
+  // Index coordinates at t: origin() + t * direction().
+  V3 index(float t) const { return origin_ + direction_ * t; }
+  const V3& origin() const { return origin_; }
+  const V3& direction() const { return direction_; }
+
+ private:
+  float boundary(int axis) const { return first_[axis] + plane_[axis] * spacing_[axis]; }
+
+  const MacroCell* cell_ = nullptr;
+  double entry_ = 0;
+  V3 origin_, direction_;
+  // Per axis: boundary i lies at first + i * spacing; number of cells ahead; stride in the cell table.
+  float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
+  int left_[3];
+  std::ptrdiff_t stride_[3];
+  float begin_ = 0, end_ = 0, stop_ = 0;
+  bool started_ = false;
+};
+
+inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1) {
+  const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
+  if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
+  // Components too small to cross a cell within the ray count as parallel to the faces: a ray outside them
+  // meets nothing.
+  constexpr double kParallel = 1e-20;
+  double from = t0, to = t1, inverse[3];
+  for (int k = 0; k < 3; ++k) {
+    const double lo = grid.lo_[k] - p[k], hi = grid.hi_[k] - p[k];
+    if (std::abs(v[k]) < kParallel) {
+      if (lo > 0 || hi < 0) return;
+      inverse[k] = 0;
+      continue;
+    }
+    inverse[k] = 1 / v[k];
+    const double a = lo * inverse[k], b = hi * inverse[k];
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  }
+  const double length = to - from;
+  if (!(length > 0 && length < std::numeric_limits<float>::max())) return;
+  entry_ = from;
+  stop_ = static_cast<float>(length);
+  origin_ = V3(p + v * from);
+  direction_ = V3(v);
+  const auto size = static_cast<float>(grid.cell_size_), per_size = 1 / size;  // a power of two
+  const std::ptrdiff_t strides[3] = {1, grid.cells_[0], std::ptrdiff_t{grid.cells_[0]} * grid.cells_[1]};
+  cell_ = grid.macro_.data();
+  for (int k = 0; k < 3; ++k) {
+    const int at =
+        std::min(static_cast<int>(std::max(0.f, (origin_[k] - grid.lo_[k]) * per_size)), grid.cells_[k] - 1);
+    cell_ += at * strides[k];
+    if (inverse[k] == 0) {
+      left_[k] = 0;
+      exit_[k] = std::numeric_limits<float>::infinity();
+      continue;
+    }
+    const bool up = inverse[k] > 0;
+    left_[k] = up ? grid.cells_[k] - 1 - at : at;
+    stride_[k] = up ? strides[k] : -strides[k];
+    step_[k] = up ? 1.f : -1.f;
+    plane_[k] = static_cast<float>(up ? at + 1 : at);
+    const auto per_index = static_cast<float>(inverse[k]);
+    first_[k] = (grid.lo_[k] - origin_[k]) * per_index;
+    spacing_[k] = size * per_index;
+    exit_[k] = boundary(k);
+  }
+}
+
+}  // namespace ls::render

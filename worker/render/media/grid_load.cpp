@@ -1,0 +1,131 @@
+#include "worker/render/media/grid_load.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "common/assets/raw_grid.h"
+#include "common/assets/vol.h"
+#include "common/base/overloaded.h"
+#include "worker/render/media/vdb_process.h"
+
+namespace ls::render {
+namespace {
+
+bool is_vdb(std::string_view name) { return name.ends_with(".vdb") || name.ends_with(".nvdb"); }
+bool is_raw(std::string_view name) { return name.ends_with(".bin"); }
+
+// World to index, given scene to index.
+Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
+  return scene_to_index * Affine::scale_translate(1 / scale, center);
+}
+
+Result<LoadedVolume> constant_volume(const ConstVolume& v, V3d center, double scale, double to_sigma) {
+  // As in Mitsuba, a volume without a file fills the unit cube transformed by to_world.
+  LoadedVolume out;
+  for (int c = 0; c < 3; ++c) {
+    out.channels.emplace_back(std::array<int, 3>{1, 1, 1}, std::vector<float>{static_cast<float>(v.value[c])},
+                              from_world(Affine(v.to_world).inverse(), center, scale), V3d(0, 0, 0),
+                              V3d(1, 1, 1), to_sigma);
+  }
+  if (v.value[0] == v.value[1] && v.value[1] == v.value[2]) out.channels.resize(1);
+  return out;
+}
+
+std::vector<float> channel(std::span<const float> interleaved, std::size_t c, std::size_t of) {
+  std::vector<float> values(interleaved.size() / of);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = interleaved[of * i + c];
+  return values;
+}
+
+// A .vol file, or a raw grid, whose values are nodes that span its own box from face to face.
+Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
+                              double to_sigma) {
+  auto path = files.path(v.file);
+  if (!path) return tl::unexpected(path.error());
+  const bool raw = is_raw(files.name(v.file));
+  auto data = raw ? load_raw_grid(*path, files.name(v.file), v.order) : load_vol(*path, files.name(v.file));
+  if (!data) return tl::unexpected(data.error());
+  const bool node_centred = v.node_centred || raw;
+  // Values are at cell centres of the unit cube, or at nodes from face to face; the cube is first mapped to
+  // the file's box, if requested, then transformed by to_world.
+  Affine unit_to_scene(v.to_world);
+  if (v.use_grid_bbox || raw) {
+    const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
+        hi(data->bbox_max[0], data->bbox_max[1], data->bbox_max[2]);
+    Affine box;
+    box.a = {hi.x - lo.x, 0, 0, 0, hi.y - lo.y, 0, 0, 0, hi.z - lo.z};
+    box.b = lo;
+    unit_to_scene = unit_to_scene * box;
+  }
+  if (!unit_to_scene.invertible()) {
+    return fail(Errc::invalid_argument,
+                fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
+  }
+  const int n[3] = {static_cast<int>(data->nx), static_cast<int>(data->ny), static_cast<int>(data->nz)};
+  if (node_centred && std::min({n[0], n[1], n[2]}) < 2) {
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("{}: {} x {} x {} values can't be nodes from face to face of a box: that takes two "
+                    "along each axis",
+                    files.name(v.file), n[0], n[1], n[2]));
+  }
+  const double margin = node_centred ? 0 : .5;
+  const V3d last(n[0] - 1, n[1] - 1, n[2] - 1), steps = last + V3d(2 * margin);
+  Affine to_nodes;
+  to_nodes.a = {steps.x, 0, 0, 0, steps.y, 0, 0, 0, steps.z};
+  to_nodes.b = V3d(-margin);
+  const Affine world_to_index = from_world(to_nodes * unit_to_scene.inverse(), center, scale);
+  LoadedVolume out;
+  out.clamped = data->negatives;
+  for (std::uint32_t c = 0; c < data->channels; ++c)
+    out.channels.emplace_back(
+        std::array<int, 3>{n[0], n[1], n[2]},
+        data->channels == 1 ? std::move(data->values) : channel(data->values, c, data->channels),
+        world_to_index, V3d(-margin), last + V3d(margin), to_sigma, v.filter, v.wrap);
+  return out;
+}
+
+Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
+                              double to_sigma) {
+  auto path = files.path(v.file);
+  if (!path) return tl::unexpected(path.error());
+  const std::string& name = files.name(v.file);
+  const auto file = VdbFile::read(*path, v.grid_name, kMaxGridValues);
+  if (!file) return fail(file.error().code, fmt::format("{}: {}", name, file.error().message));
+  const LsVdbGrid& raw = file->grid();
+  Transform t;
+  std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
+  const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);
+  if (!nodes_to_scene.invertible()) {
+    return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform has no inverse", name));
+  }
+  const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
+  const auto of = static_cast<std::size_t>(raw.channels);
+  const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
+  LoadedVolume out;
+  out.clamped = raw.negatives;
+  // Values are at nodes. They fall to the background within one voxel of the active ones, where the grid
+  // ends, so wrapping has no effect.
+  for (std::size_t c = 0; c < of; ++c)
+    out.channels.emplace_back(size, channel(values, c, of),
+                              from_world(nodes_to_scene.inverse(), center, scale), V3d(0),
+                              V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma, v.filter);
+  return out;
+}
+
+}  // namespace
+
+Result<LoadedVolume> load_volume(const Volume& volume, const AssetLoader& files, V3d center, double scale,
+                                 double to_sigma) {
+  return std::visit(
+      overloaded{[&](const ConstVolume& v) { return constant_volume(v, center, scale, to_sigma); },
+                 [&](const GridVolume& v) {
+                   return is_vdb(files.name(v.file)) ? vdb_file(v, files, center, scale, to_sigma)
+                                                     : vol_file(v, files, center, scale, to_sigma);
+                 }},
+      volume);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,320 @@
+// Participating media: free flight and transmittance. Homogeneous media in closed form; grids by delta
+// tracking with local majorants and residual ratio tracking (Novak et al. 2014) with one control value per
+// macro cell.
+//
+// Chromatic extinction: one channel, the hero, drawn once per path, decides every distance. A flight returns
+// the path weight relative to the hero (`weight`) and each channel's density of what was sampled, relative to
+// the hero's (`density`). Dividing by the mean over channels of the accumulated densities is the balance
+// heuristic over channels (Miller, Georgiev, Jarosz 2019). With equal channels every ratio is exactly 1, so
+// achromatic code may omit them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "worker/render/base/built.h"
+#include "worker/render/base/features.h"
+#include "worker/render/base/work_counters.h"
+#include "worker/render/math/math.h"
+#include "worker/render/math/random.h"
+#include "worker/render/math/sampler.h"
+#include "worker/render/media/grid.h"
+#include "worker/render/media/phase.h"
+
+namespace ls::render {
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// What emission is proportional to: length, or absorption.
+enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
+
+// Lights for which segments through a medium are also sampled equi-angularly (vertex_nee.h): none, point
+// lights, or all lights with a position.
+enum class EquiangularMode : std::uint8_t { none, points, places };
+
+struct Medium {
+  bool grid = false;
+  EquiangularMode equiangular_mode = EquiangularMode::none;
+  // Homogeneous: extinction and scattering [1/world unit]. Grid: extinction per unit of density; scattering
+  // is albedo times it.
+  C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
+  const Grid* density = nullptr;
+  // Null, or one density grid per channel: three grids of the same shape with the same macro cells. Then
+  // `density` is their mean, which is used to place points, and sigma_t is the same for all
+  // (spectral_grids.h).
+  std::array<const Grid*, 3> by_channel{};
+  std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
+  // For a grid with constant albedo: 1 - albedo, stored separately because 1 - (1 - 1e-7) in float32 is off
+  // by a fifth.
+  C3 absorbing{1, 1, 1};
+  HenyeyGreenstein phase;
+  // Emission (emission.h). Homogeneous: `emission` [radiance per world unit]. Grid: `emission` times the
+  // emitter's value, or times a black body's radiance at offset + scale times that value [K]; unless
+  // per_length, also times the absorption coefficient.
+  EmissionKind emission_kind = EmissionKind::none;
+  C3 emission{0, 0, 0};
+  std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
+  float kelvin_scale = 1, kelvin_offset = 0;
+  int priority = 0;  // of overlapping media, those of the highest priority are in effect
+  bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
+
+  // Scattering coefficient per unit of extinction density at a point of a grid.
+  C3 scattering_at(const V3& p) const {
+    if (!albedo[0]) return sigma_s;
+    C3 s;
+    for (int k = 0; k < 3; ++k) {
+      const V3 q = albedo[k]->to_index(p);
+      s[k] = sigma_t[k] * std::min(1.f, albedo[k]->value_anywhere(q));
+    }
+    return s;
+  }
+};
+
+struct Flight {
+  bool scattered = false;
+  float t = 0;
+  C3 weight{1, 1, 1};
+  C3 density{1, 1, 1};  // only meaningful in chromatic code
+};
+
+// A density above its bound would bias the result silently, so it is counted.
+struct MediumCounters {
+  std::uint64_t majorant_violations = 0;
+};
+
+// For grids with a density per channel; called by chromatic code only (spectral_grids.cpp).
+Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
+                    RandomStream stream, MediumCounters& counters);
+C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream);
+
+namespace detail {
+
+// T_c / T_hero over a length: one exponential of the difference, never a quotient of underflowed ones; 1 if
+// they are equal.
+inline float transmittance_ratio(float sigma_c, float sigma_hero, float length) {
+  const float diff = sigma_c - sigma_hero;
+  return diff == 0 ? 1.f : std::exp(-diff * length);
+}
+
+template <bool kChromatic>
+Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
+  Flight f;
+  const float s = m.sigma_t[hero];
+  f.t = s > 0 ? depth / s : kInfinity;
+  f.scattered = f.t < t_max;
+  if constexpr (kChromatic) {
+    const float length = f.scattered ? f.t : t_max;
+    for (int c = 0; c < 3; ++c) f.weight[c] = f.density[c] = transmittance_ratio(m.sigma_t[c], s, length);
+    if (f.scattered) {
+      for (int c = 0; c < 3; ++c) {
+        f.weight[c] = f.weight[c] * m.sigma_s[c] / s;
+        f.density[c] = f.density[c] * m.sigma_t[c] / s;
+      }
+    }
+  } else if (f.scattered) {
+    for (int c = 0; c < 3; ++c) f.weight[c] = m.sigma_s[c] / s;
+  }
+  return f;
+}
+
+// Where a tracker would expect more tentative collisions than this in a macro cell, the field is integrated
+// exactly through its voxels instead: a cell of 4 voxels costs about as much as 16 collisions, and no tracker
+// gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
+inline constexpr float kExactDepth = 16;
+
+// `depth`: the optical depth of the first tentative collision; the stream provides the rest.
+template <bool kChromatic, VolumeFilter kFilter>
+Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
+                RandomStream stream, MediumCounters& counters) {
+  Flight f;
+  const float s = m.sigma_t[hero];
+  // The choice of exactly integrated cells must not depend on the hero: all channels must weight the same
+  // experiment.
+  const float s_max = kChromatic ? max_component(m.sigma_t) : s;
+  // integral of the majorant, or, where integrated exactly, of the density
+  [[maybe_unused]] double passed = 0;
+  [[maybe_unused]] int nulls = 0;
+  // T_c / T_hero times the null collisions' sigma_c / s, combined because each factor alone may overflow
+  // float32.
+  [[maybe_unused]] const auto ratio = [&](int c, double integral) {
+    const float sigma = m.sigma_t[c];
+    if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
+    if (!(sigma > 0)) return 0.f;
+    return std::exp(static_cast<float>(nulls * std::log(double{sigma} / s) - (double{sigma} - s) * integral));
+  };
+  const auto scatter = [&](double t, [[maybe_unused]] double integral) {
+    f.scattered = true;
+    f.t = static_cast<float>(t);
+    const C3 scattering = m.scattering_at(o + d * f.t);
+    for (int c = 0; c < 3; ++c) {
+      if constexpr (kChromatic) {
+        const float r = ratio(c, integral);
+        f.weight[c] = r * scattering[c] / s;
+        f.density[c] = r * m.sigma_t[c] / s;
+      } else {
+        f.weight[c] = scattering[c] / s;
+      }
+    }
+    return f;
+  };
+  for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
+    const float hi = w.cell().hi, length = w.end() - w.begin(), rate = s * hi, room = rate * length;
+    if (s_max * hi * length > kExactDepth) [[unlikely]] {
+      // A hero without extinction passes through; the other channels still need the integral.
+      const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
+                                        s > 0 ? double{depth} / s : std::numeric_limits<double>::infinity());
+      if (p.reached) return scatter(w.entry() + p.t, passed + p.integral);
+      if (s > 0) depth = std::max(0.f, depth - static_cast<float>(s * p.integral));
+      if constexpr (kChromatic) passed += p.integral;
+      continue;
+    }
+    if (rate > 0) {
+      // optical depth used up within the cell: distances from the cell's own beginning stay exact
+      float gone = depth;
+      for (; gone < room; gone += stream.exponential()) {
+        const float t = std::min(w.begin() + gone / rate, w.end());
+        const float rho = m.density->value<kFilter>(w.index(t));
+        if (kBuilt.health && rho > hi) ++counters.majorant_violations;
+        if (stream.uniform() * hi < rho) return scatter(w.entry() + t, passed + double{gone} / s);
+        if constexpr (kChromatic) ++nulls;
+      }
+      depth = gone - room;
+    }
+    if constexpr (kChromatic) passed += double{hi} * length;
+  }
+  f.t = t_max;
+  if constexpr (kChromatic) {
+    for (int c = 0; c < 3; ++c) f.weight[c] = f.density[c] = ratio(c, passed);
+  }
+  return f;
+}
+
+// Russian roulette of transmittance: below e^-4 a tracker survives with probability estimate / e^-4 and
+// continues with e^-4. The estimate so far decides, not the control's depth alone: a ray that misses the
+// dense voxel of an otherwise empty cell has a deep control there, compensated by its factors to a
+// transmittance of 1 (docs/measurements/stability.md N10). Only where there is a residual to track: constant
+// densities cost nothing, and their tails are exact (N05).
+inline constexpr float kRouletteDepth = 4;
+inline constexpr float kRouletteTransmittance = .018315639f;
+
+template <bool kChromatic, VolumeFilter kFilter>
+C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
+  const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
+  if (!(s_max > 0)) return {1, 1, 1};
+  constexpr int kChannels = kChromatic ? 3 : 1;
+  // The estimate is factor * exp(-sigma control). The control part is folded into the factors once it is
+  // deep, so that both stay within float32.
+  float control = 0, foldable = kRouletteDepth, factor[kChannels];
+  for (float& x : factor) x = 1;
+  // Remaining optical depth of the residual up to the next collision; the remainder carries over from cell to
+  // cell.
+  float left = stream.exponential();
+  for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
+    const MacroCell& cell = w.cell();
+    const float length = w.end() - w.begin(), rate = s_max * cell.residual, room = rate * length;
+    if (room > kExactDepth) [[unlikely]] {
+      control += static_cast<float>(m.density->pass(w.origin(), w.direction(), w.begin(), w.end()).integral);
+    } else {
+      control += cell.control * length;
+      if (rate > 0) {
+        float gone = left;
+        for (; gone < room; gone += stream.exponential()) {
+          const float t = w.begin() + gone / rate;
+          const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
+          for (int c = 0; c < kChannels; ++c) factor[c] *= 1 - r * (kChromatic ? m.sigma_t[c] / s_max : 1.f);
+        }
+        left = gone - room;
+      }
+    }
+    if (s_max * control > foldable) [[unlikely]] {
+      float largest = 0;
+      for (int c = 0; c < kChannels; ++c) {
+        factor[c] *= std::exp(-m.sigma_t[c] * control);
+        largest = std::max(largest, factor[c]);
+      }
+      control = 0;
+      foldable = 1;
+      if (!(largest > 0)) return {0, 0, 0};
+      if (largest < kRouletteTransmittance && rate > 0) {
+        const float q = largest / kRouletteTransmittance;
+        if (!(stream.uniform() < q)) return {0, 0, 0};
+        for (float& x : factor) x /= q;
+      }
+    }
+  }
+  C3 t;
+  for (int c = 0; c < kChannels; ++c) t[c] = std::exp(-m.sigma_t[c] * control) * factor[c];
+  if constexpr (!kChromatic) t.y = t.z = t.x;
+  return t;
+}
+
+template <bool kChromatic>
+C3 transmittance_homogeneous(const Medium& m, float length) {
+  LS_COUNT(transmittance);
+  if constexpr (kChromatic) {
+    C3 t;
+    for (int c = 0; c < 3; ++c) t[c] = m.sigma_t[c] > 0 ? std::exp(-m.sigma_t[c] * length) : 1.f;
+    return t;
+  } else {
+    return C3(m.sigma_t.x > 0 ? std::exp(-m.sigma_t.x * length) : 1.f);
+  }
+}
+
+// Grids without interpolation are rare: not inlined, so that they do not burden the code of the others.
+template <bool kChromatic>
+[[gnu::noinline]] Flight fly_nearest(const Medium& m, int hero, float depth, const V3& o, const V3& d,
+                                     float t_max, RandomStream stream, MediumCounters& counters) {
+  return fly_grid<kChromatic, VolumeFilter::nearest>(m, hero, depth, o, d, t_max, stream, counters);
+}
+template <bool kChromatic>
+[[gnu::noinline]] C3 transmittance_nearest(const Medium& m, const V3& o, const V3& d, float t0, float t1,
+                                           RandomStream stream) {
+  return transmittance_grid<kChromatic, VolumeFilter::nearest>(m, o, d, t0, t1, stream);
+}
+
+}  // namespace detail
+
+// Distance to the next scattering along o + t d (d of unit length), or none before t_max. `bits` determines
+// the first tentative collision, `stream` the others.
+template <Features F>
+Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, const V3& d, float t_max,
+                   RandomStream stream, MediumCounters& counters) {
+  const float depth = exponential(bits);
+  if constexpr (F.grids) {
+    if constexpr (F.chromatic) {
+      if (m.by_channel[0]) [[unlikely]]
+        return fly_channels(m, hero, depth, o, d, t_max, stream, counters);
+    }
+    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
+      return detail::fly_nearest<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
+    if (m.grid)
+      return detail::fly_grid<F.chromatic, VolumeFilter::trilinear>(m, hero, depth, o, d, t_max, stream,
+                                                                    counters);
+  }
+  return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
+}
+
+// The Flight of a medium known to have been crossed unscattered up to t, because another medium at the same
+// place ended the flight there. Grids use the exact depth, so the result does not depend on how this is
+// known.
+Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
+
+// Unbiased estimate (exact where homogeneous) of the transmittance between t0 and t1.
+template <Features F>
+C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
+  if constexpr (F.grids) {
+    if constexpr (F.chromatic) {
+      if (m.by_channel[0]) [[unlikely]]
+        return transmittance_channels(m, o, d, t0, t1, stream);
+    }
+    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
+      return detail::transmittance_nearest<F.chromatic>(m, o, d, t0, t1, stream);
+    if (m.grid)
+      return detail::transmittance_grid<F.chromatic, VolumeFilter::trilinear>(m, o, d, t0, t1, stream);
+  }
+  return detail::transmittance_homogeneous<F.chromatic>(m, t1 - t0);
+}
+
+}  // namespace ls::render

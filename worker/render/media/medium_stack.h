@@ -1,0 +1,83 @@
+// The media at a path's current position (docs/decisions/0010-media-boundaries.md).
+//
+// A boundary has an interior and an exterior medium, either of which may be none. For nested or intersecting
+// boundaries, the media at a point are the background's, plus the interior and minus the exterior of every
+// boundary around the point, so the result does not depend on the order in which a path crosses them. Of
+// these, the media of the highest priority are in effect, all at once.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/media/medium.h"
+
+namespace ls::render {
+
+// For scenes without overlaps: the medium of the side of the last boundary (Mitsuba's rule).
+struct OneMedium {
+  std::uint32_t medium = kNone;
+
+  bool any() const { return medium != kNone; }
+  static constexpr bool several() { return false; }
+  std::uint32_t one() const { return medium; }
+  void only(std::uint32_t m) { medium = m; }
+};
+
+class MediaState {
+ public:
+  // The most boundaries that a path may be inside of at once. One more makes the sample an error, which is
+  // counted.
+  static constexpr int kCapacity = 32;
+
+  // Copied for every shadow ray, so only the used part is copied.
+  MediaState() = default;
+  MediaState(const MediaState& o) { *this = o; }
+  MediaState& operator=(const MediaState& o) {
+    background_ = o.background_;
+    bodies_ = o.bodies_;
+    count_ = o.count_;
+    overflowed_ = o.overflowed_;
+    std::copy_n(o.body_.begin(), bodies_, body_.begin());
+    std::copy_n(o.effect_.begin(), count_, effect_.begin());
+    return *this;
+  }
+
+  bool any() const { return count_ > 0; }
+  bool several() const { return count_ > 1; }
+  std::uint32_t one() const { return effect_[0]; }
+  // The media in effect, in ascending order; one that is present twice is listed twice.
+  std::span<const std::uint32_t> all() const { return {effect_.data(), static_cast<std::size_t>(count_)}; }
+  bool overflowed() const { return overflowed_; }
+
+  // For scenes without overlaps.
+  void only(std::uint32_t m) {
+    effect_[0] = m;
+    count_ = m != kNone;
+  }
+  // Starts outside of all boundaries.
+  void start(std::uint32_t background, const std::vector<Medium>& media);
+  // Moves to this side of the boundary. `through`: coming from the other side.
+  void stand(const SurfaceInfo& s, bool outside, bool through, const std::vector<Medium>& media);
+
+ private:
+  struct Body {
+    std::uint32_t interior, exterior;
+    bool operator==(const Body&) const = default;
+  };
+  void enter(const Body& b, bool sheet);
+  void leave(const Body& b, bool through);
+  int count_of(std::uint32_t medium) const;
+  void settle(const std::vector<Medium>& media);
+
+  std::uint32_t background_ = kNone;
+  int bodies_ = 0, count_ = 0;
+  bool overflowed_ = false;
+  std::array<Body, kCapacity> body_;
+  std::array<std::uint32_t, kCapacity + 1> effect_;
+};
+
+}  // namespace ls::render

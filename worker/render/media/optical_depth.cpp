@@ -1,0 +1,67 @@
+#include "worker/render/media/optical_depth.h"
+
+#include <algorithm>
+
+#include "worker/render/media/spectral_grids.h"
+
+namespace ls::render {
+namespace {
+
+// Positive wherever the density is: the mean of a cell with one dense voxel may round to 0.
+float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0x1p-10f); }
+
+}  // namespace
+
+void OpticalDepth::measure() {
+  double total = 0;
+  to_ = 0;
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const float rate = rate_of(w.cell());
+    if (!(rate > 0)) continue;
+    if (!(total > 0)) from_ = static_cast<float>(w.entry() + w.begin());
+    to_ = std::min(t_max_, static_cast<float>(w.entry() + w.end()));
+    total += double{rate} * (w.end() - w.begin());
+  }
+  total_ = static_cast<float>(total);
+}
+
+OpticalDepth::Point OpticalDepth::grid_at(float t) const {
+  double passed = 0;
+  Point last{t, 0, 0, {0, 0, 0}};
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const auto local = static_cast<float>(t - w.entry());
+    const float rate = rate_of(w.cell());
+    if (local < w.end() && !(rate > 0) && t == to_) break;
+    if (local < w.end())
+      return {t, static_cast<float>(passed + double{rate} * std::max(0.f, local - w.begin())), rate,
+              w.index(std::max(local, w.begin()))};
+    passed += double{rate} * (w.end() - w.begin());
+    last = {t, static_cast<float>(passed), rate, w.index(w.end())};
+  }
+  // A distance from a far origin may round to the very end: use the last non-empty cell.
+  return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
+}
+
+OpticalDepth::Point OpticalDepth::grid_after(float x) const {
+  double passed = 0;
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const float rate = rate_of(w.cell());
+    const double here = double{rate} * (w.end() - w.begin());
+    if (here > 0 && passed + here >= x) {
+      const auto local = std::clamp(w.begin() + static_cast<float>((x - passed) / rate), w.begin(), w.end());
+      return {static_cast<float>(w.entry() + local), x, rate, w.index(local)};
+    }
+    passed += here;
+  }
+  return {to_, total_, 0, {0, 0, 0}};  // rounding put x beyond the end
+}
+
+C3 OpticalDepth::grid_scattering(const Point& at_point, const V3& p) const {
+  if (medium_->by_channel[0]) return medium_->scattering_at(p) * densities(*medium_, at_point.index);
+  const Grid& g = *medium_->density;
+  const float density =
+      g.filter() == VolumeFilter::trilinear ? g.trilinear(at_point.index) : g.nearest(at_point.index);
+  return medium_->scattering_at(p) * density;
+}
+
+}  // namespace ls::render

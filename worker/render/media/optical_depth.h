@@ -1,0 +1,73 @@
+// Optical depth along a ray, parametrised so that the medium looks homogeneous: `x` is the density integrated
+// so far, and light of channel c fades by about exp(-sigma_t[c] x). In a homogeneous medium x is the length
+// and this is exact. In a grid x integrates the macro cells' mean densities; the cells are traversed again
+// for each query (a few nanoseconds per cell), nothing is stored.
+#pragma once
+
+#include <type_traits>
+
+#include "worker/render/base/features.h"
+#include "worker/render/media/medium.h"
+
+namespace ls::render {
+
+class OpticalDepth {
+ public:
+  struct Point {
+    float t = 0;     // along the ray
+    float x = 0;     // density integrated up to t
+    float rate = 0;  // dx / dt; 0 where the medium is absent
+    V3 index{0, 0, 0};
+  };
+
+  // Along o + t d, d of unit length, up to t_max, which may be infinite.
+  OpticalDepth(const Medium& m, const V3& o, const V3& d, float t_max)
+      : medium_(&m), o_(o), d_(d), t_max_(t_max), to_(t_max), total_(t_max) {
+    if (m.grid) measure();
+  }
+
+  // The part of the ray outside of which nothing scatters; to() is infinite if the medium has no end.
+  float from() const { return from_; }
+  float to() const { return to_; }
+  // x at to(). 0: the ray does not meet the medium.
+  float total() const { return total_; }
+
+  Point at(float t) const { return medium_->grid ? grid_at(t) : Point{t, t, 1, {0, 0, 0}}; }
+  Point after(float x) const { return medium_->grid ? grid_after(x) : Point{x, x, 1, {0, 0, 0}}; }
+
+  // Scattering coefficients at a point; p is its position in the world.
+  C3 scattering(const Point& at_point, const V3& p) const {
+    return medium_->grid ? grid_scattering(at_point, p) : medium_->sigma_s;
+  }
+
+ private:
+  void measure();
+  C3 grid_scattering(const Point& at_point, const V3& p) const;
+  Point grid_at(float t) const;
+  Point grid_after(float x) const;
+
+  const Medium* medium_;
+  V3 o_, d_;
+  float t_max_, from_ = 0, to_, total_;
+};
+
+// The same for a medium known to be homogeneous, where nothing needs to be measured.
+class HomogeneousOpticalDepth {
+ public:
+  HomogeneousOpticalDepth(const Medium& m, const V3&, const V3&, float t_max)
+      : sigma_s_(m.sigma_s), t_max_(t_max) {}
+  static float from() { return 0; }
+  float to() const { return t_max_; }
+  float total() const { return t_max_; }
+  static OpticalDepth::Point at(float t) { return {t, t, 1, {0, 0, 0}}; }
+  static OpticalDepth::Point after(float x) { return {x, x, 1, {0, 0, 0}}; }
+  C3 scattering(const OpticalDepth::Point&, const V3&) const { return sigma_s_; }
+
+ private:
+  C3 sigma_s_;
+  float t_max_;
+};
+template <Features F>
+using OpticalDepthIn = std::conditional_t<F.grids, OpticalDepth, HomogeneousOpticalDepth>;
+
+}  // namespace ls::render

@@ -1,0 +1,35 @@
+// The reply of lightshaft-vdb, written to the file that it inherits as kVdbReplyFd: this header, then from
+// kVdbValuesAt on the grid's values. Readers must treat it as untrusted: a malicious file may have written
+// it.
+#pragma once
+
+#include <cstdint>
+
+#include "worker/render/media/vdb_module.h"
+
+namespace ls::render {
+
+inline constexpr int kVdbReplyFd = 3;
+inline constexpr std::uint64_t kVdbValuesAt = 4096;  // bytes
+inline constexpr std::uint64_t kVdbMagic = 0x3162'6476'736c;
+
+struct VdbReply {
+  std::uint64_t magic;
+  std::int32_t code;  // return value of ls_vdb_read
+  char error[512];    // null-terminated
+  LsVdbGrid grid;     // `values` is not set
+};
+static_assert(sizeof(VdbReply) <= kVdbValuesAt);
+
+// Number of values of a grid with 1 or 3 channels and sizes of at least 0; the largest number for any other
+// grid and on overflow.
+inline std::uint64_t values_of(const LsVdbGrid& grid) {
+  if (grid.channels != 1 && grid.channels != 3) return ~std::uint64_t{0};
+  auto count = static_cast<std::uint64_t>(grid.channels);
+  for (const std::int32_t n : grid.size)
+    if (n < 0 || __builtin_mul_overflow(count, static_cast<std::uint64_t>(n), &count))
+      return ~std::uint64_t{0};
+  return count;
+}
+
+}  // namespace ls::render

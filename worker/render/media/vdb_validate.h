@@ -1,0 +1,22 @@
+// Validates a reply of lightshaft-vdb (vdb_reply.h), which a malicious file may have written.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/base/error.h"
+#include "worker/render/media/vdb_module.h"
+
+namespace ls::render {
+
+// The grid of a reply, checked: at most max_values values, finite and not negative; sizes of at least 1; a
+// finite transform. Its values stay where they are in `reply`, which must be page-aligned, as mapped memory
+// is. invalid_argument: the file is at fault, or the reply is malformed; resource_exhausted: a limit is
+// exceeded.
+Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t max_values);
+
+// The error for a malformed reply.
+tl::unexpected<Error> vdb_nonsense();
+
+}  // namespace ls::render

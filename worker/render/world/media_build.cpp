@@ -1,0 +1,233 @@
+#include "worker/render/world/media_build.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/base/overloaded.h"
+#include "worker/render/math/blackbody.h"
+#include "worker/render/math/color.h"
+#include "worker/render/media/grid_load.h"
+
+namespace ls::render {
+namespace {
+
+Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
+Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
+
+// Largest extinction: beyond it, products with a density and a length leave float32.
+constexpr double kMaxExtinction = 1e30;
+// Largest emission: beyond it, its sum exceeds the largest value of a sample.
+constexpr double kMaxEmission = 1e25;
+
+// Rejects a g that rounds to 1 in float32, like 0.99999999: the phase function does not exist there.
+Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
+  const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
+  if (!hg) return HenyeyGreenstein{0};
+  const auto g = static_cast<float>(hg->g);
+  if (!(std::abs(g) < 1)) {
+    return fail(Errc::invalid_argument,
+                fmt::format("a phase function's g = {} is, to the precision of the renderer, not between -1 "
+                            "and 1; light scattered so far forward passes as if there were no medium",
+                            hg->g));
+  }
+  return HenyeyGreenstein{g};
+}
+
+// sigma: per world unit; largest: of the density.
+Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
+  for (const double s : sigma) {
+    if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
+    return fail(Errc::invalid_argument,
+                fmt::format("a medium's extinction reaches {} per scene unit: check its sigma_t, scale and "
+                            "densities",
+                            s * largest * world_scale));
+  }
+  return {};
+}
+
+// Sets the medium's emission to `factor` times values of at most `largest`.
+Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, double largest) {
+  for (const double e : factor)
+    if (!(e * largest <= kMaxEmission))
+      return fail(
+          Errc::invalid_argument,
+          fmt::format("a medium's emission reaches {}: check its emission and emission_scale", e * largest));
+  m.emission = color(factor);
+  m.emission_kind = is_black(m.emission) || !(largest > 0) ? EmissionKind::none : emission_kind;
+  return {};
+}
+
+// Lengths are multiplied by the world's scale, so coefficients are divided by it.
+Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
+  Medium out;
+  const Rgb sigma_t = times(m.sigma_t, m.scale / scale);
+  if (auto ok = check_extinction(sigma_t, 1, scale); !ok) return tl::unexpected(ok.error());
+  auto phase = phase_of(scene, m.phase);
+  if (!phase) return tl::unexpected(phase.error());
+  out.sigma_t = color(sigma_t);
+  out.sigma_s = color(times(sigma_t, m.albedo));
+  out.phase = *phase;
+  Rgb emission{};
+  for (std::size_t c = 0; c < 3; ++c)
+    emission[c] = m.emission[c] / scale + sigma_t[c] * (1 - m.albedo[c]) * m.source_radiance[c];
+  if (auto ok = shine(out, EmissionKind::per_length, emission, 1); !ok) return tl::unexpected(ok.error());
+  return out;
+}
+
+struct HeteroBuilder {
+  const Scene& scene;
+  const HeterogeneousMedium& m;
+  const AssetLoader& files;
+  World& w;
+  double per_unit;  // of the density, per world unit
+  Medium out;
+  Rgb sigma{};  // out.sigma_t, not rounded to float32
+
+  Result<LoadedVolume> load(const Volume& volume, double to_sigma) const {
+    return load_volume(volume, files, w.geometry.center, w.geometry.scale, to_sigma);
+  }
+  std::array<const Grid*, 3> keep(LoadedVolume& volume) {
+    w.inputs.add(HealthCause::negative_density, volume.clamped);
+    for (Grid& g : volume.channels) w.grids.push_back(std::move(g));
+    const std::size_t n = volume.channels.size(), first = w.grids.size() - n;
+    return {&w.grids[first], &w.grids[first + (n == 1 ? 0 : 1)], &w.grids[first + (n == 1 ? 0 : 2)]};
+  }
+  Result<void> density();
+  Result<void> albedo();
+  Result<void> set_emission();
+  Result<void> medium_emission_of(EmissionKind kind, const Volume& source);
+};
+
+Result<void> HeteroBuilder::density() {
+  const Volume& volume = scene.volumes.at(m.sigma_t.value);
+  sigma = {per_unit, per_unit, per_unit};
+  Volume shape = volume;
+  if (auto* c = std::get_if<ConstVolume>(&shape)) {
+    // The colour goes into the coefficients; the grid is 1 inside the medium.
+    sigma = times(c->value, per_unit);
+    c->value = {1, 1, 1};
+  }
+  auto loaded = load(shape, per_unit);
+  if (!loaded) return tl::unexpected(loaded.error());
+  std::vector<Grid>& grids = loaded->channels;
+  if (grids.size() == 3 && grids[0].same_values(grids[1]) && grids[0].same_values(grids[2])) grids.resize(1);
+  float largest = 0;
+  int cells = grids[0].cell_size();
+  for (const Grid& g : grids) {
+    largest = std::max(largest, g.max_value());
+    cells = std::min(cells, g.cell_size());
+  }
+  if (auto ok = check_extinction(sigma, largest, w.geometry.scale); !ok) return tl::unexpected(ok.error());
+  if (grids.size() == 3) {
+    for (Grid& g : grids)
+      if (g.cell_size() != cells) g.use_cells(cells);
+    Grid mean = Grid::mean(grids[0], grids[1], grids[2]);
+    out.by_channel = keep(*loaded);
+    out.density = &w.grids.emplace_back(std::move(mean));
+  } else {
+    out.density = keep(*loaded)[0];
+  }
+  out.sigma_t = color(sigma);
+  return {};
+}
+
+Result<void> HeteroBuilder::albedo() {
+  const Volume& volume = scene.volumes.at(m.albedo.value);
+  if (const auto* a = std::get_if<ConstVolume>(&volume)) {
+    out.sigma_s = color(times(sigma, a->value));
+    out.absorbing = color({1 - a->value[0], 1 - a->value[1], 1 - a->value[2]});
+    return {};
+  }
+  auto loaded = load(volume, per_unit);
+  if (!loaded) return tl::unexpected(loaded.error());
+  // Lookups are clamped to 1: no medium scatters more than it extinguishes.
+  for (const Grid& g : loaded->channels) w.inputs.add(HealthCause::bright_albedo, g.count_above(1));
+  out.albedo = keep(*loaded);
+  return {};
+}
+
+Result<void> HeteroBuilder::set_emission() {
+  if (m.emission) return medium_emission_of(EmissionKind::per_length, scene.volumes.at(m.emission->value));
+  if (m.source_radiance)
+    return medium_emission_of(EmissionKind::per_absorption, scene.volumes.at(m.source_radiance->value));
+  if (m.temperature)
+    return medium_emission_of(EmissionKind::black_body, scene.volumes.at(m.temperature->value));
+  return {};
+}
+
+Result<void> HeteroBuilder::medium_emission_of(EmissionKind kind, const Volume& source) {
+  const double k = m.emission_scale / (kind == EmissionKind::per_length ? w.geometry.scale : 1);
+  const auto kelvin = [&](double value) {
+    return static_cast<float>(m.temperature_offset + m.temperature_scale * value);
+  };
+  if (const auto* c = std::get_if<ConstVolume>(&source)) {
+    if (kind != EmissionKind::black_body) return shine(out, kind, times(c->value, k), 1);
+    const C3 b = black_body_radiance(kelvin(c->value[0]));
+    return shine(out, EmissionKind::per_absorption, {k * b.x, k * b.y, k * b.z}, 1);
+  }
+  // Forces small cells, so that those without emission can be skipped.
+  constexpr double kFine = 1e30;
+  auto loaded = load(source, kFine);
+  if (!loaded) return tl::unexpected(loaded.error());
+  double largest = 0;
+  for (const Grid& g : loaded->channels) largest = std::max<double>(largest, g.max_value());
+  if (kind == EmissionKind::black_body) {
+    if (loaded->channels.size() != 1)
+      return fail(Errc::invalid_argument,
+                  fmt::format("{}: a temperature grid has one channel, this one has {}",
+                              files.name(std::get<GridVolume>(source).file), loaded->channels.size()));
+    out.kelvin_scale = static_cast<float>(m.temperature_scale);
+    out.kelvin_offset = static_cast<float>(m.temperature_offset);
+    largest = max_component(black_body_radiance(kelvin(largest)));
+  }
+  out.emitter = keep(*loaded);
+  return shine(out, kind, {k, k, k}, largest);
+}
+
+Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, const AssetLoader& files,
+                             World& w) {
+  auto phase = phase_of(scene, m.phase);
+  if (!phase) return tl::unexpected(phase.error());
+  HeteroBuilder b{scene, m, files, w, m.scale / w.geometry.scale, {}, {}};
+  b.out.grid = true;
+  b.out.phase = *phase;
+  if (auto ok = b.density(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = b.albedo(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = b.set_emission(); !ok) return tl::unexpected(ok.error());
+  return b.out;
+}
+
+// The media that the camera or some surface refers to.
+std::vector<bool> named_media(const Scene& scene) {
+  std::vector<bool> named(scene.media.size(), false);
+  if (scene.sensor.medium) named[scene.sensor.medium->value] = true;
+  for (const Shape& s : scene.shapes) {
+    if (!s.is_medium_transition) continue;
+    if (s.interior) named[s.interior->value] = true;
+    if (s.exterior) named[s.exterior->value] = true;
+  }
+  return named;
+}
+
+}  // namespace
+
+Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w) {
+  const std::vector<bool> named = named_media(scene);
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    if (!named[i]) {
+      w.media.emplace_back();
+      continue;
+    }
+    Result<Medium> m = std::visit(
+        overloaded{[&](const HomogeneousMedium& h) { return homogeneous(scene, h, w.geometry.scale); },
+                   [&](const HeterogeneousMedium& h) { return heterogeneous(scene, h, files, w); }},
+        scene.media[i]);
+    if (!m) return tl::unexpected(m.error());
+    m->priority = std::visit([](const auto& given) { return given.priority; }, scene.media[i]);
+    w.media.push_back(*m);
+  }
+  return {};
+}
+
+}  // namespace ls::render

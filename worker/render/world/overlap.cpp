@@ -1,0 +1,90 @@
+#include "worker/render/world/overlap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "worker/render/geometry/surface_boxes.h"
+
+namespace ls::render {
+namespace {
+
+// Limit of pairs to examine. Boxes are sorted by their start along x, and touching pairs are searched until
+// one is found: n log n unless many boxes overlap along x; if more pairs than this do, they are assumed to
+// touch.
+constexpr std::size_t kMaxPairs = std::size_t{1} << 24;
+
+bool any_touch(std::vector<SurfaceBox> boxes) {
+  std::sort(boxes.begin(), boxes.end(),
+            [](const SurfaceBox& a, const SurfaceBox& b) { return a.lo.x < b.lo.x; });
+  std::size_t pairs = 0;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (std::size_t k = i + 1; k < boxes.size() && boxes[k].lo.x <= boxes[i].hi.x; ++k) {
+      if (boxes[i].touches(boxes[k]) || ++pairs > kMaxPairs) return true;
+    }
+  }
+  return false;
+}
+
+// True if there is a boundary that does not have the surrounding medium `ambience` on either side, although
+// that medium surrounds it.
+bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
+  if (ambience == kNone) return false;
+  return std::any_of(g.surfaces.begin(), g.surfaces.end(), [&](const SurfaceInfo& s) {
+    return s.transition && s.crossed && s.exterior != ambience && s.interior != ambience;
+  });
+}
+
+constexpr int kMaxCrossings = 1 << 12;  // per ray that determines the camera's media
+
+// Records boundaries that the ray leaves before entering them, so those around its origin.
+using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // surface, instance
+void note_left(const World& w, V3 o, const V3& d, Left& left) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, bool> seen;
+  for (int i = 0; i < kMaxCrossings; ++i) {
+    const auto primitive = w.accel.nearest(o, d, kInfinity);
+    SurfaceHit hit;
+    if (!primitive || !w.geometry.complete(*primitive, o, d, hit)) return;
+    const SurfaceInfo& s = w.geometry.surfaces[hit.surface];
+    const std::pair key{hit.surface, hit.primitive.instance};
+    if (s.transition && !s.sheet && seen.try_emplace(key, true).second && dot(d, hit.ng) > 0) ++left[key];
+    o = offset_point(hit, d);
+  }
+}
+
+}  // namespace
+
+bool media_may_overlap(const World& w) {
+  const Geometry& g = w.geometry;
+  std::set<std::uint32_t> ambiences{w.camera_medium};
+  for (const SurfaceInfo& s : g.surfaces)
+    if (s.transition) ambiences.insert(s.exterior);
+  for (const std::uint32_t m : ambiences)
+    if (stands_in_ambience(g, m)) return true;
+  auto boxes = surface_boxes(g, [](const SurfaceInfo& s) { return s.transition && s.crossed; });
+  return !boxes || any_touch(std::move(*boxes));
+}
+
+MediaState camera_media(const World& w) {
+  MediaState state;
+  if (w.camera_medium == kNone) return state;
+  const CameraRay ray =
+      w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
+  Left left;
+  // Neither axes nor diagonals, which are prone to grazing hits.
+  for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
+    note_left(w, ray.o, V3(d.normalized()), left);
+  const auto around = [&](const auto& entry) { return entry.second >= 2; };
+  const bool inside_of_it = std::any_of(left.begin(), left.end(), [&](const auto& e) {
+    return around(e) && w.geometry.surfaces[e.first.first].interior == w.camera_medium;
+  });
+  state.start(inside_of_it ? kNone : w.camera_medium, w.media);
+  for (const auto& e : left)
+    if (around(e)) state.stand(w.geometry.surfaces[e.first.first], false, true, w.media);
+  return state;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,19 @@
+// Detects nested and intersecting media boundaries once, so that scenes without them pay nothing.
+#pragma once
+
+#include "worker/render/media/medium_stack.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// True if some point may lie in several media, or in a medium other than the one on the side of the last
+// boundary crossed. Decided by bounding boxes: conservative, so true may only cost time, and false is
+// certain.
+bool media_may_overlap(const World& w);
+
+// The media that the camera is in: the sensor's `medium`, plus those of the closed boundaries around the
+// camera, by majority of three rays. If the scene gives no medium there is none, as in Mitsuba. The camera's
+// position is the origin of its central ray.
+MediaState camera_media(const World& w);
+
+}  // namespace ls::render

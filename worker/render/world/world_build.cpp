@@ -1,0 +1,255 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/assets/image.h"
+#include "common/image/aov/cryptomatte.h"
+#include "common/scene/schema/integrators.h"
+#include "worker/render/base/built.h"
+#include "worker/render/geometry/coincident.h"
+#include "worker/render/world/media_build.h"
+#include "worker/render/world/overlap.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+// The features required by the scene's needs.
+Features features_of(const scene::Needs& n) {
+  return {.media = n.media,
+          .grids = n.grids,
+          .chromatic = n.chromatic,
+          .emission = n.emission,
+          .passing = n.boundaries || n.null_transmission};
+}
+
+// The features required by the finished world: never more than those by needs.
+Features found_in(const World& w) {
+  Features f;
+  const auto& surfaces = w.geometry.surfaces;
+  f.passing = std::any_of(surfaces.begin(), surfaces.end(),
+                          [](const SurfaceInfo& s) { return s.null || s.null_transmission; });
+  if (!w.use_media) return f;
+  const auto use = [&](std::uint32_t i) {
+    if (i == kNone) return;
+    const Medium& m = w.media[i];
+    const bool glows = m.emission_kind != EmissionKind::none;
+    if (is_black(m.sigma_t) && !glows) return;
+    f.media = true;
+    f.emission = f.emission || glows;
+    f.grids = f.grids || m.grid;
+    f.chromatic = f.chromatic || m.chromatic();
+  };
+  use(w.camera_medium);
+  for (const SurfaceInfo& s : surfaces) {
+    if (!s.transition) continue;
+    use(s.interior);
+    use(s.exterior);
+  }
+  f.overlaps = f.media && media_may_overlap(w);
+  return f;
+}
+
+// Sets the data that hits on each surface must carry.
+void note_surface_needs(const Scene& scene, World& w) {
+  for (std::size_t i = 0; i < w.geometry.surfaces.size(); ++i) {
+    SurfaceInfo& s = w.geometry.surfaces[i];
+    const auto& emitter = scene.shapes[i].emitter;
+    s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
+    // For a mesh, uv changes nothing else; other shapes' frames would rotate, and with them the samples.
+    s.wants_uv = s.wants_uv || (w.aovs.has(Aov::uv) && s.uvs);
+    s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
+    s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
+    s.smooth = w.bsdfs.has_smooth(s.bsdf);
+    w.null_transmission = w.null_transmission || s.null_transmission || (w.passing_counts && s.null);
+  }
+}
+
+// Cryptomatte identifiers from the names of shapes and materials; from their index in the list if the scene
+// has no names.
+void name_surfaces(const Scene& scene, World& w) {
+  const auto id = [](const std::vector<Label>& labels, std::size_t i, auto member,
+                     std::string_view else_named) {
+    return cryptomatte_id(i < labels.size() ? labels[i].*member : fmt::format("{}_{}", else_named, i));
+  };
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    w.shape_ids.push_back(id(scene.shape_labels, i, &Label::name, "shape"));
+    w.material_ids.push_back(id(scene.shape_labels, i, &Label::material, "material"));
+  }
+  for (std::size_t i = 0; i < scene.instances.size(); ++i)
+    w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
+}
+
+// True if a point light lies in a grid, or within a tenth of its size: flights rarely sample the light
+// scattered close to it, as 1 / distance^2.
+bool a_point_shines_in_a_grid(const World& w) {
+  const std::vector<V3> points = w.lights.points();
+  return std::any_of(w.media.begin(), w.media.end(), [&](const Medium& m) {
+    if (!m.grid || is_black(m.sigma_t)) return false;
+    const V3 lo = m.density->domain_lo(), hi = m.density->domain_hi(), margin = (hi - lo) * .1f;
+    return std::any_of(points.begin(), points.end(), [&](const V3& p) {
+      const V3 q = m.density->to_index(p);
+      for (int k = 0; k < 3; ++k) {
+        if (!(q[k] >= lo[k] - margin[k] && q[k] <= hi[k] + margin[k])) return false;
+      }
+      return true;
+    });
+  });
+}
+
+// A crop is rendered with the pixels of the full frame: the same samples give the same bits. At a size other
+// than the crop's own, it is the same part of a correspondingly scaled frame.
+void place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
+  const FilmSettings& film = scene.film;
+  FrameSize frame = settings.size;
+  if (film.has_crop()) {
+    const double kx = static_cast<double>(settings.size.width) / film.crop_size.width,
+                 ky = static_cast<double>(settings.size.height) / film.crop_size.height;
+    const auto scaled = [](int pixels, double k) { return static_cast<int>(std::lround(pixels * k)); };
+    frame = {std::max(1, scaled(film.size.width, kx)), std::max(1, scaled(film.size.height, ky))};
+    w.origin_x = scaled(film.crop_offset[0], kx);
+    w.origin_y = scaled(film.crop_offset[1], ky);
+  }
+  w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
+}
+
+// Experimental builds without some parts reject scenes that need those.
+Result<void> check_built(const World& w) {
+  const bool has = kBuiltFeatures.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
+                   (kBuilt.null_transmission || !w.null_transmission) &&
+                   (kBuilt.instances || w.geometry.instances.empty()) &&
+                   (kBuilt.environment_maps || !w.lights.map()) &&
+                   (kBuilt.light_trees || !w.lights.has_tree()) && (kBuilt.lenses || !w.camera.has_lens()) &&
+                   (kBuilt.found_lights || w.needs.only_delta_lights ||
+                    (w.needs.lights.empty() && w.needs.area_lights == 0)) &&
+                   (kBuilt.textures || w.needs.textures.size() <= w.needs.textures.count("constant")) &&
+                   (kBuilt.user_geometries || w.geometry.triangle_count() == w.geometry.primitive_count());
+  if (has) return {};
+  return fail(Errc::failed_precondition,
+              "the scene needs a part of the renderer that this build was made without (" LIGHTSHAFT_WITHOUT
+              ")");
+}
+
+Result<void> check_indices(const Scene& scene) {
+  const auto bad = [](std::uint32_t i, std::size_t n) { return i >= n; };
+  for (const Shape& s : scene.shapes) {
+    if (bad(s.bsdf.value, scene.bsdfs.size()) || (s.interior && bad(s.interior->value, scene.media.size())) ||
+        (s.exterior && bad(s.exterior->value, scene.media.size())) ||
+        (s.emitter && bad(s.emitter->radiance.value, scene.textures.size()))) {
+      return fail(Errc::invalid_argument,
+                  "a shape refers to a material, medium or texture that the scene does not have");
+    }
+  }
+  if (scene.sensor.aperture_scale && bad(scene.sensor.aperture_scale->value, scene.textures.size()))
+    return fail(Errc::invalid_argument, "the sensor refers to a texture that the scene does not have");
+  if (scene.sensor.medium && bad(scene.sensor.medium->value, scene.media.size())) {
+    return fail(Errc::invalid_argument, "the sensor refers to a medium that the scene does not have");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
+                                                 const AssetFiles& files, int threads) {
+  if (auto ok = check_indices(scene); !ok) return tl::unexpected(ok.error());
+  if (settings.size.width < 1 || settings.size.height < 1)
+    return fail(Errc::invalid_argument, "the film has no pixels");
+  const auto world = std::make_shared<World>();
+  World& w = *world;
+  const AssetLoader loader{scene, files};
+  w.seed = settings.seed;
+  w.aovs = aovs_of(settings);
+  w.size = settings.size;
+  w.max_depth = settings.max_depth;
+  w.rr_depth = settings.rr_depth;
+  w.passing_counts = settings.integrator == "path" && settings.max_depth >= 0;
+  w.use_media = scene::sees_media(settings.integrator);
+  w.distant_mis = settings.integrator == "volpath_distant_mis";
+  w.distance = scene.integrator.distance;
+  w.heuristic = scene.integrator.heuristic;
+  w.hide_emitters = scene.integrator.hide_emitters;
+  auto geometry = Geometry::build(scene, loader);
+  if (!geometry) return tl::unexpected(geometry.error());
+  w.geometry = std::move(*geometry);
+  w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
+  w.inputs.add(HealthCause::negative_texel, w.geometry.attributes.clamped);
+  auto textures =
+      TextureTable::build(scene,
+                          [&](const Asset& a) -> Result<ImageData> {
+                            const auto it = files.find(a.digest);
+                            if (it == files.end())
+                              return fail(Errc::internal, "no file was given for '" + a.name + "'");
+                            return load_image(it->second, a.name);
+                          },
+                          {&w.geometry.attributes, w.geometry.indices});
+  if (!textures) return tl::unexpected(textures.error());
+  w.textures = std::move(*textures);
+  auto bsdfs = BsdfTable::build(scene, w.textures);
+  if (!bsdfs) return tl::unexpected(bsdfs.error());
+  w.bsdfs = std::move(*bsdfs);
+  w.inputs.add(HealthCause::negative_texel, w.textures.clamped_texels());
+  w.inputs.add(HealthCause::reflectance, w.bsdfs.clamped_inputs());
+  note_surface_needs(scene, w);
+  if (w.use_media) {
+    if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
+    if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
+  }
+  w.coincident = find_coincident(w.geometry).any;
+  auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) -> Result<ImageData> {
+    const auto it = files.find(a.digest);
+    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
+    auto image = load_image(it->second, a.name, kMaxEnvironmentPixels);
+    if (!image && image.error().code == Errc::resource_exhausted)
+      image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
+    return image;
+  });
+  if (!lights) return tl::unexpected(lights.error());
+  w.lights = std::move(*lights);
+  w.inputs.add(HealthCause::negative_texel, w.lights.clamped_inputs());
+  for (SurfaceInfo& s : w.geometry.surfaces) {
+    s.transition = s.transition && w.use_media;
+    s.borders = s.transition || s.coincident_reach > 0;
+    s.plain = s.light == kNone && !s.null && !s.null_transmission;
+    w.lights_on_others = w.lights_on_others || (s.null && s.light != kNone && s.coincident_reach > 0);
+  }
+  auto accel = Accel::build(w.geometry, threads, w.coincident);
+  if (!accel) return tl::unexpected(accel.error());
+  w.accel = std::move(*accel);
+  place_camera(scene, settings, w);
+  if (!w.camera.usable())
+    return fail(Errc::invalid_argument,
+                "the rays of the sensor leave the range of single precision: check its to_world, fov, "
+                "principal_point_offset, clip planes, aperture_radius and focus_distance");
+  w.filter = PixelFilter(scene.film.filter);
+  const Features found = found_in(w);
+  w.needs = scene::needs_of(scene, w.use_media);
+  w.need = features_of(w.needs);
+  w.need.overlaps = found.overlaps || w.coincident;        // depends on positions in the shapes' files
+  w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
+  if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
+  if (!w.need.covers(found))
+    return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
+  w.overlaps = found.overlaps;
+  if (w.overlaps) w.camera_media = camera_media(w);
+  w.need.split = w.aovs.any_of(aovs_of(AovKind::light));
+  if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
+  bool homogeneous_media = false;
+  for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
+  w.shadows_walk = w.null_transmission || (w.need.media && w.accel.has_boundaries());
+  w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
+  w.equiangular_points = kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) &&
+                         a_point_shines_in_a_grid(w);
+  for (Medium& m : w.media) {
+    if (m.grid ? w.equiangular_points : w.equiangular)
+      m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
+  }
+  // Equi-angular sampling picks a light before the shading point is known. MIS needs the same pmf at
+  // vertices, so the tree is used in media only when no segment is sampled.
+  if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
+    w.lights.use_tree_in_media();
+  return std::shared_ptr<const World>(world);
+}
+
+}  // namespace ls::render

@@ -1,0 +1,90 @@
+// Describes a world in words and bytes.
+#include <fmt/format.h>
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+std::string counted(std::uint64_t n, std::string_view what) {
+  return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
+}
+
+// "12 triangles, 2 spheres"
+std::string primitives(const Geometry& g) {
+  std::string text;
+  const auto add = [&](std::uint64_t n, std::string_view what) {
+    if (n > 0) text += (text.empty() ? "" : ", ") + counted(n, what);
+  };
+  add(g.triangle_count(), "triangle");
+  add(g.spheres.size(), "sphere");
+  add(g.disks.size(), "disk");
+  add(g.cylinders.size(), "cylinder");
+  add(g.instances.size(), "instance");
+  return text.empty() ? "no shape" : text;
+}
+
+std::vector<WorldReport::Structure> structures_of(const World& w) {
+  std::uint64_t values = 0, cells = 0, value_count = 0;
+  for (const Grid& g : w.grids) {
+    cells += g.majorant_bytes();
+    values += g.bytes() - g.majorant_bytes();
+    value_count += g.value_count();
+  }
+  const EnvironmentMap* map = w.lights.map();
+  const std::string grids =
+      w.grids.empty() ? "no grid"
+                      : fmt::format("{} of {} values", counted(w.grids.size(), "grid"), value_count);
+  return {
+      {"geometry", w.geometry.bytes(), primitives(w.geometry)},
+      {"bvh", w.accel.bytes(),
+       w.accel.has_boundaries() ? "one for all, one for what blocks light, one for what lets it pass"
+                                : "one; nothing lets light pass"},
+      {"materials", w.bsdfs.bytes(), counted(w.bsdfs.size(), "material")},
+      {"textures", w.textures.bytes(), w.textures.bytes() > 0 ? "texels" : "no image"},
+      {"environment map", map ? map->bytes() : 0, map ? "texels and the table that samples them" : "none"},
+      {"grid values", values, grids},
+      {"majorant cells", cells, grids},
+      {"light table", w.lights.table_bytes(), counted(w.lights.count(), "light")},
+      {"light tree", w.lights.tree_bytes(),
+       w.lights.has_tree() ? counted(w.lights.count(), "light")
+                           : "too few lights with a place to choose among"}};
+}
+
+}  // namespace
+
+WorldReport describe(const World& w) {
+  WorldReport r;
+  r.variant = covering_variants(w).front();
+  r.variants = all_variants(w).size();
+  const auto feature = [&](bool used, const std::string& text) {
+    (used ? r.used : r.left_out).push_back(text);
+  };
+  feature(w.need.media, "participating media");
+  feature(w.need.grids, "density grids, majorants and their trackers");
+  feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
+  feature(w.need.emission, "light given off by media");
+  feature(w.overlaps, "media within or across each other");
+  feature(w.coincident, "a search for surfaces that lie on null ones");
+  feature(w.need.split, "AOVs of light");
+  const bool angles =
+      w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
+  feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points,
+          "equi-angular sampling about lights");
+  feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
+  feature(w.lights.can_sample(), "next-event estimation");
+  feature(w.lights.count() > 1, "choice among lights");
+  feature(w.lights.has_tree(), "tree of lights");
+  feature(w.camera.has_lens(), "thin lens");
+  feature(!w.geometry.instances.empty(), "instances of groups");
+  feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");
+  feature(w.textures.bytes() > 0, "image textures");
+  feature(w.lights.map(), "environment map, sampled by its brightness");
+  if (w.lights.left_out())
+    r.left_out.push_back(fmt::format("{} lights without power or area", w.lights.left_out()));
+  r.structures = structures_of(w);
+  for (const auto& [cause, entry] : w.inputs.causes) r.clamped_inputs += entry.count;
+  return r;
+}
+
+}  // namespace ls::render
