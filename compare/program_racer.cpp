@@ -12,7 +12,7 @@ namespace ls::race {
 namespace {
 
 constexpr std::uintmax_t kMostTextBytes = 1 << 20;
-constexpr double kPatience = 4;  // multiple of the race's time, in addition to the adapter's most_seconds
+constexpr double kExtraTime = 4;  // multiple of the race's time, in addition to the adapter's most_seconds
 constexpr const char* kList = "pictures.jsonl";
 
 Result<std::string> read_text(const std::filesystem::path& file) {
@@ -71,7 +71,7 @@ class ProgramRacer final : public Racer {
                                                     {"image", ""},
                                                     {"folder", entry_.folder.string()}});
     return run_program(
-        {filled(entry_.adapter, values), entry_.adapter.most_seconds + kPatience * conditions_.time}, clock_,
+        {filled(entry_.adapter, values), entry_.adapter.most_seconds + kExtraTime * conditions_.time}, clock_,
         stop);
   }
 

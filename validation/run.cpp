@@ -194,7 +194,7 @@ class Runner {
     c.seconds = s.seconds / static_cast<double>(lines_of(*case_));
     cli::judge_equivalence(c, s.freedom[k], unknown(c.expected), kRounding * std::abs(c.expected),
                            kLeastFreedom);
-    if (c.nonfinite > 0) c.why += ": " + cli::told(s.health);
+    if (c.nonfinite > 0) c.why += ": " + cli::health_text(s.health);
     wide = wide || c.too_wide;
     return c;
   }

@@ -162,8 +162,8 @@ class LocalRender {
     const auto image = coordinator.image_exr(job_);
     if (!image) return tl::unexpected(image.error());
     const auto saved = save_result(options_.out, *image);
-    const auto told = write_report(cut, saved.has_value());
-    return saved ? told : saved;
+    const auto report_text = write_report(cut, saved.has_value());
+    return saved ? report_text : saved;
   }
 
   Result<void> write_report(bool cut, bool print_summary) {
@@ -174,11 +174,11 @@ class LocalRender {
     for (const auto& tile : *tiles) folded.push_back(tile.rounds_folded);
     if (keepers_.partials && !keepers_.trouble)
       if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
-    const auto told = coordinator.report_json(job_);
-    if (!told) return tl::unexpected(told.error());
+    const auto report_text = coordinator.report_json(job_);
+    if (!report_text) return tl::unexpected(report_text.error());
     LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut,
                      counter_.and_then([](const InstructionCounter& c) { return c.read(); })};
-    const auto report = local_report(*told, facts);
+    const auto report = local_report(*report_text, facts);
     if (!report) return tl::unexpected(report.error());
     if (options_.report)
       if (auto saved = save_result(*options_.report, *report); !saved) return saved;

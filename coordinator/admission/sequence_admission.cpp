@@ -51,9 +51,9 @@ tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}
 
 // Drops warnings that an earlier frame has.
 void merge_warnings(std::vector<Admission>& frames) {
-  std::set<std::string> told;
+  std::set<std::string> reported;
   for (Admission& f : frames)
-    std::erase_if(f.job.warnings, [&](const std::string& w) { return !told.insert(w).second; });
+    std::erase_if(f.job.warnings, [&](const std::string& w) { return !reported.insert(w).second; });
 }
 
 void note_if_all_are_one(std::vector<Admission>& frames) {

@@ -82,9 +82,9 @@ void FairShare::withdraw(Job& job) {
   --ready_;
 }
 
-void FairShare::lend(Job& job, double seconds) {
+void FairShare::charge(Job& job, double seconds) {
   change(job, [&](const Place& at) {
-    job.charge_out = job.lent == 0 ? 0 : std::max(0.0, job.charge_out + seconds);
+    job.charge_out = job.leased == 0 ? 0 : std::max(0.0, job.charge_out + seconds);
     at.user.share.out = std::max(0.0, at.user.share.out + seconds);
     at.group.share.out = std::max(0.0, at.group.share.out + seconds);
   });
@@ -100,13 +100,13 @@ void FairShare::spend(Job& job, double seconds) {
 void FairShare::leave(Job& job) {
   withdraw(job);
   if (!at_work_.contains(job.seq)) return;
-  const double lent = job.charge_out;
+  const double leased = job.charge_out;
   change(job, [&](const Place& at) {
     job.charge_out = 0;
-    at.user.share.out = std::max(0.0, at.user.share.out - lent);
-    at.group.share.out = std::max(0.0, at.group.share.out - lent);
+    at.user.share.out = std::max(0.0, at.user.share.out - leased);
+    at.group.share.out = std::max(0.0, at.group.share.out - leased);
   });
-  job.charge_out = lent;
+  job.charge_out = leased;
 }
 
 void FairShare::enter(Job& job) {

@@ -32,7 +32,7 @@ class FairShare {
   bool empty() const { return ready_ == 0; }
 
   // Core seconds that were leased (negative: no longer leased), and core seconds that a result reported.
-  void lend(Job& job, double seconds);
+  void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
   // Forgets users and groups that have no work and are not ahead of the clock.
   void tidy();
@@ -51,7 +51,7 @@ class FairShare {
   struct Figure {
     std::string owner;
     std::int64_t priority;
-    double seconds, lent;
+    double seconds, leased;
     bool waits;  // has units to lease
   };
   std::vector<Figure> figures() const;

@@ -11,8 +11,8 @@ namespace ls::coordinator {
 // Counted since this start of the coordinator; names ending in _now are current values.
 struct FarmFigures {
   // Leases
-  std::uint64_t leases_granted = 0, units_lent = 0;
-  std::uint64_t leases_now = 0, units_lent_now = 0;
+  std::uint64_t leases_granted = 0, units_leased = 0;
+  std::uint64_t leases_now = 0, units_leased_now = 0;
   std::map<FreedCause, std::uint64_t> units_freed;  // units that left a worker without a result
   // Results
   std::uint64_t accepted = 0;

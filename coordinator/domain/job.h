@@ -85,7 +85,7 @@ struct Job {
   std::uint64_t audits_missed = 0;  // chosen, but no other worker of the class was connected
   VoterTable voters;
   Load load;
-  std::uint32_t lent = 0;     // units under all leases, including audits
+  std::uint32_t leased = 0;   // units under all leases, including audits
   bool has_units = false;     // units to lease, when last checked
   bool offered = false;       // is in FairShare
   double charge_out = 0;      // core seconds charged for its leases (fair_share.h)

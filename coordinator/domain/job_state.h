@@ -24,7 +24,7 @@ constexpr std::string_view to_string(StopReason reason) {
   return kWords[static_cast<std::size_t>(reason)];
 }
 
-enum class WorkerState { connected, draining, lost, sick };
+enum class WorkerState { connected, draining, lost, unhealthy };
 constexpr std::string_view to_string(WorkerState state) {
   constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};
   return kWords[static_cast<std::size_t>(state)];

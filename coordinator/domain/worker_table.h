@@ -69,7 +69,7 @@ struct Worker {
   WorkerState state() const {
     if (!connected) return WorkerState::lost;
     if (draining) return WorkerState::draining;
-    return unhealthy_since || quarantined ? WorkerState::sick : WorkerState::connected;
+    return unhealthy_since || quarantined ? WorkerState::unhealthy : WorkerState::connected;
   }
 };
 

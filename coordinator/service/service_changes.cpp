@@ -109,7 +109,7 @@ Result<void> Service::set_priority_locked(JobEntry& entry, int priority) {
 
 // Applies an extension (more samples or a tighter target) to the farm and to the stored job.
 Result<void> Service::go_on_locked(JobEntry& entry, const Result<void>& possible, const Event& change,
-                                   std::string told) {
+                                   std::string log_line) {
   const JobState state = shown_state(entry);
   if (!possible) {
     if (state == JobState::done && !entry.finishing) forget_locked(entry);
@@ -125,7 +125,7 @@ Result<void> Service::go_on_locked(JobEntry& entry, const Result<void>& possible
   entry.stored.spec.target_error = plan.target_error;
   entry.stored.spec.time = plan.time;
   if (plan.spp != spp) entry.stored.spp = entry.stored.spec.spp = plan.spp;
-  log_job(id, std::move(told));
+  log_job(id, std::move(log_line));
   if (const auto put = store_->put_job(entry.stored); !put) return put;
   publish_job_locked(entry);
   return {};

@@ -13,7 +13,7 @@ FarmFigures Service::figures() const {
   for (const auto& [id, worker] : workers_)
     if (const auto figures = farm_.worker(id)) {
       f.leases_now += figures->leases;
-      f.units_lent_now += figures->units_out;
+      f.units_leased_now += figures->units_out;
     }
   for (const auto& [id, entry] : entries_)
     if (entry->assembly) f.waiting_now += entry->assembly->waiting();

@@ -243,7 +243,7 @@ class Service final : public Coordinator {
   Result<void> set_priority_locked(JobEntry& entry, int priority);
   Result<void> extend_locked(JobEntry& entry, std::uint64_t spp);
   Result<void> go_on_locked(JobEntry& entry, const Result<void>& possible, const Event& change,
-                            std::string told);
+                            std::string log_line);
   Result<void> set_target_locked(JobEntry& entry, double target_error);
   Result<void> wake_locked(JobEntry& entry);  // gives an unloaded job back to the farm
   void forget_locked(JobEntry& entry);        // unloads an ended job
@@ -308,7 +308,7 @@ class Service final : public Coordinator {
   Provenance provenance_of(const ReportFacts& facts) const;
   CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job) const;
 
-  // References (service_truth.cpp); compare() and reference_of() run on the comparing thread
+  // References (service_reference.cpp); compare() and reference_of() run on the comparing thread
   void compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
   void compare_last_locked(const EntryPtr& entry);
   void compare(const EntryPtr& entry, std::uint64_t curve, double spp, const std::vector<TilePicture>& tiles,

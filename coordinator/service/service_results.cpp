@@ -15,7 +15,7 @@ namespace ls::coordinator {
 namespace {
 // Clamps the worker's numbers: their sums go into records that must be readable, so implausible values count
 // as 0. Values that are not numbers are rejected with the result (verify_result).
-void believe(UnitResult& result) {
+void drop_impossible_times(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
   for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
                        &result.times.wait})
@@ -29,7 +29,7 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
   failpoint("result-arrived");
   Arrived arrived{from, std::move(result), nullptr, {}};
   arrived.at = now();
-  believe(arrived.result);
+  drop_impossible_times(arrived.result);
   {
     const std::lock_guard lock(mutex_);
     figures_.result_bytes += arrived.result.exr.size();
@@ -90,7 +90,7 @@ void Service::commit(std::vector<Checked> batch) {
     std::optional<Error> error;
   };
   std::vector<Stored> stored(batch.size());
-  std::set<std::shared_ptr<PartialLog>> touched;
+  std::set<std::shared_ptr<PartialLog>> written;
   std::vector<std::shared_ptr<PartialLog>> logs(batch.size());
   std::vector<double> at(batch.size());
   {
@@ -118,17 +118,17 @@ void Service::commit(std::vector<Checked> batch) {
                                   r.cpu_seconds, at[i], r.health},
                                  r.exr);
     if (place)
-      stored[i].place = *place, touched.insert(logs[i]);
+      stored[i].place = *place, written.insert(logs[i]);
     else
       stored[i].error = place.error();
     failpoint("result-appended");
   }
-  for (const auto& log : touched)
+  for (const auto& log : written)
     if (const auto synced = log->sync(); !synced)
       for (std::size_t i = 0; i < batch.size(); ++i)
         if (logs[i] == log && stored[i].place) stored[i].error = synced.error();
 
-  if (!touched.empty()) failpoint("result-durable");
+  if (!written.empty()) failpoint("result-durable");
   std::unique_lock lock(mutex_);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     Checked& item = batch[i];

@@ -204,7 +204,7 @@ void Service::on(const Send& e, Todo&) {
   if (const auto* assign = std::get_if<AssignLease>(&e.message)) {
     const Lease& lease = assign->lease;
     ++figures_.leases_granted;
-    figures_.units_lent += lease.units.size();
+    figures_.units_leased += lease.units.size();
     if (!connection.first_lease) connection.first_lease = lease_number(lease.id, lease_prefix());
     found->second.last_job = lease.job;
     if (const auto entry = find_locked(lease.job)) note_leased_locked(*entry, lease, e.worker);
@@ -225,9 +225,9 @@ void Service::note_leased_locked(JobEntry& entry, const Lease& lease, const Work
 
 void Service::on(const WorkerStateChanged& e, Todo&) {
   log_info(fmt::format("worker={} state={}", e.worker.value, to_string(e.to)), e.why);
-  if (e.to == WorkerState::sick) log_error(fmt::format("worker={}", e.worker.value), "sick: " + e.why);
+  if (e.to == WorkerState::unhealthy) log_error(fmt::format("worker={}", e.worker.value), "sick: " + e.why);
   if (const auto w = workers_.find(e.worker); w != workers_.end())
-    w->second.trouble = e.to == WorkerState::sick ? e.why : "";
+    w->second.trouble = e.to == WorkerState::unhealthy ? e.why : "";
   publish_worker_locked(e.worker, true);
 }
 

@@ -174,8 +174,8 @@ Seeds protocol_seeds() {
     r.cpu_seconds = .1;
     return r;
   };
-  UnitResult unwell = result(0, 0);
-  unwell.health.add(HealthCause::infinite, 2, {3, 4, 1});
+  UnitResult unhealthy = result(0, 0);
+  unhealthy.health.add(HealthCause::infinite, 2, {3, 4, 1});
   WorkerHello other = hello();
   other.tags = {"a"};
   other.blobs_held = {kClass};
@@ -190,7 +190,7 @@ Seeds protocol_seeds() {
   std::string all;
   for (TileIndex t = 0; t < 2; ++t)
     for (RoundIndex r = 0; r < 3; ++r) all += with_length(wire_of(FromWorker(result(t, r))));
-  Seeds seeds{all, with_length(wire_of(FromWorker(unwell))) + wire_of(FromWorker(result(0, 0)))};
+  Seeds seeds{all, with_length(wire_of(FromWorker(unhealthy))) + wire_of(FromWorker(result(0, 0)))};
   for (const FromWorker& m :
        {FromWorker(other), FromWorker(WorkerProgress{{{{"L"}, 1}}, "rendering", 1, 2, 3}),
         FromWorker(failure), FromWorker(LeaseReturned{{"L"}, {{{"J"}, 0, 0}}}), FromWorker(WorkerDraining{})})

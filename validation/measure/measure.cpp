@@ -81,7 +81,7 @@ std::uint64_t samples_gone_wrong(const render::Health& health) {
   return health.nonfinite + health.negative + health.majorant_violations;
 }
 
-std::string told(const render::Health& health) {
+std::string health_text(const render::Health& health) {
   std::string text;
   for (const auto& [cause, entry] : health.causes) {
     if (effect_of(cause) == HealthEffect::input) continue;

@@ -15,7 +15,7 @@ namespace ls::cli {
 // Samples of all causes.
 std::uint64_t samples_gone_wrong(const render::Health& health);
 // The causes, with the first location: "1 majorant_violation, first at pixel (3, 5), sample 17".
-std::string told(const render::Health& health);
+std::string health_text(const render::Health& health);
 void add(render::Health& sum, const render::Health& h);
 
 // Renders every pixel of `size`, one row per task; the planes of the sums cover the whole frame.

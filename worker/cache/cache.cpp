@@ -35,8 +35,8 @@ class LockedFile final : public BlobFile {
 
 // A blob that is missing, damaged or denied at the coordinator may become available later.
 Error passing(Error error) {
-  const bool says_so = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
-  if (!says_so) error.code = Errc::internal;
+  const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
+  if (!temporary) error.code = Errc::internal;
   return error;
 }
 

@@ -55,7 +55,7 @@ class FakeBackend final : public LocalBackend {
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples},
                      aovs_of(brief.settings));
     if (faulty && options_.fault.kind == FakeFault::Kind::wrong) out.partial.sums[0] += 1;
-    if (faulty && options_.fault.kind == FakeFault::Kind::unwell)
+    if (faulty && options_.fault.kind == FakeFault::Kind::unhealthy)
       out.health.add(HealthCause::infinite, 2, {unit.rect.x0, unit.rect.y0, unit.samples.s0});
     out.cpu_seconds = thread_cpu_seconds() - start + work;
     out.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -89,7 +89,7 @@ class FakeBackend final : public LocalBackend {
         while (!stop) ::usleep(1000);
         break;
       case FakeFault::Kind::wrong:
-      case FakeFault::Kind::unwell:
+      case FakeFault::Kind::unhealthy:
       case FakeFault::Kind::none:
         break;
     }
@@ -128,7 +128,7 @@ Result<FakeFault> parse_fake_fault(std::string_view text) {
   else if (kind == "wrong")
     fault.kind = FakeFault::Kind::wrong;
   else if (kind == "unwell")
-    fault.kind = FakeFault::Kind::unwell;
+    fault.kind = FakeFault::Kind::unhealthy;
   else
     return fail(Errc::invalid_argument,
                 fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong, unwell", kind));

@@ -15,7 +15,7 @@ namespace ls::worker {
 
 // A fault injected into chosen units, for tests.
 struct FakeFault {
-  enum class Kind { none, crash, hang, memory, wrong, unwell } kind = Kind::none;
+  enum class Kind { none, crash, hang, memory, wrong, unhealthy } kind = Kind::none;
   // Selects units by the job's seed, tile and round. Negative: any.
   std::int64_t seed = -1, tile = -1, round = -1;
 };

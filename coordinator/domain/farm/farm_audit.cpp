@@ -60,22 +60,22 @@ std::string audit_lease(const LeaseRecord& lease,
 std::string audit_load(const std::string& whose, const Load& kept, const Load& counted, std::uint32_t units,
                        std::uint32_t workers) {
   if (kept.units != counted.units || kept.leases_at != counted.leases_at)
-    return fmt::format("{}: {} units lent to {} workers, but counted as {} at {}", whose, counted.units,
+    return fmt::format("{}: {} units leased to {} workers, but counted as {} at {}", whose, counted.units,
                        counted.leases_at.size(), kept.units, kept.leases_at.size());
   if (units != 0 && kept.units > units)
-    return fmt::format("{}: {} units are lent, {} may be", whose, kept.units, units);
+    return fmt::format("{}: {} units are leased, {} may be", whose, kept.units, units);
   if (workers != 0 && kept.leases_at.size() > workers)
     return fmt::format("{}: {} workers hold some, {} may", whose, kept.leases_at.size(), workers);
   return "";
 }
 
 // What is leased of each job, group and user, according to the leases
-struct Lent {
+struct Leased {
   std::map<JobSeq, Load> jobs;
   std::map<std::string, Load> users, groups;
   std::map<JobSeq, double> charges;
 
-  explicit Lent(const LeaseTable& leases) {
+  explicit Leased(const LeaseTable& leases) {
     for (const auto& [seq, lease] : leases.all()) {
       const JobPlan& plan = lease.job->plan;
       charges[lease.job->seq] += lease.remaining * lease.charge_per_unit;
@@ -90,21 +90,21 @@ struct Lent {
   }
 };
 
-std::string audit_job_load(const Job& job, Lent& lent, const ShareLimits& limits) {
+std::string audit_job_load(const Job& job, Leased& leased, const ShareLimits& limits) {
   const JobPlan& plan = job.plan;
   const std::string name = "job " + plan.brief.job.value;
-  const double charge = lent.charges[job.seq];
+  const double charge = leased.charges[job.seq];
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
-    return fmt::format("{}: charged with {} s, lent {} s", name, job.charge_out, charge);
+    return fmt::format("{}: charged with {} s, leased {} s", name, job.charge_out, charge);
   const bool alone = plan.group.empty();  // otherwise the limits are the group's
-  return audit_load(name, job.load, lent.jobs[job.seq],
+  return audit_load(name, job.load, leased.jobs[job.seq],
                     alone ? tighter(plan.max_units, limits.units_per_job) : 0,
                     alone ? tighter(plan.max_workers, limits.workers_per_job) : 0);
 }
 
 std::string audit_loads(const std::string& what, const std::map<std::string, Load>& kept,
                         std::map<std::string, Load>& counted, std::uint32_t units, std::uint32_t workers) {
-  if (counted.size() != kept.size()) return "a " + what + " that has nothing lent is counted";
+  if (counted.size() != kept.size()) return "a " + what + " that has nothing leased is counted";
   for (const auto& [name, load] : kept)
     if (std::string wrong = audit_load(what + " " + name, load, counted[name], units, workers);
         !wrong.empty())
@@ -164,13 +164,13 @@ std::string Farm::audit() const {
     }
   }
   const ShareLimits& limits = state.options.limits;
-  Lent lent(state.leases);
+  Leased leased(state.leases);
   for (const auto& [seq, job] : state.jobs)
-    if (std::string wrong = audit_job_load(*job, lent, limits); !wrong.empty()) return wrong;
+    if (std::string wrong = audit_job_load(*job, leased, limits); !wrong.empty()) return wrong;
   std::string wrong =
-      audit_loads("user", state.users, lent.users, limits.units_per_user, limits.workers_per_user);
+      audit_loads("user", state.users, leased.users, limits.units_per_user, limits.workers_per_user);
   if (wrong.empty())
-    wrong = audit_loads("group", state.groups, lent.groups, limits.units_per_job, limits.workers_per_job);
+    wrong = audit_loads("group", state.groups, leased.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
   // The table adds and subtracts as workers come, go and are measured: each time it loses about 2^-52 of the
   // farm's threads to rounding.

@@ -179,11 +179,11 @@ void Farm::State::fail(Job& job, std::string error, std::optional<UnitFailure> f
 }
 
 void Farm::State::end(Job& job) {
-  std::set<WorkerIndex> told;
+  std::set<WorkerIndex> notified;
   for (const LeaseSeq seq : leases_of(job)) {
     Worker& worker = *leases.find(seq)->worker;
     free_lease(seq, FreedCause::job_ended, false);
-    if (!worker.connected || !told.insert(worker.index).second) continue;
+    if (!worker.connected || !notified.insert(worker.index).second) continue;
     effects.emplace_back(Send{worker.id, CancelJob{job.plan.brief.job}});
     worker.briefed.erase(job.seq);
     worker.warmed_up.erase(job.seq);

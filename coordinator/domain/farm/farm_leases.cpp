@@ -37,9 +37,9 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   worker.seconds_out += sum;
   worker.leases.insert(lease.seq);
   workers.settle(worker);
-  job.lent += lease.remaining;
+  job.leased += lease.remaining;
   if (!audit) load(job, worker, lease.remaining);
-  shares.lend(job, lease.remaining * lease.charge_per_unit);
+  shares.charge(job, lease.remaining * lease.charge_per_unit);
   if (worker.briefed.insert(job.seq).second) message.brief = job.plan.brief;
   leases.add(std::move(lease));
   effects.emplace_back(Send{worker.id, std::move(message)});
@@ -57,9 +57,9 @@ bool Farm::State::detach(LeaseRecord& lease, UnitCode code) {
     last = it->second.empty();
     if (last) job.out.erase(it);
   }
-  --job.lent;
+  --job.leased;
   if (!lease.audit) unload(job, 1);
-  shares.lend(job, -lease.charge_per_unit);
+  shares.charge(job, -lease.charge_per_unit);
   --lease.remaining;
   --worker.units_out;
   worker.seconds_out = worker.units_out == 0 ? 0 : std::max(0.0, worker.seconds_out - lease.seconds_per_unit);

@@ -98,9 +98,9 @@ void Farm::State::settle_audits(Job& job) {
   for (const auto& [code, audit] : job.audits) {
     if (audit.lease != 0) continue;
     const Deciders who = deciders(job, audit);
-    const Duration patience = audit.second ? kNoGrowthLimit : kAuditAfterRestart;
+    const Duration grace = audit.second ? kNoGrowthLimit : kAuditAfterRestart;
     const bool patient =
-        (audit.restored || (audit.second && who == Deciders::away)) && now - audit.since < patience;
+        (audit.restored || (audit.second && who == Deciders::away)) && now - audit.since < grace;
     if (who != Deciders::there && !patient) stuck.push_back(code);
   }
   for (const UnitCode code : stuck) {
@@ -153,10 +153,11 @@ std::string contradiction(const UnitAccepted& now, const Digest& before) {
   return fmt::format("it rendered tile {} round {} of job {} first to {}, then to {}", now.unit.tile,
                      now.unit.round, now.unit.job.value, before.hex(), now.digest.hex());
 }
-std::string outvoted(const UnitKey& unit, const Digest& said, const WorkerId& one, const WorkerId& other,
+std::string outvoted(const UnitKey& unit, const Digest& claimed, const WorkerId& one, const WorkerId& other,
                      const Digest& agreed) {
   return fmt::format("it rendered tile {} round {} of job {} to {}; {} and {} both rendered it to {}",
-                     unit.tile, unit.round, unit.job.value, said.hex(), one.value, other.value, agreed.hex());
+                     unit.tile, unit.round, unit.job.value, claimed.hex(), one.value, other.value,
+                     agreed.hex());
 }
 }  // namespace
 
@@ -207,24 +208,24 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
     if (deciders(job, audit) == Deciders::none) return undecided(job, code);
     return refresh(job);
   }
-  const auto [second, said] = *audit.second;
-  if (with.digest != said) return undecided(job, code);
+  const auto [second, claimed] = *audit.second;
+  if (with.digest != claimed) return undecided(job, code);
   found_faulty(with.unit, first.worker,
-               outvoted(with.unit, first.digest, workers.name_of(second), with.worker, said));
+               outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
 // A worker that delivers a differing result without having been asked has chosen the unit itself, so its
 // result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the
 // claimant is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
-  const std::pair said{workers.index_of(by.worker), by.digest};
+  const std::pair claimed{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {
-    if (!open->second.claim) open->second.claim = said;
+    if (!open->second.claim) open->second.claim = claimed;
     return;
   }
   Audit audit;
   audit.first = job.units.find(code)->worker;
-  audit.claim = said;
+  audit.claim = claimed;
   if (job.audits.size() >= kMaxAuditsOpen || deciders(job, audit) != Deciders::there) return;
   job.audits.emplace(code, std::move(audit));
   audits_changed.insert(job.plan.brief.job);

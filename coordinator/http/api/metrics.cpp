@@ -80,9 +80,9 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
-  single(out, "lightshaft_units_lent", "gauge", "Units of these leases.", f.units_lent_now);
+  single(out, "lightshaft_units_lent", "gauge", "Units of these leases.", f.units_leased_now);
   single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
-  single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_lent);
+  single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_leased);
   head(out, "lightshaft_units_freed_total", "counter",
        "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
   // All causes, even with count 0, so that rates are defined from the first event on.

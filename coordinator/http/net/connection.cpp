@@ -61,8 +61,8 @@ net::awaitable<bool> Connection::open() {
   const Stream::Opened opened = co_await stream_.open();
   disarm();
   if (opened == Stream::Opened::plain_text) {
-    const Response told = problem(400, "this port speaks TLS: ask it with https://, not http://");
-    co_await answer_unread(told);
+    const Response refusal = problem(400, "this port speaks TLS: ask it with https://, not http://");
+    co_await answer_unread(refusal);
   }
   co_return opened == Stream::Opened::ready;
 }

@@ -183,8 +183,8 @@ void Server::stop() {
   });
   {
     std::unique_lock lock(s.mutex);
-    const auto patience = steady_seconds(s.shared->api.limits().stop_seconds);
-    s.all_closed.wait_for(lock, patience, [&s] { return s.none_open; });
+    const auto limit = steady_seconds(s.shared->api.limits().stop_seconds);
+    s.all_closed.wait_for(lock, limit, [&s] { return s.none_open; });
   }
   s.shared->api.ask_to_stop();
   s.io.stop();

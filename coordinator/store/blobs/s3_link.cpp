@@ -173,9 +173,9 @@ Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
   curl_easy_getinfo(curl.get(), CURLINFO_RESPONSE_CODE, &status);
   curl_easy_getinfo(curl.get(), CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
   answer.length = length < 0 ? 0 : static_cast<std::uint64_t>(length);
-  const bool told = code == CURLE_OK || (code == CURLE_SEND_ERROR && status >= 400);
-  answer.status = told ? static_cast<int>(status) : 0;
-  if (!told) answer.text = *problem ? problem : curl_easy_strerror(code);
+  const bool has_status = code == CURLE_OK || (code == CURLE_SEND_ERROR && status >= 400);
+  answer.status = has_status ? static_cast<int>(status) : 0;
+  if (!has_status) answer.text = *problem ? problem : curl_easy_strerror(code);
   return answer;
 }
 
@@ -200,18 +200,18 @@ Error S3Link::error_of(const Request& request, const Answer& answer) const {
   const std::string what = fmt::format("{} {}", request.method, url_of(request));
   if (answer.status == 0) return {Errc::unavailable, fmt::format("{}: no answer: {}", what, answer.text)};
   const std::string code = xml_element(answer.text, "Code"), text = xml_element(answer.text, "Message");
-  const std::string said = fmt::format("{}: status {} {} {}", what, answer.status, code,
-                                       text.empty() ? answer.text.substr(0, kShownText) : text);
+  const std::string answered = fmt::format("{}: status {} {} {}", what, answer.status, code,
+                                           text.empty() ? answer.text.substr(0, kShownText) : text);
   if (answer.status == 404 && code == "NoSuchBucket")
-    return {Errc::failed_precondition, said + "; make the bucket first, or correct --blobs"};
-  if (answer.status == 404) return {Errc::not_found, said};
+    return {Errc::failed_precondition, answered + "; make the bucket first, or correct --blobs"};
+  if (answer.status == 404) return {Errc::not_found, answered};
   if (answer.status == 401 || answer.status == 403)
     return {Errc::permission_denied,
-            said +
+            answered +
                 "; check AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, what they allow, the region and this "
                 "machine's clock"};
-  if (answer.status == 507) return {Errc::resource_exhausted, said};
-  return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, said};
+  if (answer.status == 507) return {Errc::resource_exhausted, answered};
+  return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, answered};
 }
 
 // Asks for an object that does not exist: 404 is an answer.

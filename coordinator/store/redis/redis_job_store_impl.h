@@ -1,5 +1,5 @@
 // The implementation of redis_job_store.h: redis_job_store.cpp has what the service's threads use,
-// redis_job_store_tell.cpp the thread that updates Redis.
+// redis_job_store_send.cpp the thread that updates Redis.
 #pragma once
 
 #include <fmt/format.h>
@@ -115,8 +115,8 @@ class RedisJobStore final : public JobStore {
     auto before = local_->reserve(counter, amount);
     if (!before) return before;
     const std::lock_guard lock(mutex_);
-    auto& told = counters_[counter];
-    told = std::max(told, *before + amount);
+    auto& recorded = counters_[counter];
+    recorded = std::max(recorded, *before + amount);
     wake_.notify_one();
     return before;
   }
@@ -126,7 +126,7 @@ class RedisJobStore final : public JobStore {
     std::string trouble = trouble_.empty() ? not_kept_ : trouble_;
     if (trouble.empty() && members_) trouble = members_->stranded();
     return {options_.address.shown(), std::move(trouble),
-            due_.size() + telling_ + (all_due_ ? revisions_.size() : 0)};
+            due_.size() + sending_ + (all_due_ ? revisions_.size() : 0)};
   }
 
   Moved moved() override {
@@ -264,12 +264,12 @@ class RedisJobStore final : public JobStore {
   // The thread that updates Redis
   void send_loop(const std::stop_token& token);
   void send_the_rest();
-  void set_trouble(const Result<void>& told);
+  void set_trouble(const Result<void>& recorded);
   Result<void> send_once();
   Result<void> check_memory();
   Result<void> note_all_behind();
   Result<void> send_counters();
-  Result<void> tell_quarantined();
+  Result<void> send_quarantined();
   Result<void> send_jobs();
   std::vector<RedisLink::Command> commands_of(const JobId& id, const Due& due) const;
   void give_back(std::map<JobId, Due> taken);
@@ -283,8 +283,8 @@ class RedisJobStore final : public JobStore {
   std::set<JobId> lost_;                      // now owned by others: updates by the service are not stored
   Moved moved_;                               // changes that the service has not fetched yet
   std::map<JobId, Due> due_;
-  std::size_t telling_ = 0;  // jobs being sent to Redis: no longer in due_, not in Redis yet
-  JobId told_last_;          // last due job sent; the next ones follow it in order
+  std::size_t sending_ = 0;  // jobs being sent to Redis: no longer in due_, not in Redis yet
+  JobId sent_last_;          // last due job sent; the next ones follow it in order
   std::map<std::string, std::uint64_t> counters_;
   std::map<WorkerId, std::string> quarantined_;  // all known
   std::set<WorkerId> quarantined_due_;

@@ -223,7 +223,7 @@ TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {
   EXPECT_EQ(WaitingBytes::all(), before) << "what goes is not counted any more";
 }
 
-Health unwell(int x, std::uint64_t sample) {
+Health unhealthy(int x, std::uint64_t sample) {
   Health h;
   h.add(HealthCause::infinite, 1, {x, 0, sample});
   return h;
@@ -231,19 +231,19 @@ Health unwell(int x, std::uint64_t sample) {
 
 TEST(HealthTable, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
   HealthTable table, at_once;
-  table.folded(0, 0, {0, 2}, unwell(1, 0));
+  table.folded(0, 0, {0, 2}, unhealthy(1, 0));
   table.folded(0, 1, {2, 4}, {});
-  table.folded(0, 2, {4, 6}, unwell(1, 5));
-  table.folded(1, 2, {4, 6}, unwell(33, 5));
+  table.folded(0, 2, {4, 6}, unhealthy(1, 5));
+  table.folded(1, 2, {4, 6}, unhealthy(33, 5));
   EXPECT_EQ(table.total().nonfinite, 3u);
   EXPECT_EQ(HealthTable::load(table.save()).value(), table);
 
-  Health full = unwell(1, 5);
-  full.merge(unwell(1, 7));
+  Health full = unhealthy(1, 5);
+  full.merge(unhealthy(1, 7));
   table.folded(0, 2, {4, 8}, full);
   table.folded(1, 2, {4, 8}, {});
 
-  at_once.folded(0, 0, {0, 2}, unwell(1, 0));
+  at_once.folded(0, 0, {0, 2}, unhealthy(1, 0));
   at_once.folded(0, 2, {4, 8}, full);
   EXPECT_EQ(table, at_once);
   EXPECT_EQ(table.total().nonfinite, 3u);
@@ -251,23 +251,23 @@ TEST(HealthTable, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
 
 TEST(HealthTable, ADiscardedTileSaysNothingAndIsFoldedAgain) {
   HealthTable table, at_once;
-  table.folded(0, 0, {0, 2}, unwell(1, 0));
-  table.folded(1, 0, {0, 2}, unwell(40, 0));
-  table.folded(1, 2, {4, 6}, unwell(41, 5));
+  table.folded(0, 0, {0, 2}, unhealthy(1, 0));
+  table.folded(1, 0, {0, 2}, unhealthy(40, 0));
+  table.folded(1, 2, {4, 6}, unhealthy(41, 5));
 
   table.discard(1);
-  at_once.folded(0, 0, {0, 2}, unwell(1, 0));
+  at_once.folded(0, 0, {0, 2}, unhealthy(1, 0));
   EXPECT_EQ(table, at_once);
 
-  table.folded(1, 0, {0, 2}, unwell(42, 0));
-  at_once.folded(1, 0, {0, 2}, unwell(42, 0));
+  table.folded(1, 0, {0, 2}, unhealthy(42, 0));
+  at_once.folded(1, 0, {0, 2}, unhealthy(42, 0));
   EXPECT_EQ(table, at_once);
 }
 
 TEST(HealthTable, RefusesTextCutAnywhereAndOtherText) {
   HealthTable table;
-  table.folded(0, 0, {0, 2}, unwell(1, 0));
-  table.folded(3, 2, {4, 6}, unwell(1, 5));
+  table.folded(0, 0, {0, 2}, unhealthy(1, 0));
+  table.folded(3, 2, {4, 6}, unhealthy(1, 5));
   const std::string text = table.save();
   const auto lines = [](std::string_view s) { return std::count(s.begin(), s.end(), '\n'); };
   for (std::size_t n = 0; n < text.size(); ++n) {
@@ -283,7 +283,7 @@ TEST(HealthTable, RefusesTextCutAnywhereAndOtherText) {
 TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
   Assembly assembly(kGrid, false);
   WaitingPartial first = waiting(0, {0, 2});
-  first.health = unwell(1, 0);
+  first.health = unhealthy(1, 0);
   ASSERT_TRUE(assembly.fold(0, 0, first));
   TempFolder dir;
   write_to(dir.path() / "film.snap", assembly);

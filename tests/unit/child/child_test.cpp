@@ -76,13 +76,13 @@ TEST(Child, TellsOfTheHealthOfAUnit) {
   const auto child = backend("unwell,tile=1");
   const LocalJob job = job_with_seed(3);
 
-  const auto well = child->render(job, unit(0), kGoOn), unwell = child->render(job, unit(1), kGoOn);
+  const auto well = child->render(job, unit(0), kGoOn), unhealthy = child->render(job, unit(1), kGoOn);
 
   EXPECT_TRUE(well.value().health.clean());
   Health expected;
   expected.add(HealthCause::infinite, 2, {0, 0, 0});
-  EXPECT_EQ(unwell.value().health, expected);
-  EXPECT_EQ(unwell.value().partial.sums, well.value().partial.sums);
+  EXPECT_EQ(unhealthy.value().health, expected);
+  EXPECT_EQ(unhealthy.value().partial.sums, well.value().partial.sums);
 }
 
 TEST(Child, NamesSignalPixelAndSampleOfACrash) {

@@ -38,7 +38,7 @@ TEST(Failure, AForgottenJobStillCountsAgainstTheWorkerThatFailedInIt) {
     rig.send(JobForgotten{{id}});
   }
 
-  EXPECT_EQ(rig.worker("bad").state, WorkerState::sick);
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::unhealthy);
   rig.pass(kForgiveAfter);
   EXPECT_EQ(rig.worker("bad").state, WorkerState::connected);
 }

@@ -123,7 +123,7 @@ TEST(Failure, AWorkerThatFailsInTwoJobsIsSickAndForgivenWithTime) {
   rig.join("good", 1);
   bad_worker_against(rig, "j");
   bad_worker_against(rig, "k");
-  EXPECT_EQ(rig.worker("bad").state, WorkerState::sick);
+  EXPECT_EQ(rig.worker("bad").state, WorkerState::unhealthy);
 
   rig.lose("good");
   rig.submit(plan_of("l", 2, 2));

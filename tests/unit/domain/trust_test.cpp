@@ -267,7 +267,7 @@ TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) 
   EXPECT_THAT(found[0].evidence, testing::HasSubstr("both rendered it to"));
   EXPECT_FALSE(work.seen<TileDiscarded>().empty());
   EXPECT_TRUE(work.rig.farm.quarantined({"w3"}));
-  EXPECT_EQ(work.rig.worker("w3").state, WorkerState::sick);
+  EXPECT_EQ(work.rig.worker("w3").state, WorkerState::unhealthy);
   EXPECT_TRUE(work.rig.held[{"w3"}].empty());
   EXPECT_EQ(work.rig.farm.audits().workers_quarantined, 1u);
 }
@@ -376,7 +376,7 @@ TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) 
 
   const auto effects = rig.send(WorkerQuarantined{{"a"}, "it rendered wrong pixels of job x"});
 
-  EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
+  EXPECT_EQ(rig.worker("a").state, WorkerState::unhealthy);
   EXPECT_TRUE(rig.held[{"a"}].empty());
   ASSERT_EQ(of<TileDiscarded>(effects).size(), 1u);
   EXPECT_EQ(of<TileDiscarded>(effects)[0].tile, unit.unit.tile);
@@ -426,7 +426,7 @@ TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   const auto effects = rig.send(WorkerQuarantined{{"a"}, "barred: it lied"});
 
   EXPECT_EQ(rig.worker("a").units_out, 0u);
-  EXPECT_EQ(rig.worker("a").state, WorkerState::sick);
+  EXPECT_EQ(rig.worker("a").state, WorkerState::unhealthy);
   EXPECT_FALSE(of<WorkerStateChanged>(effects).empty());
   EXPECT_EQ(rig.farm.audit(), "");
   rig.held.erase({"a"});

@@ -33,7 +33,7 @@ AssignLease assignment() {
   return {lease, brief};
 }
 
-Health unwell() {
+Health unhealthy() {
   Health h;
   h.add(HealthCause::infinite, 1, {1, 2, 3});
   h.add(HealthCause::negative, 2, {1, 2, 3});
@@ -55,8 +55,12 @@ const std::vector<FromWorker> kFromWorker = {
                 WorkerId{"w-9"},
                 true},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
-    UnitResult{
-        {JobId{"j"}, 1, 2}, LeaseId{"l"}, {std::byte{1}, std::byte{0}}, digest_of_text("u"), 0.5, unwell()},
+    UnitResult{{JobId{"j"}, 1, 2},
+               LeaseId{"l"},
+               {std::byte{1}, std::byte{0}},
+               digest_of_text("u"),
+               0.5,
+               unhealthy()},
     UnitResult{{JobId{"j"}, 1, 2},
                LeaseId{"l"},
                {std::byte{1}},

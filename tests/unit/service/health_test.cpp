@@ -14,7 +14,7 @@ namespace {
 using testing::HasSubstr;
 
 // What is wrong with a unit: a function of its pixels and samples.
-Health unwell(const PixelRect& rect, const SampleRange& samples) {
+Health unhealthy(const PixelRect& rect, const SampleRange& samples) {
   Health h;
   for (std::uint64_t s = samples.s0; s < samples.s1; ++s)
     if (s % 3 == 0) h.add(HealthCause::infinite, 1, {rect.x0, rect.y1 - 1, s});
@@ -22,15 +22,15 @@ Health unwell(const PixelRect& rect, const SampleRange& samples) {
   h.add(HealthCause::negative_density, 9);
   return h;
 }
-UnitResult unwell(UnitResult r) {
+UnitResult unhealthy(UnitResult r) {
   const UnitHeader header = decode_partial_file(r.exr).value().partial.header;
-  r.health = unwell(header.tile, header.samples);
+  r.health = unhealthy(header.tile, header.samples);
   return r;
 }
 // Of tiles [from, 2) of the test's image.
 Health expected(std::uint64_t spp, TileIndex from = 0) {
   Health sum;
-  for (TileIndex t = from; t < 2; ++t) sum.merge(unwell(TileGrid{{40, 24}, 32}.rect(t), {0, spp}));
+  for (TileIndex t = from; t < 2; ++t) sum.merge(unhealthy(TileGrid{{40, 24}, 32}.rect(t), {0, spp}));
   if (spp > 4)  // both of its tiles' rounds of samples 4 to 8, whatever their end
     for (TileIndex t = from; t < 2; ++t) {
       const PixelRect rect = TileGrid{{40, 24}, 32}.rect(t);
@@ -53,7 +53,7 @@ TEST(ServiceHealth, IsTheSameShuffledDuplicatedAndInMemory) {
     std::mt19937 random(seed);
     farm.reorder = [&](auto& units) { std::shuffle(units.begin(), units.end(), random); };
     farm.tamper = [&](UnitResult r) {
-      return std::vector<UnitResult>(1 + random() % 3, unwell(std::move(r)));
+      return std::vector<UnitResult>(1 + random() % 3, unhealthy(std::move(r)));
     };
 
     ASSERT_TRUE(farm.finish(job));
@@ -72,14 +72,14 @@ TEST(ServiceHealth, SurvivesARestartAtAnyPointAndAfterTheEnd) {
       auto coordinator = open_at(dir.path());
       job = submit_spp(*coordinator, 16);
       FakeFarm farm(*coordinator, 1);
-      farm.tamper = [](UnitResult r) { return std::vector{unwell(std::move(r))}; };
+      farm.tamper = [](UnitResult r) { return std::vector{unhealthy(std::move(r))}; };
       farm.stop_after = k;
       farm.finish(job);
     }
     {
       auto coordinator = open_at(dir.path());
       FakeFarm farm(*coordinator, 1);
-      farm.tamper = [](UnitResult r) { return std::vector{unwell(std::move(r))}; };
+      farm.tamper = [](UnitResult r) { return std::vector{unhealthy(std::move(r))}; };
       ASSERT_TRUE(farm.finish(job)) << k;
       EXPECT_EQ(coordinator->job(job)->health, expected(16)) << k;
     }
@@ -97,7 +97,7 @@ TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
     const JobId job = submit_spp(*coordinator, 6);
     const auto render = [&] {
       FakeFarm farm(*coordinator, 1);
-      farm.tamper = [](UnitResult r) { return std::vector{unwell(std::move(r))}; };
+      farm.tamper = [](UnitResult r) { return std::vector{unhealthy(std::move(r))}; };
       return farm.finish(job);
     };
     ASSERT_TRUE(render());
@@ -119,7 +119,7 @@ TEST(ServiceHealth, IsOfWhatIsFoldedOnly) {
   FakeFarm farm(*coordinator, 1);
   farm.tamper = [](UnitResult r) {
     if (r.unit.tile == 0 && r.unit.round == 0) return std::vector<UnitResult>{};
-    return std::vector{unwell(std::move(r))};
+    return std::vector{unhealthy(std::move(r))};
   };
   ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == 7; }));
   EXPECT_EQ(coordinator->job(job)->health, expected(16, 1));
@@ -134,7 +134,7 @@ TEST(ServiceHealth, IsToldWithPlaceAndCommandInReportViewAndImage) {
   spec.size = FrameSize{40, 24};
   const JobId job = submit(*coordinator, spec);
   FakeFarm farm(*coordinator, 1);
-  farm.tamper = [](UnitResult r) { return std::vector{unwell(std::move(r))}; };
+  farm.tamper = [](UnitResult r) { return std::vector{unhealthy(std::move(r))}; };
   ASSERT_TRUE(farm.finish(job));
 
   const auto health = report(*coordinator, job)["health"];

@@ -45,7 +45,7 @@ TEST(PartialLog, CostsNoFileBeforeTheFirstRecord) {
   EXPECT_EQ(PartialLog::open(folder).value()->found().size(), 1u);
 }
 
-PartialRecord unwell(std::uint32_t n) {
+PartialRecord unhealthy(std::uint32_t n) {
   PartialRecord r = record(n);
   r.health.add(HealthCause::infinite, 2, {static_cast<int>(n), 1, 3});
   r.health.add(HealthCause::negative_density, 7);
@@ -56,13 +56,14 @@ TEST(PartialLog, KeepsTheHealthOfARecord) {
   TempFolder dir;
   {
     auto log = PartialLog::open(dir.path()).value();
-    for (std::uint32_t i = 0; i < 6; ++i) ASSERT_TRUE(log->append(i % 2 ? unwell(i) : record(i), payload(i)));
+    for (std::uint32_t i = 0; i < 6; ++i)
+      ASSERT_TRUE(log->append(i % 2 ? unhealthy(i) : record(i), payload(i)));
     ASSERT_TRUE(log->sync());
   }
   const auto log = PartialLog::open(dir.path()).value();
   ASSERT_EQ(log->found().size(), 6u);
   for (std::uint32_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(log->found()[i].record, i % 2 ? unwell(i) : record(i));
+    EXPECT_EQ(log->found()[i].record, i % 2 ? unhealthy(i) : record(i));
     EXPECT_EQ(log->read(log->found()[i].place).value(), payload(i));
   }
 }
@@ -74,7 +75,7 @@ TEST(PartialLog, CutsARecordWhoseHealthIsTornOrDamaged) {
     {
       auto log = PartialLog::open(dir.path()).value();
       ASSERT_TRUE(log->append(record(0), payload(0)));
-      ASSERT_TRUE(log->append(unwell(1), payload(1)));
+      ASSERT_TRUE(log->append(unhealthy(1), payload(1)));
       ASSERT_TRUE(log->sync());
     }
     const auto file = dir.path() / "partials-000.seg";

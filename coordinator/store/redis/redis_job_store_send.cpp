@@ -66,7 +66,7 @@ Result<void> RedisJobStore::send_once() {
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
   // Before the jobs: a coordinator that takes them over must know
-  if (auto sent = tell_quarantined(); !sent) return sent;
+  if (auto sent = send_quarantined(); !sent) return sent;
   if (auto sent = send_counters(); !sent) return sent;
   return send_jobs();
 }
@@ -113,7 +113,7 @@ Result<void> RedisJobStore::note_all_behind() {
   return {};
 }
 
-Result<void> RedisJobStore::tell_quarantined() {
+Result<void> RedisJobStore::send_quarantined() {
   std::vector<RedisLink::Command> commands;
   std::set<WorkerId> due;
   {
@@ -162,12 +162,12 @@ Result<void> RedisJobStore::send_jobs() {
     const std::lock_guard lock(mutex_);
     // Round robin, so that a job that Redis always rejects does not delay the others.
     while (!due_.empty() && taken.size() < kJobsAtOnce) {
-      auto next = due_.upper_bound(told_last_);
+      auto next = due_.upper_bound(sent_last_);
       if (next == due_.end()) next = due_.begin();
-      told_last_ = next->first;
+      sent_last_ = next->first;
       taken.insert(due_.extract(next));
     }
-    telling_ = taken.size();
+    sending_ = taken.size();
     for (const auto& [id, due] : taken)
       if (const auto fence = fences_.find(id); fence != fences_.end()) fences.insert(*fence);
   }
@@ -223,7 +223,7 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
 // Makes the jobs that were not sent due again.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
   const std::lock_guard lock(mutex_);
-  telling_ = 0;
+  sending_ = 0;
   for (auto& [id, old] : taken) {
     const auto [now, fresh] = due_.try_emplace(id, old);
     if (fresh || now->second.removed) continue;

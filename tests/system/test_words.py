@@ -1,0 +1,22 @@
+"""tests/lint/words.py finds words of our own in identifiers, and only there."""
+import sys
+
+from local_farm import ROOT
+
+sys.path.insert(0, str(ROOT / "tests" / "lint"))
+import words  # noqa: E402
+
+
+def test_parts_of_identifiers_are_found_once_with_their_line():
+    text = "int a;\nvoid told_last(TokenBook& kGlow);\ntold_last();\n"
+
+    assert words.violations("x.cpp", text) == [(2, "told_last", "told"), (2, "TokenBook", "book"), (2, "kGlow", "glow")]
+
+
+def test_comments_texts_and_includes_are_left_alone():
+    assert words.violations("x.cpp", '#include "glow.h"\n// told\n/* a book */ f("liar", \'k\', R"(kit)");\nint kitten, mistold;\n') == []
+
+
+def test_an_exception_holds_for_its_file_alone():
+    assert words.violations("worker/render/vdb/vdb_module.cpp", "void say();") == []
+    assert words.violations("worker/render/vdb/other.cpp", "void say();") == [(1, "say", "say")]
