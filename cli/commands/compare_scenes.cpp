@@ -53,8 +53,8 @@ class SceneRace {
     std::optional<LocalWorld> world;  // for the first seed, until it is used
   };
 
-  // Sets up the entrants. Every integrator is tried at once, so that errors in the scene show before hours of
-  // rendering.
+  // Prepares every integrator and program of the race. Each integrator is tried now, before the race begins,
+  // so that errors in the scene show before hours of rendering.
   tl::expected<void, Rejected> line_up() {
     std::vector<std::string> wanted = options_.integrators;
     if (wanted.empty()) wanted.emplace_back();

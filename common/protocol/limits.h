@@ -10,8 +10,8 @@
 namespace ls::limits {
 
 inline constexpr std::size_t kMessageBytes = 1 << 20;  // one gRPC message
-// An encoded partial; leaves room for the rest of a UnitResult. 6 floats per pixel: tiles up to about 200 x
-// 200.
+// Largest encoded partial (the pixel sums of one unit). With 6 floats per pixel that allows tiles of about
+// 200 x 200; 32 KiB are left for the rest of the UnitResult message.
 inline constexpr std::size_t kPartialBytes = kMessageBytes - (32 << 10);
 inline constexpr std::size_t kBlobChunkBytes = 256 << 10;
 

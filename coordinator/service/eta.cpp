@@ -38,9 +38,9 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
 // the job, the number of units is known and they come out even.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
-// Wall-clock seconds for `core` core seconds. A unit runs on one thread, so no more threads help than there
-// can be units, and none takes less than its own time. If less than one unit is left, it takes only that
-// part.
+// Wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one thread, so at
+// most units_at_once cores are busy, and the result is at least the duration of one unit, or of what is left
+// of the last one. `wait`: how long threads wait for the last units, as a share of a unit's duration.
 double seconds_on(double cores, double core, double wait, const EtaInputs& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);

@@ -1,4 +1,4 @@
-// Public views of a sequence as a whole.
+// What clients see of a sequence (a job with frames) as a whole.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 

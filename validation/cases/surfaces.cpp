@@ -14,7 +14,8 @@ BsdfIndex rough_mirror(SceneBuilder& builder, double alpha, Microfacet d = Micro
   return builder.bsdf(RoughConductorBsdf{d, a, a, {0, 0, 0}, {1, 1, 1}, builder.texture(rgb(1))});
 }
 
-// A sheet in z = 0 seen from this many degrees off its normal, with something visible in it.
+// A large rectangle in z = 0 of the material from `make`, seen `degrees` off its normal. Callers add what is
+// seen in it.
 SceneBuilder sheet(double degrees, auto make) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(1e3), make(builder));

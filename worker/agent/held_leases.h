@@ -39,7 +39,8 @@ class HeldLeases {
   // Removes units that are to be stopped, including running ones.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
-  // Removes all waiting units (of one job, if given) and lists them for return.
+  // Removes the units that have not been started (only those of *job, if given). Returns the messages by
+  // which the agent gives their leases back to the coordinator.
   std::vector<LeaseReturned> return_waiting(const JobId* job = nullptr);
 
   std::optional<Held> first_waiting(const JobId& job) const;

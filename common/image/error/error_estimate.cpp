@@ -28,8 +28,8 @@ constexpr double kOneSided = 19;
 // half, a single sample that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
 
-// The mean amount by which skewed noise lowers the sum of relative squares (derived in the header). Summed by
-// columns, so that the loop is vectorised.
+// The expected amount by which skewed noise lowers the sum of squared relative errors (error_estimate.h
+// derives it). Summed column by column, so that the loop is vectorised.
 double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
                const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;

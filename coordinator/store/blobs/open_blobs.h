@@ -9,8 +9,9 @@
 
 namespace ls::coordinator {
 
-// Empty: DATA/blobs. s3://...: that store, with DATA/blobs for blobs in transit (store/blobs/s3_blobs.h).
-// Otherwise a folder, which other coordinators may share; `node` is the name of this one.
+// Opens the store that `where` names. Empty: the folder `data`/blobs. An s3:// address: that bucket, with
+// `data`/blobs for blobs that are being uploaded or downloaded (s3_blobs.h). Otherwise: a folder, which
+// several coordinators may share; `node` is the name of this one among them.
 Result<std::shared_ptr<BlobStore>> open_blobs(const std::string& where, const std::filesystem::path& data,
                                               const std::string& node);
 

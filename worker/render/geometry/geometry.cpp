@@ -35,7 +35,8 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;
-  // times an edge length: the margin as a share of the height over that edge
+  // `margin` times the length of an edge is the margin in barycentric units: its share of the height over
+  // that edge.
   const double margin = 0x1p-22 * reach / twice_area;
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);

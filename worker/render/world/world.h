@@ -65,7 +65,8 @@ class World {
   int origin_x = 0, origin_y = 0;
 
   AovSet aovs;
-  // For the ID AOVs: the identifier of each surface, and for each instance the one that replaces it.
+  // For the ID AOVs: shape and material identifiers of each surface. A hit inside of an instance has the
+  // instance's identifier in the place of the shape's.
   std::vector<float> shape_ids, material_ids, instance_ids;
 
   Health inputs;  // corrected scene inputs, by cause

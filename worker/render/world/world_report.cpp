@@ -1,4 +1,4 @@
-// Describes a world in words and bytes.
+// Describes a built world: what it has and leaves out, and the memory of each structure.
 #include <fmt/format.h>
 
 #include "worker/render/world/world.h"
