@@ -148,7 +148,7 @@ std::string jobs_table(const json& answer) {
   for (const json& job : objects(answer, "jobs"))
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
-                    time_left_text(job, "eta_seconds"),
+                    time_left_text(job, job, "eta_seconds"),
                     text(job, "name") + (flag_field(job, "fake") ? " (fake pixels)" : "") +
                         (unclean(job) ? " (numbers not clean)" : "") +
                         (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
@@ -190,9 +190,10 @@ std::string job_text(const json& job) {
   add_error_rows(rows, job);
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
-  rows.push_back({"left", time_left_text(job, "eta_seconds", "eta_ci95")});
-  if (number_field(job, "eta_with_8_more"))
-    rows.push_back({"with 8 more workers", time_left_text(job, "eta_with_8_more", "eta_with_8_more_ci95")});
+  rows.push_back({"left", time_left_text(job, job, "eta_seconds", "eta_ci95")});
+  if (const auto more = job.find("eta_with_more"); more != job.end() && more->is_object())
+    rows.push_back({fmt::format("with {} more workers", int_field(*more, "workers", 0)),
+                    time_left_text(job, *more, "seconds", "ci95")});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())

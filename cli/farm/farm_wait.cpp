@@ -33,7 +33,10 @@ ProgressFigures progress_of(const json& job) {
   f.eta_ci95 = pair_field(job, "eta_ci95");
   f.relmse_ci95 = pair_field(job, "relmse_ci95");
   f.target_error = number_field(job, "target_error");
-  f.eta_with_more = number_field(job, "eta_with_8_more");
+  if (const auto more = job.find("eta_with_more"); more != job.end() && more->is_object()) {
+    f.eta_with_more = number_field(*more, "seconds");
+    f.more_workers = int_field(*more, "workers", f.more_workers);
+  }
   f.doubtful = verdict_of(job).doubtful;
   f.trouble = text_field(job, "error");
   const double elapsed = number_field(job, "elapsed_seconds").value_or(0);

@@ -53,13 +53,13 @@ std::string estimate_text(const json& job, const char* key, const char* interval
   return ci ? fmt::format("{} ({:.4g} to {:.4g})", text, ci->first, ci->second) : text;
 }
 
-std::string time_left_text(const json& job, const char* key, const char* interval) {
-  const auto value = number_field(job, key);
+std::string time_left_text(const json& job, const json& times, const char* key, const char* interval) {
+  const auto value = number_field(times, key);
   if (!value) return "-";
   // A fixed number of samples takes the same time whatever the error.
   if (number_field(job, "target_error") && verdict_of(job).doubtful)
     return "at least " + show_seconds(*value);
-  const auto ci = interval ? pair_field(job, interval) : std::nullopt;
+  const auto ci = interval ? pair_field(times, interval) : std::nullopt;
   return show_seconds(*value) +
          (ci ? fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second)) : std::string());
 }

@@ -19,7 +19,8 @@ Verdict verdict_of_report(const nlohmann::json& report);  // of GET /jobs/ID/rep
 // "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)", "-".
 std::string estimate_text(const nlohmann::json& job, const char* key, const char* interval);
 // "4:12 (3:06 to 5:30)", "at least 4:12" (for a doubtful job with a target), "-".
-std::string time_left_text(const nlohmann::json& job, const char* key, const char* interval = nullptr);
+std::string time_left_text(const nlohmann::json& job, const nlohmann::json& times, const char* key,
+                           const char* interval = nullptr);
 // "0.0123", "below the reference's noise", "0.0123 (not to be trusted: ...)"; empty: unknown. `below`: the
 // name of the flag for values below the noise.
 std::string reference_error_text(const nlohmann::json& object, const char* key, const char* below,

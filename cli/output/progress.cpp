@@ -72,7 +72,8 @@ void add_time_left(const ProgressFigures& f, const Add& add) {
                      show_seconds(*f.eta_seconds)));
   if (f.eta_ci95 && !f.doubtful)
     add(2, fmt::format(" ({} to {})", show_seconds(f.eta_ci95->first), show_seconds(f.eta_ci95->second)));
-  if (f.eta_with_more) add(5, fmt::format(", {} with 8 more", show_seconds(*f.eta_with_more)));
+  if (f.eta_with_more)
+    add(5, fmt::format(", {} with {} more", show_seconds(*f.eta_with_more), f.more_workers));
 }
 
 }  // namespace

@@ -20,8 +20,9 @@ struct ProgressFigures {
   std::optional<std::pair<double, double>> eta_ci95 = {};
   std::optional<std::pair<double, double>> relmse_ci95 = {};
   std::optional<double> target_error = {};   // requested relMSE
-  std::optional<double> eta_with_more = {};  // time left with eight more workers
-  bool doubtful = false;                     // the error is not reliable yet, nor is the time to a target
+  std::optional<double> eta_with_more = {};  // time left with `more_workers` more
+  int more_workers = 8;
+  bool doubtful = false;  // the error is not reliable yet, nor is the time to a target
 };
 // " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  4:12
 // left (3:06 to 5:30), 1:06 with 8 more". On a narrow terminal whole parts are omitted, in this order: the

@@ -54,6 +54,11 @@ json to_value(const JobView& v) {
          {"target_error", v.target_error ? number(*v.target_error) : json()},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
          {"eta_ci95", pair_or_null(v.eta_ci95)},
+         {"eta_with_more", v.eta_with_more ? json{{"workers", kMoreWorkers},
+                                                  {"seconds", number(*v.eta_with_more)},
+                                                  {"ci95", pair_or_null(v.eta_with_more_ci95)}}
+                                           : json()},
+         // Older names of the same; they go with the next version.
          {"eta_with_8_more", v.eta_with_more ? number(*v.eta_with_more) : json()},
          {"eta_with_8_more_ci95", pair_or_null(v.eta_with_more_ci95)},
          {"error", text_or_null(v.error)},

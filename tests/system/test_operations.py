@@ -57,8 +57,9 @@ def test_metrics_count_what_a_job_took(farm):
 
     m, units = metrics(farm), farm.job(job)["units_total"]
     assert m["lightshaft_units_folded_total"] == m['lightshaft_results_total{verdict="accepted"}'] == units
-    assert m["lightshaft_units_lent_total"] >= units and m["lightshaft_leases_granted_total"] >= 1
-    assert m["lightshaft_units_lent"] == m["lightshaft_leases"] == 0
+    assert m["lightshaft_units_leased_total"] >= units and m["lightshaft_leases_granted_total"] >= 1
+    assert m["lightshaft_units_leased"] == m["lightshaft_leases"] == 0
+    assert m["lightshaft_units_lent_total"] == m["lightshaft_units_leased_total"], "the older name counts the same"
     assert m["lightshaft_result_bytes_total"] > units * 32 * 32 * 24 / 4 and m["lightshaft_blob_bytes_total"] > 0
     assert 0 < m["lightshaft_fold_lag_seconds_total"] < 60 * units
     assert m["process_threads"] > 3 and m["process_open_fds"] > 3 and m["process_resident_memory_bytes"] > 1e6
@@ -68,7 +69,7 @@ def test_metrics_count_retries_by_their_cause(farm):
     victim = farm.add_worker("--fake-delay", 50)
     job = farm.submit(SCENE, **SPEC)
     farm.wait_for_progress(job, 2)
-    held = wait_until(lambda: metrics(farm)["lightshaft_units_lent"], "units are lent")
+    held = wait_until(lambda: metrics(farm)["lightshaft_units_leased"], "units are lent")
     victim.kill()
 
     lost = wait_until(lambda: metrics(farm)['lightshaft_units_freed_total{cause="worker lost"}'], "its units are freed")

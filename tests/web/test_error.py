@@ -3,7 +3,7 @@ import pytest
 
 from stub_farm import job
 
-WITH_TARGET = {"target_error": 0.001, "eta_seconds": 60, "eta_ci95": [45, 80], "eta_with_8_more": 12}
+WITH_TARGET = {"target_error": 0.001, "eta_seconds": 60, "eta_ci95": [45, 80], "eta_with_more": {"workers": 8, "seconds": 12, "ci95": None}}
 TIME = {"load": 1, "build": 2, "render": 90, "transfer": 3, "merge": 1, "idle": 3}
 
 
@@ -285,7 +285,7 @@ def test_nothing_jumps_from_the_first_sample_to_the_last(farm, dashboard):
     farm.change("j-1", progress=0.4, **WITH_TARGET)
     page.wait("document.querySelectorAll('.plot-point').length === 4 && document.querySelector('.plot-meets')")
     farm.report = report(1, 2, 4, 8, 100)
-    farm.change("j-1", state="done", stopped="error", progress=1, relmse=0.00099, eta_seconds=None, eta_ci95=None, eta_with_8_more=None)
+    farm.change("j-1", state="done", stopped="error", progress=1, relmse=0.00099, eta_seconds=None, eta_ci95=None, eta_with_more=None)
     page.wait("document.querySelectorAll('.plot-point').length === 5 && document.querySelector('.state-done')")
     page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
 

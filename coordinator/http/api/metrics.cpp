@@ -80,9 +80,12 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
-  single(out, "lightshaft_units_lent", "gauge", "Units of these leases.", f.units_leased_now);
+  single(out, "lightshaft_units_leased", "gauge", "Units of these leases.", f.units_leased_now);
+  single(out, "lightshaft_units_lent", "gauge", "Older name of lightshaft_units_leased.", f.units_leased_now);
   single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
-  single(out, "lightshaft_units_lent_total", "counter", "Units of these leases.", f.units_leased);
+  single(out, "lightshaft_units_leased_total", "counter", "Units of these leases.", f.units_leased);
+  single(out, "lightshaft_units_lent_total", "counter", "Older name of lightshaft_units_leased_total.",
+         f.units_leased);
   head(out, "lightshaft_units_freed_total", "counter",
        "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
   // All causes, even with count 0, so that rates are defined from the first event on.
@@ -114,7 +117,10 @@ void write_results(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_results_arrived_bytes", "gauge", "Memory that these take.", f.arrived_bytes);
   single(out, "lightshaft_results_waiting", "gauge",
          "Accepted results that wait for an earlier round of their tile.", f.waiting_now);
-  single(out, "lightshaft_chores", "gauge", "Writes that wait for the disk.", f.background_writes_now);
+  single(out, "lightshaft_background_writes", "gauge", "Writes that wait for the disk.",
+         f.background_writes_now);
+  single(out, "lightshaft_chores", "gauge", "Older name of lightshaft_background_writes.",
+         f.background_writes_now);
   single(out, "lightshaft_result_bytes_total", "counter", "Bytes of results from workers.", f.result_bytes);
   single(out, "lightshaft_blob_bytes_total", "counter", "Bytes of blobs sent to workers.", f.blob_bytes);
 }

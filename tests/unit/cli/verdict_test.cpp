@@ -23,7 +23,7 @@ json some_job() {
       R"({"id": "j-1", "name": "bath.xml", "state": "running", "progress": 0.4, "size": [320, 240],
     "spp": 512, "spp_asked": 512, "spp_done": 215, "rmse": 0.031, "rmse_ci95": [0.0301, 0.032], "relmse": 0.00418,
     "relmse_ci95": [0.0039, 0.00448], "target_error": 0.001, "eta_seconds": 252, "eta_ci95": [186, 330],
-    "eta_with_8_more": 66, "eta_with_8_more_ci95": [50, 90], "elapsed_seconds": 187, "core_seconds": 742,
+    "eta_with_more": {"workers": 8, "seconds": 66, "ci95": [50, 90]}, "elapsed_seconds": 187, "core_seconds": 742,
     "verdict": {"kind": "converging", "words": "converging as expected", "trusted": true}, "few_hits": 0,
     "slope": -0.98, "slope_ci95": [-1.06, -0.9], "efficiency_per_core": 0.322, "reference": null,
     "pixels_without_samples": 0, "error": null, "warnings": []})");

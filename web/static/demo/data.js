@@ -19,7 +19,7 @@ const kHeavy = { kind: "heavy_tail", words: "don't trust yet: few pixels carry t
 // Only its target ends it, and a few bright pixels keep its error from being known.
 const untrusted = {
   progress: 0.071, spp: 65536, spp_asked: null, spp_done: 36, rmse: 0.0921, rmse_ci95: [0.0876, 0.0968], relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], target_error: 0.005,
-  eta_seconds: 4310, eta_ci95: [3200, 6100], eta_with_8_more: 1140, eta_with_8_more_ci95: [850, 1600], units_done: 2448, units_total: 34680, elapsed_seconds: 880, core_seconds: 3490,
+  eta_seconds: 4310, eta_ci95: [3200, 6100], eta_with_more: { workers: 8, seconds: 1140, ci95: [850, 1600] }, units_done: 2448, units_total: 34680, elapsed_seconds: 880, core_seconds: 3490,
   verdict: kHeavy, slope: -0.71, slope_ci95: [-0.95, -0.47], efficiency_per_core: 0.00742, few_hits: 31, size: [1920, 1080],
   time: { load: 0.4, build: 3.1, render: 3490, transfer: 21, merge: 14.2, idle: 38 },
 };

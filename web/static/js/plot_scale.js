@@ -83,7 +83,7 @@ export function aheadOf(job, report, key) {
   if (!last || !(target > 0) || last.relmse <= target) return null;
   if (key === "seconds" && job.eta_seconds > 0 && Array.isArray(job.eta_ci95)) {
     const [lo, hi] = job.eta_ci95.map((eta) => job.elapsed_seconds + eta);
-    return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_8_more > 0 ? job.elapsed_seconds + job.eta_with_8_more : null };
+    return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_more?.seconds > 0 ? job.elapsed_seconds + job.eta_with_more.seconds : null };
   }
   if (!(forecast?.asked && forecast.core_seconds > 0)) return null;
   const pace = key === "seconds" ? last.seconds / last.core_seconds : 1; // as it went so far

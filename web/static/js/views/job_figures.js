@@ -36,7 +36,7 @@ function timeNotes(job) {
   const sure = !doubtful(job.verdict);
   return [
     sure && job.eta_ci95 ? `95 %: ${duration(job.eta_ci95[0])} to ${duration(job.eta_ci95[1])}` : `${duration(job.elapsed_seconds)} so far`,
-    typeof job.eta_with_8_more === "number" ? `with 8 more: ${duration(job.eta_with_8_more)}${sure ? between(job.eta_with_8_more_ci95) : ""}` : null];
+    job.eta_with_more ? `with ${job.eta_with_more.workers} more: ${duration(job.eta_with_more.seconds)}${sure ? between(job.eta_with_more.ci95) : ""}` : null];
 }
 
 const trueFigures = ({ relmse, rmse, flip, below_noise: below, rmse_below_noise: rmseBelow }, sameSeed) => [
