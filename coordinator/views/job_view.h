@@ -35,6 +35,7 @@ struct ErrorFigures {  // of the image folded up to one complete round in all ti
 struct ReferenceError {
   double rmse = 0, relmse = 0;
   // Mean HDR-FLIP (common/image/reference/flip.h); computed only each time the samples have doubled
+  // Mean HDR-FLIP (common/image/reference/flip.h); computed when the samples have doubled, and at the end
   std::optional<double> flip;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};
   // True if the error is too small to be distinguished from the reference's own noise. Clients then show this

@@ -90,7 +90,7 @@ struct Farm::State {
   void on(const UnitAccepted& event);
   void on(const UnitFolded& event);
   void on(const UnitFailed& event);
-  void charge(Job& job, double cpu_seconds);  // adds them to the share of the job's owner
+  void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
   void issue_folds(Job& job, TileIndex tile);
   void checkpoint(Job& job, RoundIndex round);
 
