@@ -34,7 +34,6 @@ struct ErrorFigures {  // of the image folded up to one complete round in all ti
 // (common/image/reference/reference.h)
 struct ReferenceError {
   double rmse = 0, relmse = 0;
-  // Mean HDR-FLIP (common/image/reference/flip.h); computed only each time the samples have doubled
   // Mean HDR-FLIP (common/image/reference/flip.h); computed when the samples have doubled, and at the end
   std::optional<double> flip;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};

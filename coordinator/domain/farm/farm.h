@@ -63,7 +63,6 @@ struct JobFigures {
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.
   double core_seconds_left = 0;
   double core_seconds_to_limit = 0;  // the same if every tile gets its full samples, whatever the error
-  // Cores of the workers that hold its leases; of each, the fraction that the job has of its leases
   // Cores of the workers that hold its leases; each counts by the job's share of that worker's leases
   double cores = 0;
   double core_seconds_queued = 0;  // predicted CPU seconds of the units that wait for a worker
