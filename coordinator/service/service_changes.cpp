@@ -1,4 +1,4 @@
-// Changes to jobs by users: every change is checked completely before any part of it is applied.
+// Changes that users make to jobs. Every change is checked completely before any part of it is applied.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -198,7 +198,7 @@ Result<void> Service::remove(const JobId& id) {
   return {};
 }
 
-// Drops the job from memory after its record has been removed.
+// Drops the job from memory, after its record in the store was removed.
 void Service::drop_locked(const EntryPtr& entry) {
   const JobId id = entry->stored.id;
   entry->removed = true;
