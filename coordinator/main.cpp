@@ -117,8 +117,8 @@ std::string with_port(const std::string& address, int port) {
   return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
 }
 
-// Starts notifications to the receivers that the operator names on the command line; users cannot add any.
-// They are signed with the secret in DIR/webhook-secret.
+// Starts notifications to the receivers in `flags`: the operator names them, users cannot add any. They are
+// signed with the secret in DIR/webhook-secret.
 Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinator::Coordinator& coordinator,
                                                                   const Flags& flags, const fs::path& data) {
   if (flags.webhooks.empty()) return nullptr;

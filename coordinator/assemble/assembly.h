@@ -65,7 +65,7 @@ class Assembly {
   // kMaxPendingPartials, its pixels are dropped and read from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  void forget_round(RoundIndex round);  // a truncated round was reopened: its waiting partials are void
+  void forget_round(RoundIndex round);  // drops waiting partials of a truncated round that was reopened
   void forget_waiting();
   void discard(TileIndex tile);  // drops all of the tile: it is folded again from round 0
   std::size_t waiting() const { return waiting_.size(); }

@@ -17,7 +17,7 @@ class HealthTable {
   // Adds the health of a folded unit. That of a truncated round is kept apart: if the same round is folded
   // again with more samples, the new health replaces it, as the new pixels replace the old.
   void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
-  void discard(TileIndex tile);  // the tile is folded again from round 0
+  void discard(TileIndex tile);  // drops the tile's health, since the tile is folded again from round 0
   Health total() const;
 
   std::string save() const;

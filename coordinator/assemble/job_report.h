@@ -23,7 +23,7 @@ struct ReportFacts {
   std::optional<ImageError> error;
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
-  std::uint64_t clamped_values = 0;  // in the final EXR
+  std::uint64_t clamped_values = 0;  // values that the final EXR cannot represent
   std::vector<ConvergencePoint> convergence;
   std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
@@ -35,7 +35,8 @@ void put_film(ReportFacts& facts, const Film& film);
 // Says how far the image's error estimates can be trusted.
 ConvergenceStatus convergence_status_of(const ReportFacts& facts);
 struct Efficiency {
-  std::optional<double> wall, per_core;  // 1 / (relMSE x wall-clock seconds), 1 / (relMSE x core seconds)
+  // wall: 1 / (relMSE x wall-clock seconds); per_core: 1 / (relMSE x core seconds)
+  std::optional<double> wall, per_core;
 };
 Efficiency efficiency_of(const ReportFacts& facts);
 // Returns numbers for the header of the final EXR besides those of the film: slope, efficiency,

@@ -36,8 +36,8 @@ class SnapshotFile {
   static Result<SnapshotFile> create(const std::filesystem::path& path, std::string_view suffix,
                                      const TileGrid& grid, AovSet aovs, std::string_view format);
   Result<void> add(const TileSnapshot& tile);  // adds each tile once; tiles without folds are skipped
-  Result<void> finish();  // seals the file and makes it durable, still under the temporary name
-  Result<void> commit();  // moves the file into place, after finish()
+  Result<void> finish();  // writes the seal and makes the file durable, still under its temporary name
+  Result<void> commit();  // gives the file its final name; call after finish()
 
  private:
   explicit SnapshotFile(AtomicFile file) : file_(std::move(file)) {}

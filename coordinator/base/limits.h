@@ -36,7 +36,7 @@ inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
 
 // Bytes of scene text read for all frames together
 inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;
-// Tiles of all frames together; each takes 24 bytes from the start
+// Tiles of all frames together; each takes 24 bytes of memory from the start
 inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;
 inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // asset files of all frames together
 // Pixels of all finished frames together that one change of a sequence may resume at the same time
@@ -46,7 +46,8 @@ inline constexpr std::size_t kFramesPerEvent = 2500;
 
 // Results. A partial is the encoded result of one unit (one round of one tile). The limits in bytes hold for
 // all jobs together; with them a UHD film of 8.3 million pixels at 48 bytes each stays below 600 MB.
-inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;  // one partials-NNN.seg file
+// Bytes of one partials-NNN.seg file, which holds partials
+inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;
 inline constexpr std::uint32_t kMaxSegments = 1u << 20;
 // Bytes of results that are received but not durable yet; above this, the coordinator does not read from its
 // workers

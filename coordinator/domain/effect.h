@@ -24,8 +24,8 @@ struct Send {
   ToWorker message;
 };
 
-// These units have left this lease. Those that are still needed wait for another worker, unless another lease
-// holds them too.
+// These units have left this lease (the list of units that the worker was told to render). Those that are
+// still needed wait for another worker, unless another lease holds them too.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -114,7 +114,7 @@ struct WorkerStateChanged {
   WorkerState to = WorkerState::connected;
   std::string why;
 };
-// The worker gets no more units of this job for a while.
+// The worker has failed too often at units of this job: it gets no more of them for a while.
 struct WorkerBlocked {
   WorkerId worker;
   JobId job;

@@ -53,7 +53,8 @@ struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    SampleRange samples;  // ignored if no longer needed (a truncated round that was extended since)
+    // A unit whose range is no longer needed is ignored (a truncated round that was extended since)
+    SampleRange samples;
     Digest digest;
     WorkerId worker;
   };
@@ -171,7 +172,7 @@ struct UnitAccepted {
   // Seconds that the rendering thread waited for a core or for memory meanwhile: core_share.h
   double wait_seconds = 0;
 };
-// The assembler has carried out a Fold.
+// The assembler has carried out a Fold (domain/effect.h): the unit's result is part of the image.
 struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // as in the Fold

@@ -36,7 +36,8 @@ class FairShare {
   // spend() adds core seconds that a result reported.
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
-  // Forgets users and groups that have no work and are not ahead of the clock.
+  // Forgets users and groups that have no work and whose share is not greater than the clock, the share of
+  // the one served last: if they come back, they start at the clock anyway.
   void tidy();
   // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
   // seconds of its leases at the new priority. The caller then offers the job again.
@@ -57,7 +58,7 @@ class FairShare {
     std::string owner;
     std::int64_t priority;
     double seconds, leased;
-    bool waits;  // has units to lease
+    bool waits;  // true if one of its jobs has units to lease
   };
   std::vector<Figure> figures() const;
   std::size_t kept() const;  // number of priorities, users and groups remembered
@@ -65,7 +66,7 @@ class FairShare {
  private:
   struct Share {
     double spent = 0, out = 0;  // core seconds that results reported, and those predicted for leased units
-    std::uint32_t at_work = 0;  // jobs that are offered or leased
+    std::uint32_t at_work = 0;  // number of its jobs that have units to lease or units that are leased
     double had() const { return spent + out; }
   };
   template <class T>
@@ -98,7 +99,7 @@ class FairShare {
     Group& group;
   };
   Place place_of(const Job& job);
-  // Applies `change` to user and group, and updates the positions of both in the order.
+  // Applies `change` to the job's user and group, and updates the positions of both in the order of turns.
   template <class Change>
   void change(Job& job, Change&& change);
   static std::optional<Turn<User>> turn_of(User& user);  // nullopt: no job of the user has units to lease

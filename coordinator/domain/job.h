@@ -49,9 +49,9 @@ struct Audit {
   // A differing result that nobody asked this worker for. It counts as no vote, but an audit is made because
   // of it
   std::optional<std::pair<WorkerIndex, Digest>> claim;
-  std::vector<WorkerIndex> tried;  // workers that tried and failed
+  std::vector<WorkerIndex> tried;  // workers that tried to render it for the audit and failed
   TimePoint since{};               // time of the second result, or of the restart
-  bool restored = false;           // begun before a restart
+  bool restored = false;           // true if the audit began before a restart
   LeaseSeq lease = 0;              // lease under which the unit is rendered; 0: it waits for a worker
   // True if this worker may render the unit for the audit: it has not delivered a result of it or failed at
   // it.
@@ -79,7 +79,7 @@ struct Job {
   // Why the job ends. It is set once the last rounds of all tiles are decided, though units of them may still
   // be leased or not folded. It is final once the job is done
   std::optional<StopReason> stopping;
-  bool frozen = false;  // stopped by time or user: units leased before are still accepted, no others are
+  bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
   std::optional<Digest> numeric_class;
   // Start of the job's clock, moved on by the times for which the clock was stopped
   std::optional<TimePoint> first_ray;
@@ -98,7 +98,7 @@ struct Job {
   std::uint32_t leased = 0;   // units under all leases, including audits
   bool has_units = false;     // true if it had units to lease when this was last checked
   bool offered = false;       // true if FairShare counts it among the jobs that have units to lease
-  double charge_out = 0;      // core seconds charged for its leases (fair_share.h)
+  double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
   double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
@@ -135,10 +135,11 @@ struct Job {
   // many threads in total.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
-  // Ends each tile after ends[tile] rounds, or earlier if it ends earlier already, and forgets results
-  // accepted beyond. Does nothing if no tile ends earlier than before.
+  // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets results that
+  // were accepted of later rounds. `reason` is why the job ends. Does nothing if no tile ends earlier than
+  // before.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
-  void plan_all();  // every tile ends with the requested samples
+  void plan_all();  // sets every tile's end to the requested samples
   // Returns the time at which the job's time budget is used up; nullopt: it has none, or no ray yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
   // Call both around a change of state that may stop or start the job's clock.

@@ -49,7 +49,7 @@ inline constexpr Duration kSpeculateSlack = 1s;
 inline constexpr std::uint32_t kSpeculationScan = 64;
 
 // Fair shares
-inline constexpr double kMostUnitSeconds = 86400;  // longer reported times are ignored
+inline constexpr double kMostUnitSeconds = 86400;  // a time that a result reports is ignored if it is longer
 inline double plausible_seconds(double reported) {
   return reported >= 0 && reported <= kMostUnitSeconds ? reported : 0;
 }
@@ -71,7 +71,7 @@ inline constexpr Duration kAuditAfterRestart = 60s;
 inline constexpr std::size_t kMaxVoters = 65'536;
 
 // Rounds that may be leased ahead of the folded ones
-inline constexpr RoundIndex kRoundsAhead = 64;  // bounds the results that wait to be folded
+inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait to be folded
 
 // Failures
 // A job fails when one of its units has failed on kUnitFailureWorkers distinct workers and in at least

@@ -15,7 +15,7 @@ struct TimeSplit {
   bool operator==(const TimeSplit&) const = default;
 };
 
-// The names in JSON, wherever a split is written or read
+// The parts and their names in JSON, wherever a split is written or read
 struct TimePart {
   const char* name;
   double TimeSplit::*seconds;

@@ -83,7 +83,8 @@ class UnitQueue {
   // Number of waiting units that are certain to be needed; may include some that were accepted out of turn.
   std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
 
-  // Every round of the tile before this one has been leased at least once, or accepted.
+  // Returns the first round of the tile that was never leased: every earlier round has been leased at least
+  // once, or accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
   // Makes the tile's rounds from `round` on wait again.
   void rewind(TileIndex tile, RoundIndex round) {

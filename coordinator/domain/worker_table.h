@@ -106,8 +106,8 @@ class WorkerTable {
   Worker& at(WorkerIndex index) { return *workers_.at(index); }
 
   const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
-  int threads() const { return threads_; }  // of all connected workers
-  // Cores of all connected workers (threads times core share), up to rounding
+  int threads() const { return threads_; }  // threads of all connected workers
+  // Returns the cores of all connected workers (threads times core share), up to rounding
   double cores() const { return cores_; }
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
@@ -121,7 +121,7 @@ class WorkerTable {
   std::vector<WorkerId> ids_;
   std::unordered_map<WorkerId, WorkerIndex> index_;
   std::vector<WorkerIndex> free_;
-  std::size_t kept_ = 0;  // names left by the last keep_names()
+  std::size_t kept_ = 0;  // number of names that the last keep_names() left
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> wanting_work_;
   int threads_ = 0, connected_ = 0;

@@ -37,12 +37,13 @@ class Coordinator {
     std::optional<Duration> keep_unused = std::chrono::hours(24);
     bool shared = false;      // other coordinators use the same store and blobs
     std::string join_token;   // empty: any worker may join
-    JoinCheck may_join;       // if set, replaces the check of join_token
+    JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
     bool allow_fake = false;  // true: workers that make up their pixels may join (for tests)
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that another worker renders again
     std::shared_ptr<const Clock> clock;
-    // Interval of Tick events, raised by a thread of the coordinator; nullopt: the caller calls tick()
+    // Time between two Tick events, which a thread of the coordinator raises. nullopt: there is no such
+    // thread, and the caller calls tick()
     std::optional<Duration> tick;
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);

@@ -54,27 +54,29 @@ struct JobEntry {
   TileGrid grid;
   std::shared_ptr<PartialLog> log;   // file of accepted results; null if the job is only in memory
   std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
-  std::optional<ReferenceTiles> reference_tiles;  // only with a reference, while there is an assembly
+  // Pictures to compare with the reference, if it has one, while there is an assembly
+  std::optional<ReferenceTiles> reference_tiles;
   std::optional<ReferenceNoise> reference_noise;  // from the last comparison; nullopt: unknown
   std::vector<ConvergencePoint> points;
-  // Number of the current curve: points of an older curve (wrong or lost pixels) are dropped
+  // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
+  // dropped
   std::uint64_t curve = 0;
   bool unloaded = false;  // true if it has ended and is on disk only: the farm has forgotten it
   // True if its user removed it, or another coordinator has it: nothing more of it is stored
   bool removed = false;
   bool pin_unsaved = false;     // its numeric class is not stored yet, so its results cannot be stored either
-  std::string audits;           // open audits, as last written to disk (store/log/audit_file.h)
+  std::string audits;           // its open audits, as they were last written to disk (store/log/audit_file.h)
   std::string broken;           // why it could not be restored at the start
-  std::uint64_t finishing = 0;  // number of the final image being made; 0: none
+  std::uint64_t finishing = 0;  // number of the final image that is being made; 0: none is
   bool snapshot_running = false;
   std::uint64_t snapshots = 0;  // number of snapshots committed; used by the writer thread only
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
-  JobState last_state = JobState::queued;  // as last published
+  JobState last_state = JobState::queued;  // its state when it was last published
   std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
   std::optional<TimePoint> still_since;    // since when its clock stands still, because the job is paused
   double fold_seconds = 0;                 // seconds on the job's clock at the last fold
-  std::string trouble;                     // why it is waiting
+  std::string trouble;                     // why the job waits
   // The workers that each leased unit (tile and round) is leased to, for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
   // Seconds on the job's clock of each durable result, while a restart replays the results
@@ -97,7 +99,7 @@ struct Connection {
   bool open = true;  // guarded by the service's lock
   // true: a result of this worker waits for room, and its stream is not read meanwhile
   std::atomic<bool> held_back{false};
-  // False once the service is gone; a session may outlive it
+  // False once the service is gone: a session may outlive the service
   std::shared_ptr<const std::atomic<bool>> service_lives;
   std::optional<std::uint64_t> first_lease;  // number of the first lease assigned over this stream
 };
@@ -215,7 +217,7 @@ class Service final : public Coordinator {
   void leave_sequence_locked(const EntryPtr& entry);
   struct Inheritance {
     JobStore::Inherited job;
-    TimePoint again{};  // earliest next attempt
+    TimePoint again{};  // the job is not tried again before this time
   };
   void take_over(Inheritance inheritance);
   void apply_quarantine_locked(const std::vector<QuarantinedWorker>& workers);
@@ -294,7 +296,7 @@ class Service final : public Coordinator {
   // Final images and snapshots (service_finish.cpp), on the writer thread
   void finish(const EntryPtr& entry, std::uint64_t number);
   void retire(const EntryPtr& entry);
-  struct Folded {  // a cheap copy to use outside the lock
+  struct Folded {  // a copy of the folded image, cheap to make, to use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;

@@ -44,7 +44,7 @@ struct ReferenceError {
   bool operator==(const ReferenceError&) const = default;
 };
 struct ConvergencePoint {
-  double seconds = 0;       // since the first ray
+  double seconds = 0;       // seconds since the first ray
   double core_seconds = 0;  // CPU seconds of workers for these samples
   double spp = 0;
   ErrorFigures error;
@@ -75,7 +75,7 @@ struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
   std::uint32_t current = 0;   // the frame to show: the first that is being rendered, or has been
-  std::vector<FrameView> all;  // ascending; filled by Coordinator::job() only
+  std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
 
 struct JobView {
@@ -88,10 +88,11 @@ struct JobView {
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
-  std::optional<double> target_error;  // relMSE, requested
+  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
   double spp_done = 0;                 // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
-  std::optional<ReferenceError> reference_error;  // of the last checkpoint that has one
+  // At the last checkpoint that was compared with the reference
+  std::optional<ReferenceError> reference_error;
   // True if the reference and the image share scene and seed. Then they share their noise as well, and
   // reference_error means nothing (see same_noise() there)
   bool reference_same_seed = false;
@@ -101,13 +102,14 @@ struct JobView {
   std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
   std::optional<std::uint64_t> pixels_without_samples;  // in the current image; nullopt: unknown
   std::optional<double> eta_seconds;
-  std::optional<std::pair<double, double>> eta_ci95;  // if an error target ends the job
+  // 95 % interval of eta_seconds, if an error target ends the job
+  std::optional<std::pair<double, double>> eta_ci95;
   // eta_seconds if kMoreWorkers more workers like the present ones joined
   std::optional<double> eta_with_more;
   // Interval of eta_with_more, if an error target ends the job
   std::optional<std::pair<double, double>> eta_with_more_ci95;
-  std::string error;                  // why it failed
-  std::vector<std::string> warnings;  // of the scene
+  std::string error;                  // why it failed, or why it waits
+  std::vector<std::string> warnings;  // warnings about the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
@@ -118,8 +120,8 @@ struct JobView {
   double queued_core_seconds = 0;
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
-  double submitted_unix = 0;      // wall clock, for display
-  Health health;                  // of the folded units; for a sequence only the totals
+  double submitted_unix = 0;  // wall clock, for display
+  Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
   std::vector<HealthNote> notes;  // the same as sentences for people; empty: no problems
   bool fake = false;  // true if fake workers made up its pixels; of a sequence: those of any frame
   // Set only for a sequence. Its other values combine all frames: they are sums or means over pixels, and
@@ -129,9 +131,9 @@ struct JobView {
 
 // Changes to a job requested by a user. Either all are applied or, if any is rejected, none.
 struct JobChange {
-  std::optional<JobState> state;  // paused, running or cancelled
+  std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
-  std::optional<std::uint64_t> spp;  // the new total
+  std::optional<std::uint64_t> spp;  // the new total of samples per pixel
   // The new target error; only for a job that has one and was not stopped for another reason. A smaller
   // target resumes a job that reached the larger one
   std::optional<double> target_error;
@@ -142,7 +144,7 @@ struct TileView {
   PixelRect rect;
   RoundIndex rounds_folded = 0;
   std::uint64_t spp = 0;
-  std::optional<double> relmse;      // estimated; nullopt: no samples yet
+  std::optional<double> relmse;      // estimated error of the tile; nullopt: it has no samples yet
   std::vector<std::string> workers;  // names of the workers rendering it now
 };
 

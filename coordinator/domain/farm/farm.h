@@ -35,7 +35,7 @@ Result<void> check_plan(const JobPlan& plan);
 // What the service should do with a result that has arrived
 struct Wanted {
   enum class Verdict {
-    yes,        // verify it against `samples` and `numeric_class`, then raise UnitAccepted
+    yes,        // verify it against `samples` and `numeric_class`, make it durable, then raise UnitAccepted
     duplicate,  // do the same; the farm drops it if its digest is equal, else it is evidence against a worker
     no          // acknowledge it to the worker and drop it
   };
@@ -91,7 +91,7 @@ class Farm {
     // Leases are named PREFIX-1, PREFIX-2...; each start of the coordinator needs another prefix
     std::string lease_prefix = "l";
     ShareLimits limits = {};
-    double audit_rate = 0;         // fraction of the accepted results that another worker renders again
+    double audit_rate = 0;         // fraction of the accepted results that another worker is to render again
     std::uint64_t audit_seed = 0;  // decides which results are audited; workers must not know it
   };
 
@@ -143,9 +143,10 @@ class Farm {
   // Returns the sizes of all containers, by name; for tests that look for unbounded growth.
   std::vector<std::pair<std::string, std::size_t>> sizes() const;
 
-  // Checks all invariants and describes the first violation: planned = done + leased + queued; leases,
-  // workers and jobs agree with one another; no worker is idle while a unit it may take is queued. Empty if
-  // all hold. Slow: for tests and occasional checks in service; only right after handle().
+  // Checks all invariants and describes the first violation; empty if all hold. Invariants: planned = done +
+  // leased + queued; leases, workers and jobs agree with one another; no worker is idle while a unit it may
+  // take is queued. This is slow, for tests and occasional checks in service, and may be called only right
+  // after handle().
   std::string audit() const;
 
  private:

@@ -112,7 +112,7 @@ struct Farm::State {
   // there.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
-  void settle_audits(Job& job);  // drops or decides the audits that no worker can do
+  void settle_audits(Job& job);  // drops the open audits that no worker can do, or decides them
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
@@ -166,7 +166,7 @@ struct Farm::State {
   void dispatch();
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
-  Job* choose(const Worker& worker);  // the next job for this worker
+  Job* choose(const Worker& worker);  // the job that this worker gets units of next; null: none
   enum class Takes { nothing, later, now };
   Takes takes(Job& job, const Worker& worker);
   bool may_pin(const Job& job, const Worker& worker) const;
