@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxAssets = 100'000;     // files that one submiss
 inline constexpr std::size_t kMaxWarnings = 100;       // warnings kept per job
 inline constexpr std::size_t kMaxShownName = 256;      // of a job or worker
 inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame of a sequence counts as one
-inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // the part of kMaxJobs that one user may have
+inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // how many of the kMaxJobs jobs one user may have
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;

@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// A job's request, resolved: the scene's defaults are already filled in.
+// What a job asks for. The scene's defaults are already filled in.
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
@@ -131,8 +131,8 @@ struct WorkerJoined {
   std::uint64_t memory_bytes = 0;
   std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
 };
-// The worker rendered wrong pixels, found before a restart or by another coordinator: it gets no work, and
-// its results for jobs of this farm are void.
+// The worker rendered wrong pixels, as was found before a restart or by another coordinator. It gets no work,
+// and its results for jobs of this farm are void.
 struct WorkerQuarantined {
   WorkerId worker;
   std::string why;

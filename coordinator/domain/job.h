@@ -22,7 +22,7 @@ namespace ls::coordinator {
 using JobSeq = std::uint64_t;    // order of submission
 using LeaseSeq = std::uint64_t;  // order of leasing; 0: no lease
 
-// The leases that hold a unit: one, or two when an idle worker renders a copy
+// The leases that hold a unit: one, or two if an idle worker renders a copy of it
 struct Holders {
   std::array<LeaseSeq, 2> lease{};
   bool full() const { return lease[0] != 0 && lease[1] != 0; }

@@ -80,11 +80,12 @@ class UnitQueue {
     }
   }
   bool wanted(UnitCode code) const { return round_of(code) < wanted_before(tile_of(code)); }
-  // Number of waiting units that are certain to be needed; may include some that were accepted out of turn.
+  // Returns how many waiting units are certain to be needed. May count units that have an accepted result
+  // already, because it arrived before their turn.
   std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
 
-  // Returns the first round of the tile that was never leased: every earlier round has been leased at least
-  // once, or accepted.
+  // Returns the number of the tile's round that is next in order: every earlier round of the tile has been
+  // leased at least once, or accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
   // Makes the tile's rounds from `round` on wait again.
   void rewind(TileIndex tile, RoundIndex round) {

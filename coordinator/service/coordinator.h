@@ -1,5 +1,6 @@
-// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/
-// put it on the network; `lightshaft render` uses it in process.
+// The coordinator without sockets: domain (the farm, which decides what is rendered where), store and
+// assembler behind one thread-safe object. rpc/ and http/ put it on the network; `lightshaft render` uses it
+// in process.
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,8 @@ namespace ls::coordinator {
 
 class EventHub {
  public:
-  // Durably reserves the next `count` ids, so that no id is ever used twice, and returns the first of them.
+  // Durably reserves the next `count` ids, so that no id is ever used twice. Returns the number before the
+  // first of them.
   using Reserve = std::function<Result<std::uint64_t>(std::uint64_t count)>;
   explicit EventHub(Reserve reserve);
   ~EventHub();

@@ -195,7 +195,7 @@ class Service final : public Coordinator {
   bool image_is_lost(const StoredJob& job) const;
   static void begin_again(StoredJob& job);
   bool has_quarantined_locked(const JobEntry& entry) const;
-  // Opens the log and loads the folded image, without the results of quarantined workers.
+  // Opens the job's log and loads its folded image, without the results of quarantined workers.
   Result<void> load_locked(JobEntry& entry);
   void remove_unknown_folders(const std::vector<StoredJob>& jobs) const;
   void remove_leftovers() const;

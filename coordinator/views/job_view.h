@@ -129,7 +129,7 @@ struct JobView {
   std::optional<FramesView> frames;
 };
 
-// Changes to a job requested by a user. Either all are applied or, if any is rejected, none.
+// Changes that a user requests of a job. Either all are applied or, if any is rejected, none.
 struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;

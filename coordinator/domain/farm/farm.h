@@ -10,8 +10,8 @@
 // UnitFolded -> {Checkpoint, JobFinished...}. Several results of one unit may be under way at once: the first
 // UnitAccepted wins.
 //
-// The cost of handle() does not grow with the number of tiles or units, except once per round (checkpoint)
-// and per job.
+// The cost of one call of handle() does not grow with the number of tiles or units, except once per round
+// (when it completes: checkpoint) and for what happens once per job.
 #pragma once
 
 #include <cstdint>
