@@ -10,6 +10,7 @@
 namespace ls::coordinator::limits {
 
 // Blobs
+
 // Bytes of one file of a scene: 64 GiB
 inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // bytes that one read() returns
@@ -24,7 +25,7 @@ inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
 inline constexpr std::size_t kMaxAssets = 100'000;     // files that one submission names
 inline constexpr std::size_t kMaxWarnings = 100;       // warnings kept per job
-inline constexpr std::size_t kMaxShownName = 256;      // of a job or worker
+inline constexpr std::size_t kMaxShownName = 256;      // bytes kept of the name of a job or worker
 inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame of a sequence counts as one
 inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // how many of the kMaxJobs jobs one user may have
 using ls::kMaxFramePixels;
@@ -46,7 +47,8 @@ inline constexpr std::size_t kFramesPerEvent = 2500;
 
 // Results. A partial is the encoded result of one unit (one round of one tile). The limits in bytes hold for
 // all jobs together; with them a UHD film of 8.3 million pixels at 48 bytes each stays below 600 MB.
-// Bytes of one partials-NNN.seg file, which holds partials
+
+// Bytes of one partials-NNN.seg file, a segment of a job's log of partials
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;
 inline constexpr std::uint32_t kMaxSegments = 1u << 20;
 // Bytes of results that are received but not durable yet; above this, the coordinator does not read from its

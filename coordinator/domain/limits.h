@@ -14,6 +14,7 @@ namespace ls::coordinator {
 using namespace std::chrono_literals;
 
 // Jobs
+
 // Most samples per pixel of a job that gives only a target error or a time
 inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;
 
@@ -63,6 +64,7 @@ inline constexpr std::uint32_t kJobsLookedAt = 64;  // jobs checked to find one 
 inline constexpr std::size_t kBlobsRemembered = 1024;
 
 // Audits
+
 // audits open at the same time per job; at this number no further one begins
 inline constexpr std::size_t kMaxAuditsOpen = 64;
 // Time for workers to reconnect before a restored audit is dropped
@@ -74,6 +76,7 @@ inline constexpr std::size_t kMaxVoters = 65'536;
 inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait to be folded
 
 // Failures
+
 // A job fails when one of its units has failed on kUnitFailureWorkers distinct workers and in at least
 // kUnitFailureAttempts attempts. Fewer workers are enough if fewer are connected
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;
@@ -91,6 +94,7 @@ inline constexpr std::size_t kNamesKept = 256;
 inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // workers that one message names
 
 // Stopping
+
 // samples per pixel that every tile gets before it may stop for its error
 inline constexpr std::uint64_t kMinSppBeforeStop = 64;
 inline constexpr int kMinStopPixels = 1024;  // fewest pixels in a group of tiles that stop together

@@ -88,7 +88,7 @@ void Service::look_for(const std::set<Digest>& missing_blobs) {
   std::set<Digest> here;
   for (const Digest& digest : missing_blobs) {
     const auto found = blobs_->find(digest);
-    if (!found) break;  // the store is unavailable: until the next lookup
+    if (!found) break;  // the store is unavailable: this is tried again at the next lookup
     if (*found) here.insert(digest);
   }
   if (here.empty()) return;

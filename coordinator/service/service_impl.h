@@ -56,7 +56,8 @@ struct JobEntry {
   std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
   // Pictures to compare with the reference, if it has one, while there is an assembly
   std::optional<ReferenceTiles> reference_tiles;
-  std::optional<ReferenceNoise> reference_noise;  // from the last comparison; nullopt: unknown
+  // Noise of the reference, from the last comparison; nullopt: unknown
+  std::optional<ReferenceNoise> reference_noise;
   std::vector<ConvergencePoint> points;
   // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
   // dropped
@@ -375,7 +376,7 @@ class Service final : public Coordinator {
   std::vector<Inheritance> inherited_;
   std::string store_trouble_;     // why the last result could not be stored; empty if it was
   std::string blobs_trouble_;     // why the blob store is unavailable; empty if it is available
-  std::vector<EntryPtr> folded_;  // jobs of which the events being handled have folded units
+  std::vector<EntryPtr> folded_;  // jobs of which units were folded by the events that are being handled
   bool restoring_ = false;
   FarmFigures figures_;  // figures() fills in the current values (..._now)
   std::atomic<std::uint64_t> blob_bytes_{0};
@@ -389,7 +390,7 @@ class Service final : public Coordinator {
   // Lookups of missing blobs. They have a thread of their own since the blob store may be unavailable
   WorkQueue<std::set<Digest>> looks_;
   TimePoint last_look_{};
-  std::shared_ptr<const Reference> reference_;  // used by the last comparison
+  std::shared_ptr<const Reference> reference_;  // the reference image that the last comparison used
   Digest reference_digest_;
   std::unique_ptr<EventHub> hub_;
   // This is the last member, so the threads are joined before anything that they use is destroyed

@@ -146,7 +146,7 @@ void Service::commit(std::vector<Checked> batch) {
     else
       accept_locked(item, stored[i].place);
   }
-  lock.unlock();  // requests granted now may continue at once, on this thread
+  lock.unlock();  // requests that release() grants may continue on this thread, before it returns
   for (const Checked& item : batch) budget_.release(item.arrived.bytes);
 }
 

@@ -80,7 +80,7 @@ tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& requ
   return id;
 }
 
-// Registers a job; a frame joins its sequence, which is listed where its first frame was.
+// Registers a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
 void Service::register_locked(const EntryPtr& entry) {
   const JobId& id = entry->stored.id;
   entries_.emplace(id, entry);
@@ -104,7 +104,8 @@ void Service::publish_sequence_locked(const JobId& id, bool at_once) {
   const auto found = sequences_.find(id);
   if (found == sequences_.end() || restoring_) return;
   Sequence& sequence = found->second;
-  at_once &= sequence.frames.size() <= limits::kFramesPerEvent;  // otherwise with the next tick
+  // A longer sequence is published with the next tick instead
+  at_once &= sequence.frames.size() <= limits::kFramesPerEvent;
   const double period = limits::kProgressSeconds * (1 + static_cast<double>(sequence.frames.size()) /
                                                             static_cast<double>(limits::kFramesPerEvent));
   sequence.progress_due = !at_once && seconds(now() - sequence.last_progress) < period;
@@ -134,7 +135,7 @@ Result<void> Service::edit_locked(const std::vector<EntryPtr>& frames,
 // ended change only if they are to get more samples.
 Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& sequence,
                                              const JobChange& change) {
-  std::vector<EntryPtr> sound, open, retargeted, extended;  // unreadable records are left out
+  std::vector<EntryPtr> sound, open, retargeted, extended;  // `sound`: frames whose record can be read
   for (const EntryPtr& frame : sequence.frames) {
     if (!frame->broken.empty()) continue;
     sound.push_back(frame);

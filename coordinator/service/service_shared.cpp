@@ -89,7 +89,7 @@ void Service::take_over(Inheritance inheritance) {
   }
   const std::lock_guard lock(mutex_);
   if (entries_.contains(job.id)) return;
-  if (on_disk()) {  // local files are from an earlier ownership and outdated
+  if (on_disk()) {  // local files are of a time when this coordinator owned the job before: they are outdated
     std::error_code error;
     std::filesystem::remove_all(folder(job.id), error);
   }

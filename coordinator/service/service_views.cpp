@@ -54,7 +54,7 @@ Result<Service::EntryPtr> Service::usable_locked(const JobId& id) const {
 }
 
 JobState Service::shown_state(const JobEntry& entry) const {
-  return entry.stored.state;  // stays `running` until finish() has written the image
+  return entry.stored.state;  // this stays `running` until finish() has written the final image
 }
 
 namespace {

@@ -24,11 +24,11 @@ namespace ls::coordinator {
 
 inline constexpr int kMoreWorkers = 8;  // workers that JobView::eta_with_more adds
 
-struct ErrorFigures {  // of the image folded up to one complete round in all tiles
+struct ErrorFigures {  // estimated errors of the image that was folded up to one complete round in all tiles
   double rmse = 0;
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  double rmse_lo = 0, rmse_hi = 0;      // both 0: unknown, stored by a version without them
+  double rmse_lo = 0, rmse_hi = 0;      // both are 0 if unknown: a version without them stored the error
 };
 // Error against a reference image, from which the reference's own noise is subtracted
 // (common/image/reference/reference.h)
@@ -80,7 +80,7 @@ struct FramesView {
 
 struct JobView {
   JobId id;
-  std::string name;  // scene file name, for display
+  std::string name;  // name of the scene file, for display
   // The user whose token submitted it. Empty: the administrator, or it was submitted before there were users
   std::string owner;
   JobState state = JobState::queued;
@@ -120,7 +120,7 @@ struct JobView {
   double queued_core_seconds = 0;
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
-  double submitted_unix = 0;  // wall clock, for display
+  double submitted_unix = 0;  // time of submission by the wall clock, for display
   Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
   std::vector<HealthNote> notes;  // the same as sentences for people; empty: no problems
   bool fake = false;  // true if fake workers made up its pixels; of a sequence: those of any frame

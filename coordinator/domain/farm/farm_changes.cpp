@@ -1,4 +1,4 @@
-// Changes by the user: samples and target error of a job.
+// Changes that a user makes to a job: its samples and its target error.
 #include <fmt/format.h>
 
 #include <algorithm>

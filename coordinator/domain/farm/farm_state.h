@@ -38,7 +38,8 @@ struct Farm::State {
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the last Tick; compared with the end of workers' blocks, since all workers are checked at ticks
+  // Time of the last Tick. Whether a worker is still blocked is decided by this time, since blocks are
+  // forgiven at ticks, when all workers are checked
   TimePoint ticked{};
   std::vector<Effect> effects;
   bool work_appeared = false;   // there may be units that any worker could take now
@@ -95,6 +96,7 @@ struct Farm::State {
   void checkpoint(Job& job, RoundIndex round);
 
   // farm_trust.cpp: audits and faulty workers
+
   // Compares a further result of a unit with the accepted one
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void restore_audits(Job& job, const JobRestored& event);
@@ -108,8 +110,8 @@ struct Farm::State {
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
-  // Which workers could decide the audit: none, only workers that are away (paused) now, or one that is
-  // there.
+  // Which workers could render the unit of an audit: none; only workers that are connected but get no work
+  // now (away); or one that may begin (there).
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
   void settle_audits(Job& job);  // drops the open audits that no worker can do, or decides them
@@ -141,7 +143,7 @@ struct Farm::State {
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  void leave_load(Job& job, const Worker& worker);  // the worker has one lease of the job less
+  void leave_load(Job& job, const Worker& worker);  // counts one lease of the job less for the worker
   // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
   // Audits are exempt: the farm orders them, not the user, and an audit that waited for the user's other work
   // would delay the end of a finished job.

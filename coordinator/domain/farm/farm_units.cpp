@@ -1,4 +1,5 @@
-// Results and failures of units, folding, and the end of a job.
+// What the farm does with results and failures of units (rounds of tiles) and when they are folded, and how a
+// job fails.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Workers: joining, reporting, leaving, and the passage of time.
+// What the farm does when workers join, report and leave, and as time passes.
 #include <algorithm>
 #include <span>
 
