@@ -1,5 +1,5 @@
-// lightshaft-coordinator: wires store, state machine, gRPC and HTTP together and runs until SIGTERM or
-// SIGINT.
+// lightshaft-coordinator: opens the coordinator (store, state machine and threads), serves it by gRPC and
+// HTTP, and runs until SIGTERM or SIGINT.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <malloc.h>
@@ -42,7 +42,7 @@ namespace fs = std::filesystem;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Held until the process ends: two coordinators on one folder would destroy each other's work.
+// Locks the folder until the process ends: two coordinators on one folder would destroy each other's work.
 Result<int> lock_folder(const fs::path& folder) {
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -62,7 +62,7 @@ Result<int> lock_folder(const fs::path& folder) {
   return fd;
 }
 
-// Every connection needs a file descriptor: raise the limit to what the system allows.
+// Every connection needs a file descriptor: this raises the limit on them to what the system allows.
 void raise_file_limit() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
@@ -70,7 +70,8 @@ void raise_file_limit() {
   ::setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-// For scripts and tests that use port 0. Renamed into place, so that readers see the whole file.
+// Writes the ports to ports.json, for scripts and tests that let the system choose them (port 0). The file is
+// renamed into place, so that readers see all of it or nothing.
 Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   const fs::path aside = folder / "ports.json.new", file = folder / "ports.json";
   std::ofstream out(aside, std::ios::trunc);
@@ -82,8 +83,9 @@ Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   return {};
 }
 
-// Partials and films of 100 KB to some MB are allocated many times a second: returning them to the system
-// each time would cost page faults again and again.
+// Keeps freed memory in the process. Results of units and images, of 100 KB to some MB each, are allocated
+// many times a second: giving their memory back to the system each time would cost page faults again and
+// again.
 void keep_freed_memory() {
   ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
@@ -91,7 +93,7 @@ void keep_freed_memory() {
 
 fs::path secrets_of(const Flags& flags) { return flags.secrets.empty() ? flags.data : flags.secrets; }
 
-// nullopt: TLS was not requested.
+// Returns the certificates and keys for TLS; nullopt: TLS was not requested.
 Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
   const bool brought = !flags.tls_ca.empty();
   if (!brought && !flags.tls) return std::nullopt;
@@ -102,7 +104,8 @@ Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
   return std::move(*texts);
 }
 
-// On a network, plain traffic can be read and changed, tokens first of all.
+// Warns if an address on the network is served without encryption: others could read and change the traffic,
+// above all the tokens.
 void warn_of_open_lines(const std::string& address, std::string_view what) {
   const std::string host = address.substr(0, address.rfind(':'));
   if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
@@ -114,7 +117,8 @@ std::string with_port(const std::string& address, int port) {
   return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
 }
 
-// Only the operator names receivers; notifications are signed with DIR/webhook-secret.
+// Starts notifications to the receivers in `flags`: the operator names them, users cannot add any. They are
+// signed with the secret in DIR/webhook-secret.
 Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinator::Coordinator& coordinator,
                                                                   const Flags& flags, const fs::path& data) {
   if (flags.webhooks.empty()) return nullptr;
@@ -127,7 +131,7 @@ Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinato
                                                         std::make_shared<ls::SystemClock>(), unix_time});
 }
 
-// Limits wrong join tokens per address as HTTP limits other wrong tokens.
+// Returns a guard that limits wrong join tokens per address, as HTTP limits other wrong tokens.
 ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   const double a_minute = limits.wrong_tokens_per_minute;
   const auto throttle = std::make_shared<ls::http::Throttle>(
@@ -155,8 +159,8 @@ sigset_t block_signals() {
 
 Result<void> serve(const Flags& flags, const sigset_t& signals) {
   const fs::path data = flags.data;
-  // The port first: if it is taken, this is reported before anything is changed. Connections wait until all
-  // is ready.
+  // The port is opened first: if it is taken, this is reported before anything is changed. Connections wait
+  // until all is ready.
   auto http = ls::http::Server::listen(flags.http);
   if (!http) return tl::unexpected(http.error());
   if (auto lock = lock_folder(data); !lock) return tl::unexpected(lock.error());
@@ -164,7 +168,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   fs::remove(data / "ports.json", ignored);
   const fs::path secrets = secrets_of(flags);
   fs::create_directories(secrets, ignored);
-  // Against coordinators that start with the same folder at the same time
+  // This lock keeps out coordinators that start with the same folder at the same time
   std::optional<ls::http::FolderLock> others(secrets);
   auto tokens = ls::http::TokenRegistry::open(secrets);
   if (!tokens) return tl::unexpected(tokens.error());

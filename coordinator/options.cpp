@@ -9,7 +9,8 @@ namespace {
 
 constexpr int kUsage = 2;
 
-// Limits of the HTTP server for slow and greedy clients: hidden options for the config file and tests.
+// Adds hidden options for the limits that the HTTP server sets to slow and greedy clients: for the config
+// file and for tests.
 void add_limits(CLI::App& app, http::Limits& limits) {
   const auto hidden = [&app](const char* name, auto& value, double least) {
     app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
@@ -30,7 +31,7 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// Limits on what is leased at the same time (docs/design/scheduling.md).
+// Adds the options that limit what is leased at the same time (docs/design/scheduling.md).
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
@@ -93,7 +94,8 @@ void add_files(CLI::App& app, Flags& flags) {
                  "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
 }
 
-// Others must be able to read what this coordinator writes, or they could not take anything over.
+// Checks the flags for --shared: other coordinators must be able to read what this one writes, or they could
+// not take its jobs over.
 Result<void> check_shared(const Flags& flags) {
   if (!flags.shared) return {};
   if (flags.store == "sqlite" || flags.blobs.empty())

@@ -24,7 +24,8 @@ struct Flags {
   bool shared = false;
   std::string public_http, public_grpc;
   std::string secrets;  // folder of tokens and TLS files; empty: --data
-  // nullopt: 24 hours, or for good if the blob store may be shared
+  // Hours for which a blob (file of a scene) is kept that no job needs. nullopt: 24, or for good if other
+  // coordinators may share the blob store
   std::optional<double> keep_unused_hours;
   std::vector<std::string> webhooks;
   LogFormat log_format = LogFormat::text;
@@ -34,7 +35,8 @@ struct Flags {
   bool allow_fake = false;
 };
 
-// Returns the exit code if there is nothing to run: 0 for help, 2 for wrong usage (reported on stderr).
+// Returns the flags. Returns an exit code instead if there is nothing to run: 0 for help, 2 for wrong usage
+// (reported on stderr).
 std::variant<Flags, int> parse_flags(int argc, char** argv);
 
 }  // namespace ls::coordinator

@@ -23,7 +23,7 @@ namespace {
 
 Error invalid(std::string text) { return {Errc::invalid_argument, std::move(text)}; }
 
-// The job's choice takes precedence over the scene's.
+// Sets the integrator. What the job asks for takes precedence over what the scene names.
 Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSettings& settings,
                                std::vector<std::string>& warnings) {
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
@@ -71,7 +71,7 @@ Result<void> check_spec(const JobSpec& spec) {
   return {};
 }
 
-// The AOVs requested by the job and by the scene.
+// Sets the AOVs: those that the job requests and those that the scene requests.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
   for (std::string_view rest = scene.aovs; !rest.empty();) {
@@ -100,7 +100,8 @@ Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
   return {std::move(error), std::move(diagnostics)};
 }
 
-// The part of the scene that the job's integrator uses; all its files are available.
+// Returns the part of the scene that the job's integrator uses, or an error if a file of that part is not in
+// the store.
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
                                                   std::optional<std::uint32_t> frame,
                                                   const UploadedScene& read, const RenderSettings& settings) {
@@ -108,9 +109,10 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
-  const auto again = read_uploaded(request, blobs, frame, true);  // for the places that name the file
+  // A strict second reading gives the places in the scene that name the missing file
+  const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
-  return scene::pruned(again->scene, whom);  // the file has arrived meanwhile
+  return scene::pruned(again->scene, whom);  // the file has arrived since the first reading
 }
 
 }  // namespace
@@ -186,7 +188,8 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
         Errc::failed_precondition,
         fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
-  // No more than a reference of the right size needs, but enough to report a slightly wrong size as such.
+  // Limits the picture to the pixels that a reference of the right size needs, but not below 2^22, so that a
+  // slightly wrong size can be reported as such.
   limits.max_pixels = std::max<std::uint64_t>(
       static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
       std::uint64_t{1} << 22);
@@ -205,7 +208,8 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
-// A world takes at least as much memory as its files; the user may request more.
+// A world (the scene as a worker loads it) takes at least as much memory as its files; the user may ask for
+// workers that have more.
 std::uint64_t memory_need(const StoredJob& job) {
   std::uint64_t files = 0;
   for (const BlobRef& file : job.assets) files += file.bytes;

@@ -14,33 +14,34 @@
 namespace ls::coordinator {
 
 struct Admission {
-  StoredJob job;               // without id and time
-  std::string scene_json;      // canonical; its digest is job.scene
-  std::size_t text_bytes = 0;  // of all scene files read
+  StoredJob job;               // the job to store, without id and time
+  std::string scene_json;      // the scene in canonical form; its digest is job.scene
+  std::size_t text_bytes = 0;  // bytes of all scene files that were read
 };
 
 // Reads the scene with the request's assets as its only files, so a scene can never reach a path on this
 // machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
-// `frame`: number of a frame of a sequence. The scene is read for this frame, and its seed is the job's plus
-// this number: frames have independent noise, and a frame rendered alone has the same pixels.
+// `frame` is the number of a frame of a sequence (a job with frames). The scene is then read for this frame,
+// and its seed is the job's plus this number: frames have independent noise, and a frame rendered alone has
+// the same pixels.
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame = {});
 
-// Admits all frames of spec.frames, or returns their errors; limits.h bounds their total size.
+// Admits all frames of spec.frames, or returns their errors. limits.h bounds the frames' total size.
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs);
 
-// The reference that the job asks for, for an image of this size. failed_precondition: its blob is missing;
-// invalid_argument: it is not a suitable picture.
+// Reads the reference image that the job asks for, for an image of this size. Errors: failed_precondition if
+// its blob is missing, invalid_argument if it is not a suitable picture.
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
-// The command that renders one of the job's samples again: common/job/replay_command.h.
+// Returns the command that renders one of the job's samples again: common/job/replay_command.h.
 std::string replay_of(const StoredJob& job);
 
-// The least bytes of memory that a worker needs for the job.
+// Returns how many bytes of memory a worker needs at least for the job.
 std::uint64_t memory_need(const StoredJob& job);
 
-// The stored job as the farm's plan.
+// Returns what the farm needs to know of the stored job.
 JobPlan plan_of(const StoredJob& job);
 
 }  // namespace ls::coordinator

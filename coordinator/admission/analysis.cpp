@@ -9,9 +9,10 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::size_t kMostListed = 64;  // of the pruned items: more are alike, and records stay small
+// Pruned items that are listed: further ones are much like these, and records stay small
+constexpr std::size_t kMostListed = 64;
 
-// Bytes of the files that only this part of the renderer reads.
+// Returns the bytes of the files that only this part of the renderer reads.
 std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part) {
   static const std::map<std::string, std::string> kReads = {{"meshes", "mesh"},
                                                             {"bitmap textures", "texture"},

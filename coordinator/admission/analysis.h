@@ -1,5 +1,5 @@
-// Scene analysis: what a scene needs and which parts are left out, as stored with the job for its workers and
-// in words for people.
+// Scene analysis: what a scene needs, and which of its parts are left out of the rendering. It is stored with
+// the job in two forms: for the workers, and as text for people.
 #pragma once
 
 #include "common/scene/analysis/needs.h"
@@ -8,7 +8,7 @@
 
 namespace ls::coordinator {
 
-// Fills the job's needs, features and analysis. `pruned`: the scene as the job's integrator sees it.
+// Sets needs, features and analysis of `job`. `pruned` is the scene as the job's integrator sees it.
 void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job);
 
 }  // namespace ls::coordinator

@@ -10,7 +10,8 @@ CryptomatteManifests manifests_of(const Scene& scene, AovSet aovs) {
   CryptomatteManifests out;
   std::vector<std::string> shapes, materials;
   for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {
-    // The shapes of a group appear as its instances.
+    // A shape that belongs to a group is not listed itself: in the image it appears as an instance of the
+    // group.
     if (!scene.shapes[i].group) shapes.push_back(scene.shape_labels[i].name);
     materials.push_back(scene.shape_labels[i].material);
   }

@@ -1,4 +1,4 @@
-// Cryptomatte manifests: the names behind an image's identifiers.
+// A Cryptomatte manifest lists the names of objects that an image's cryptomattes refer to by identifiers.
 #pragma once
 
 #include "common/image/exr/aov_layers.h"

@@ -9,7 +9,7 @@
 namespace ls::coordinator {
 namespace {
 
-// "./a/b.obj" and "a/b.obj" are the same name.
+// Returns the name without leading "./": "./a/b.obj" and "a/b.obj" are the same file.
 std::string plain_name(std::string_view name) {
   while (name.starts_with("./")) name.remove_prefix(2);
   return std::string(name);

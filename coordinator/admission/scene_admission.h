@@ -16,12 +16,13 @@ namespace ls::coordinator {
 struct UploadedScene {
   Scene scene;
   std::vector<Diagnostic> warnings;
-  std::size_t text_bytes = 0;     // of included scene files
-  std::set<Digest> not_uploaded;  // files that the scene names but whose bytes are missing
+  std::size_t text_bytes = 0;     // bytes of the scene files that the main file includes
+  std::set<Digest> not_uploaded;  // files that the scene names but that are not in the store
 };
 
-// Missing bytes are no error if not `strict`: the caller decides whether they are needed. `strict`: a missing
-// file is an error, with its place in the scene.
+// Reads the request's scene. If `strict`, a file that is not in the store is an error, with its place in the
+// scene. Otherwise it is listed in not_uploaded, unless the scene includes it as a further scene file, and
+// the caller decides whether it is needed.
 tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request, const BlobStore& blobs,
                                                     std::optional<std::uint32_t> frame, bool strict);
 

@@ -1,4 +1,5 @@
-// Admission of sequences: one scene, read once per frame; all frames or none.
+// Admission of sequences (jobs with frames): the scene is read once per frame, and either all frames are
+// admitted or none.
 #include <fmt/format.h>
 
 #include <set>
@@ -12,12 +13,12 @@ namespace {
 
 constexpr std::uint32_t kMostBadFrames = 64;  // reading stops after this many frames with errors
 
-// The limits on all frames together.
+// Checks the limits on all frames together.
 class Budget {
  public:
   explicit Budget(std::uint32_t frames) : frames_(frames) {}
 
-  // Call scene() before the text is read, and frame() for every frame.
+  // scene() is to be called before the scene's text is read, and frame() for every frame.
   Result<void> scene(std::size_t bytes) const {
     if (bytes <= limits::kMaxSequenceText / frames_) return {};
     return too_much("bytes of scene text", limits::kMaxSequenceText);
@@ -49,7 +50,7 @@ tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}
   return tl::unexpected(Rejected{std::move(error), std::move(found)});
 }
 
-// Drops warnings that an earlier frame has.
+// Drops the warnings of each frame that an earlier frame has, too.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
   for (Admission& f : frames)

@@ -1,5 +1,7 @@
-// The image of one unfinished job: the film, the accepted partials that wait for an earlier round, errors and
-// costs. Not thread-safe; guarded by the service's lock. The film is cheap to copy for work outside the lock.
+// The image of one unfinished job: the film (the sums of all folded samples), the accepted partials that wait
+// for an earlier round of their tile, the errors and the costs. A partial is the encoded pixel sums of one
+// unit, that is, of one round (range of samples) of one tile; to fold it is to add it to the film. Not
+// thread-safe; guarded by the service's lock. The film is cheap to copy for work outside the lock.
 #pragma once
 
 #include <atomic>
@@ -18,17 +20,19 @@
 
 namespace ls::coordinator {
 
-// An accepted partial that is not folded yet. Without `partial` its pixels are read from the log.
+// An accepted partial that is not folded yet. If `partial` is empty, its pixels are read from `place` in the
+// log.
 struct WaitingPartial {
   std::optional<Partial> partial;
   std::optional<PartialLog::Place> place;
   SampleRange samples;
   Digest digest;
   Health health;
-  TimePoint arrived{};  // zero: before this start
+  TimePoint arrived{};  // zero: it arrived before this start of the coordinator
 };
 
-// Bytes of the pixels that waiting partials of one job hold; also summed over the process.
+// Counts the bytes of the pixels of one job's waiting partials. all() is the sum over all jobs of the
+// process.
 class WaitingBytes {
  public:
   WaitingBytes() = default;
@@ -61,9 +65,9 @@ class Assembly {
   // kMaxPendingPartials, its pixels are dropped and read from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  void forget_round(RoundIndex round);  // a truncated round was reopened: its waiting partials are void
+  void forget_round(RoundIndex round);  // drops waiting partials of a truncated round that was reopened
   void forget_waiting();
-  void discard(TileIndex tile);  // discards all of the tile: it is folded again from round 0
+  void discard(TileIndex tile);  // drops all of the tile: it is folded again from round 0
   std::size_t waiting() const { return waiting_.size(); }
   bool holds(TileIndex tile, RoundIndex round) const { return waiting_.contains({tile, round}); }
 
@@ -72,10 +76,10 @@ class Assembly {
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
   const HealthTable& health() const { return health_; }
-  UnitCosts& costs() { return costs_; }  // of accepted units, folded or not
+  UnitCosts& costs() { return costs_; }  // costs of accepted units, folded or not
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
-  // Number of folded rounds of each tile for a job of `spp` samples, without tails that were cut for fewer
-  // samples.
+  // Returns for each tile how many rounds are folded that a job of `spp` samples per pixel can use. A
+  // truncated last round (tail) that was cut for fewer samples does not count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 

@@ -25,7 +25,8 @@ Health HealthTable::total() const {
   return all;
 }
 
-// One line per tile for its full rounds, then one per tail: "f" or "t", the tile and its health.
+// Returns one line for each tile that has full rounds, then one for each tile with a truncated last round
+// (tail). A line is "f" or "t", the tile and its health.
 std::string HealthTable::save() const {
   std::string text;
   for (const auto& [tile, health] : full_)

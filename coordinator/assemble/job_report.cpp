@@ -16,13 +16,13 @@ json number(double value) { return std::isfinite(value) ? json(value) : json(); 
 json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
-// 64 rather than 64.0 if all pixels have the same number of samples.
+// Writes samples per pixel: 64 rather than 64.0 if all pixels have the same number.
 json spp_value(double spp) {
   if (spp == std::floor(spp) && spp >= 0 && spp < 1e15) return static_cast<std::uint64_t>(spp);
   return number(spp);
 }
 
-// true_rmse, true_relmse, true_flip, and whether the first two are below the reference's noise.
+// Adds true_rmse, true_relmse, true_flip, and whether the first two are below the reference's noise.
 void put_reference_error(json& object, const ReferenceError& reference_error) {
   object["true_rmse"] = number(reference_error.rmse);
   object["true_relmse"] = number(reference_error.relmse);
@@ -39,8 +39,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"relmse", reference_error ? number(reference_error->relmse) : json()},
           {"flip", reference_error && reference_error->flip ? number(*reference_error->flip) : json()},
           {"same_seed", facts.job.reference_same_seed},
-          // The difference to the reference is within the reference's own noise, so it cannot show the
-          // image's error.
+          // True if the difference to the reference is within the reference's own noise: then it cannot show
+          // the image's error.
           {"below_noise", reference_error && reference_error->relmse_below_noise()},
           {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
           {"mse_stderr", reference_error ? number(reference_error->mse_stderr) : json()},
@@ -49,11 +49,12 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// The forecast of the time to the target at each checkpoint, so that its reliability can be judged
-// afterwards.
+// Adds to the curve what was forecast at each checkpoint for the time to the target, so that the reliability
+// of forecasts can be judged afterwards.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // At doubling samples only: points in between add little, and each forecast evaluates all points
+  // Only checkpoints at which the samples have doubled get a forecast: points in between add little, and each
+  // forecast evaluates all points
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;
@@ -85,7 +86,8 @@ json point(const ConvergencePoint& p) {
   return j;
 }
 
-// The cost of reaching the job's target or, if there is none left to reach, half of the error.
+// Returns a forecast of the cost of reaching the job's target error. If there is none, or it is reached, the
+// forecast is for half of the present error.
 json forecast(const ReportFacts& facts) {
   if (facts.convergence.empty()) return {};
   const double now = facts.convergence.back().error.relmse;
@@ -161,7 +163,7 @@ ConvergenceStatus convergence_status_of(const ReportFacts& facts) {
   return judge(error_points(facts.convergence, !facts.job.reference_same_seed), facts.error->verdict);
 }
 
-// 1 / error per second of wall-clock time; per core second for comparisons between farms.
+// 1 / (error x seconds of wall-clock time), and the same with core seconds, for comparisons between farms.
 Efficiency efficiency_of(const ReportFacts& facts) {
   const auto over = [&](double seconds) -> std::optional<double> {
     const double cost = facts.error ? facts.error->relmse * seconds : 0;

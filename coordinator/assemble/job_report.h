@@ -1,4 +1,5 @@
-// The report of a job, as JSON.
+// Writes the report of a job, as JSON, and the figures that are derived from its image and its curve of
+// errors.
 #pragma once
 
 #include <map>
@@ -16,41 +17,44 @@
 namespace ls::coordinator {
 
 struct ReportFacts {
-  StoredJob job;  // with current totals
+  StoredJob job;  // the job as stored, but with current totals
   std::uint64_t samples = 0;
-  // Error of the current image, over the pixels that have a sample; nullopt: none has
+  // Error of the current image, over the pixels that have a sample. nullopt: no pixel has one
   std::optional<ImageError> error;
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
-  std::uint64_t clamped_values = 0;  // in the final EXR
+  std::uint64_t clamped_values = 0;  // values that the final EXR cannot represent
   std::vector<ConvergencePoint> convergence;
   std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
 };
 std::string report_json(const ReportFacts& facts);
-// Sets samples, pixels without samples and error from the film.
+// Sets those facts that the film gives: samples, pixels without samples, and error.
 void put_film(ReportFacts& facts, const Film& film);
 
-// Judges how far the image's error estimates can be trusted.
+// Says how far the image's error estimates can be trusted.
 ConvergenceStatus convergence_status_of(const ReportFacts& facts);
 struct Efficiency {
-  std::optional<double> wall, per_core;  // 1 / (relMSE x wall-clock seconds), 1 / (relMSE x core seconds)
+  // wall: 1 / (relMSE x wall-clock seconds); per_core: 1 / (relMSE x core seconds)
+  std::optional<double> wall, per_core;
 };
 Efficiency efficiency_of(const ReportFacts& facts);
-// Numbers for the final EXR's header besides those of the film: slope, efficiency, efficiency_per_core,
-// target_error, true_rmse, true_relmse, as far as known.
+// Returns numbers for the header of the final EXR besides those of the film: slope, efficiency,
+// efficiency_per_core, target_error, true_rmse, true_relmse, as far as they are known.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
-// true_below_noise, reference_same_seed and fake, if they apply
+// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed and fake, if they
+// apply
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
-// A note on an image that ended for another reason than its samples; else empty.
+// Returns a note for an image that ended for another reason than having its samples; else an empty text.
 std::string note_on(StopReason stopped);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
-// Without `with_reference_error` the points lack the errors against the reference.
+// Converts the points of a job's curve. Without `with_reference_error` the result lacks the errors against
+// the reference.
 std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points,
                                      bool with_reference_error = true);
-// The error of the last checkpoint that has one
+// Returns the error against the reference at the last checkpoint that has one
 std::optional<ReferenceError> last_reference_error(const std::vector<ConvergencePoint>& points);
 
 }  // namespace ls::coordinator

@@ -1,5 +1,6 @@
-// The pictures of tiles that a comparison with a reference still needs. A checkpoint gives the number of
-// rounds of each tile that count, and shows every tile as it was then, even if some are ahead already. Like
+// Keeps the pictures of tiles that a comparison with a reference image still needs. A round is a range of
+// samples; folding adds a tile's next round to the image. A checkpoint says how many rounds of each tile
+// count, and shows every tile as it was after these, even if some tiles are ahead already. This is like
 // round_errors.h, but with whole pictures, since the perceived error (FLIP) is not a sum over tiles.
 //
 // Not thread-safe. Pictures are shared and immutable: the result of at() may be used without a lock.
@@ -22,17 +23,18 @@ struct TilePicture {
 
 class ReferenceTiles {
  public:
-  // Tiles that are partly folded already (after a restart) are known from their last round on.
+  // Begins with the picture that `film` has of each tile. Of tiles that are partly folded already (after a
+  // restart), earlier rounds are unknown.
   explicit ReferenceTiles(const Film& film);
 
-  // Call after each fold, when `film` includes it.
+  // Keeps the tile's picture after this round. Call after each fold, when `film` includes it.
   void folded(TileIndex tile, RoundIndex round, const Film& film);
-  // Pictures after `rounds` of each tile, or after all it has if that is less. nullopt: the picture of some
-  // tile is lost, because the coordinator was restarted meanwhile.
+  // Returns for each tile its picture after `rounds[tile]` rounds, or after all that it has if these are
+  // fewer. nullopt: the picture of some tile is lost, because the coordinator was restarted meanwhile.
   std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
   void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }  // the tile is folded again from round 0
   std::optional<std::vector<TilePicture>> latest() const;
-  // at() will not be called with fewer rounds again
+  // Drops pictures that are no longer needed: at() will not be called with fewer rounds of any tile again
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
  private:
@@ -43,7 +45,7 @@ class ReferenceTiles {
   std::vector<Tile> tiles_;
 };
 
-// The whole frame, interleaved, row by row.
+// Joins the tiles' pictures to one of the whole frame, interleaved, row by row.
 std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame);
 
 }  // namespace ls::coordinator

@@ -62,7 +62,7 @@ void put(std::vector<std::byte>& out, const T& value) {
   std::memcpy(&out[at], &value, sizeof value);
 }
 
-// Never allocates more than the bytes hold, whatever they say.
+// Reads values from `bytes`. It never allocates more than the bytes can hold, whatever counts they claim.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -81,8 +81,9 @@ class Reader {
 };
 }  // namespace
 
-// Per tile: u32 count, {u32 round, TileError}..., u32 count, doubles... Read only by builds with the same
-// layout: the snapshot names its format, and other builds ignore it.
+// Returns the errors of one tile as bytes: u32 count, then {u32 round, TileError} of each kept round; u32
+// count, then the relative error sums as doubles. They are read only by builds with the same layout: the
+// snapshot names its format, and other builds ignore it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;
@@ -106,7 +107,7 @@ std::vector<std::byte> RoundErrors::save() const {
 }
 
 namespace {
-// Reads one tile; what follows it is left in `in`.
+// Reads the errors of one tile from the front of `in`. What follows them stays in `in`.
 template <class Rounds>
 bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
   std::uint32_t count = 0;

@@ -1,6 +1,7 @@
-// The error sums of every tile after every fold, as long as they are needed. A checkpoint gives the number of
-// rounds of each tile that count and sums the errors after these, even if some tiles are ahead already. So
-// the errors of a checkpoint do not depend on the order of arrival.
+// Keeps the error sums of every tile after every fold, as long as they are needed. A round is a range of
+// samples; folding adds a tile's next round to the image. A checkpoint says how many rounds of each tile
+// count, and sums the errors of the tiles after these, even if some tiles are ahead already. So the errors of
+// a checkpoint do not depend on the order in which results arrive.
 #pragma once
 
 #include <cstddef>
@@ -16,24 +17,25 @@ namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // `keep_relative`: also keep each fold's relative error sum for good; the farm's stop rule needs them after
-  // a restart.
+  // If `keep_relative`, each fold's relative error sum is kept for good, too: the farm's stop rule needs
+  // these sums after a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
-  // Rounds of a tile come in order; a round given again (a truncated one, now in full) replaces the earlier
-  // error.
+  // Adds the tile's error after this round. The rounds of a tile come in order; if a round is given again (a
+  // truncated one, now in full), the new error replaces the old.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  // The sum after `rounds` of each tile, in tile order. A tile with fewer rounds counts with what it has; a
-  // tile of which only later rounds are kept, because it was ahead at an earlier checkpoint, with the first
-  // of those.
+  // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
+  // fewer rounds counts with its last. If a tile was ahead at an earlier checkpoint and only later rounds of
+  // it are kept, it counts with the first of these.
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: nothing that it needs has been dropped.
   bool knows(std::span<const RoundIndex> rounds) const;
   void discard(TileIndex tile) { tiles_[tile] = {}; }  // the tile is folded again from round 0
-  // at() will not be called with fewer rounds again
+  // Drops errors that are no longer needed: at() will not be called with fewer rounds of any tile again
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
-  // [round][tile]; empty unless kept. 0 for tiles that have not reached a round.
+  // Returns the relative error sums as [round][tile]; empty unless they are kept. The sum is 0 for tiles that
+  // have not reached a round.
   std::vector<std::vector<double>> relative() const;
 
   std::vector<std::byte> save() const;

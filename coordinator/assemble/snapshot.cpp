@@ -13,7 +13,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 constexpr std::string_view kMagic = "LSSNAP2\n";
 constexpr std::uint32_t kEnd = ~std::uint32_t{0};
-constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;  // of one tile
+constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;  // most bytes of one part of one tile
 
 struct TileHead {
   std::uint32_t tile = 0;
@@ -43,7 +43,7 @@ class Source {
   explicit Source(std::filesystem::path path) : path_(std::move(path)) {
     if (auto file = File::open(path_, O_RDONLY)) file_ = std::move(*file);
   }
-  // nullopt: fewer bytes are left.
+  // Returns the next bytes of the file; nullopt if fewer are left.
   std::optional<std::vector<std::byte>> take(std::uint64_t bytes) {
     if (!file_ || bytes > kMostPart) return std::nullopt;
     auto read = read_at(file_, at_, static_cast<std::size_t>(bytes), path_);
@@ -60,7 +60,7 @@ class Source {
     std::memcpy(&v, raw->data(), sizeof v);
     return v;
   }
-  // True if the rest of the file is the right seal.
+  // True if what is left of the file is the seal (SHA-256) of what was read so far.
   bool sealed() {
     const Digest read = hash_.finish();
     const auto seal = take(sizeof read.bytes);
@@ -74,7 +74,8 @@ class Source {
   Sha256 hash_;
 };
 
-// False: damaged. Appends to `health` the text that HealthTable::load() reads at the end.
+// Reads one tile into `film` and `errors`, and appends its text to `health`, which HealthTable::load() reads
+// at the end. False: the file is damaged.
 bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
   TileHead head{.tile = tile};
   for (std::uint64_t* length : {&head.film, &head.errors, &head.health}) {

@@ -1,6 +1,7 @@
-// A snapshot file of a job's folded image, tile by tile: writing or reading it needs memory for one tile
-// besides the film. Each tile is saved as it was when added, so folding may continue meanwhile; after a
-// restart, later folds are repeated from the partials.
+// A snapshot is a file of a job's folded image, tile by tile. Writing or reading it needs memory for one tile
+// besides the film (the image in memory). Each tile is saved as it was when it was added, so folding may
+// continue meanwhile. After a restart, what was folded later is folded again from the partials (the stored
+// results of units).
 // Format:
 //    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
 //    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
@@ -31,12 +32,12 @@ TileSnapshot snapshot_of(const Film& film, const RoundErrors& errors, const Heal
 
 class SnapshotFile {
  public:
-  // `suffix`: added to the file name until commit().
+  // Creates the file under the name `path` followed by `suffix`; commit() gives it the name `path`.
   static Result<SnapshotFile> create(const std::filesystem::path& path, std::string_view suffix,
                                      const TileGrid& grid, AovSet aovs, std::string_view format);
-  Result<void> add(const TileSnapshot& tile);  // each tile once; tiles without folds are skipped
-  Result<void> finish();  // seals the file and makes it durable, still under the temporary name
-  Result<void> commit();  // moves the file into place, after finish()
+  Result<void> add(const TileSnapshot& tile);  // adds each tile once; tiles without folds are skipped
+  Result<void> finish();  // writes the seal and makes the file durable, still under its temporary name
+  Result<void> commit();  // gives the file its final name; call after finish()
 
  private:
   explicit SnapshotFile(AtomicFile file) : file_(std::move(file)) {}
@@ -45,8 +46,9 @@ class SnapshotFile {
   Sha256 hash_;
 };
 
-// nullopt if the file is missing, damaged or of another grid, AOV set or format: then everything is folded
-// again from the partials. Also reads the format of earlier versions ("LSSNAP1\n", all in one piece).
+// Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format: then
+// everything is folded again from the partials (the stored results of units). Also reads the format of
+// earlier versions ("LSSNAP1\n", all in one piece).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
 

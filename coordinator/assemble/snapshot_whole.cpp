@@ -37,7 +37,7 @@ std::optional<Assembly> load_whole_snapshot(const std::filesystem::path& path, c
   const auto by = take_part(rest);
   const auto film_bytes = take_part(rest);
   const auto error_bytes = take_part(rest);
-  // The first snapshots had no health.
+  // The first snapshots that were written had no health part.
   const std::optional<std::span<const std::byte>> health_bytes =
       rest.empty() ? std::as_bytes(std::span(kNoHealth)) : take_part(rest);
   if (!by || !film_bytes || !error_bytes || !health_bytes || !rest.empty()) return std::nullopt;

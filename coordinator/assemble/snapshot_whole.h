@@ -1,5 +1,5 @@
-// Snapshots of earlier versions, all in one piece: {"LSSNAP1\n", format, film, error sums, health}, closed by
-// a SHA-256. Read, but no longer written.
+// Reads snapshots of earlier versions, which are all in one piece: {"LSSNAP1\n", format, film, error sums,
+// health}, closed by a SHA-256. They are no longer written.
 #pragma once
 
 #include <filesystem>

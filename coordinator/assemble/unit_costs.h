@@ -1,5 +1,5 @@
-// CPU cost of the units of an image: the cost of a checkpoint is that of the units in it, even if other units
-// are ahead already.
+// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. The cost of a
+// checkpoint is that of the units in it, even if other units are ahead already.
 #pragma once
 
 #include <span>
@@ -14,16 +14,17 @@ class UnitCosts {
  public:
   explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}
 
-  // Adds the core seconds of an accepted unit. A unit rendered again, e.g. of a truncated round, adds each
-  // time.
+  // Adds the core seconds of an accepted unit. A unit that is rendered again, e.g. one of a truncated round,
+  // adds its cost each time.
   void add(TileIndex tile, RoundIndex round, double core_seconds);
-  // Cost of all units in the first `rounds` of each tile or of earlier calls: the result never decreases.
+  // Returns the core seconds of the units in the first `rounds[tile]` rounds of each tile. Units that an
+  // earlier call included stay included, so the result never decreases.
   double until(std::span<const RoundIndex> rounds);
 
  private:
   struct Tile {
-    RoundIndex summed = 0;     // rounds included in sum_
-    std::vector<float> ahead;  // cost of later rounds
+    RoundIndex summed = 0;     // number of rounds included in sum_
+    std::vector<float> ahead;  // core seconds of each later round
   };
   std::vector<Tile> tiles_;
   double sum_ = 0;

@@ -1,4 +1,5 @@
-// Verification of a worker's result. No state, no lock: runs on any thread.
+// Verifies a worker's result. It has no state and no lock, and runs on any thread. A partial is the encoded
+// pixel sums of one unit, that is, of one round (range of samples) of one tile.
 #pragma once
 
 #include <variant>
@@ -8,17 +9,19 @@
 
 namespace ls::coordinator {
 
-// An honest partial of the right round, but of another sample range than needed now: the job was extended
-// meanwhile.
+// The partial is honest and of the right round, but of another sample range than is needed now: the job was
+// extended meanwhile.
 struct OtherRange {
   SampleRange samples;
 };
-// Wrong size, windows, scene, settings, class, tile or digest, or not finite; the error says which.
+// The result is wrong: its size, windows, scene, settings, numeric class, tile or digest differ from what is
+// expected, or it has values that are not finite. The error says which.
 struct BadResult {
   Error error;
 };
 using Verified = std::variant<Partial, OtherRange, BadResult>;
 
+// Checks that `result` is a partial with the header `expected` of an image of size `frame` with these AOVs.
 Verified verify_result(const UnitResult& result, const UnitHeader& expected, FrameSize frame,
                        AovSet aovs = {});
 

@@ -1,4 +1,5 @@
-// Calls act() every `pause` until a stop is requested; the first call comes after one pause.
+// every() calls act() once per `pause` until a stop is requested through `token`. The first call comes after
+// one pause. It blocks its thread.
 #pragma once
 
 #include <condition_variable>

@@ -56,13 +56,15 @@ class WorkQueue {
   int held_back_ = 0;  // threads blocked in wait_for_room()
 };
 
-// Limits the bytes in flight: requests beyond the budget wait in line.
+// Limits how many bytes are in use at the same time. ask() requests bytes, release() gives them back;
+// requests that do not fit wait in line.
 class ByteBudget {
  public:
   explicit ByteBudget(std::size_t bytes) : room_(bytes) {}
-  // Calls `granted` once the bytes fit, in the order of requests: at once on this thread, or later on a
-  // thread that calls release(). Never calls it after close(). A single item larger than the whole budget is
-  // granted when nothing else is in use. Every waiting request is kept, so callers must limit their number.
+  // Calls `granted` once the bytes fit, in the order of requests. If they fit now, it is called on this
+  // thread before ask() returns; else later on a thread that calls release(). It is never called after
+  // close(). A single item larger than the whole budget is granted when nothing else is in use. Every waiting
+  // request is kept, so callers must limit their number.
   void ask(std::size_t bytes, std::function<void()> granted) {
     {
       const std::lock_guard lock(mutex_);

@@ -10,9 +10,10 @@
 namespace ls::coordinator {
 namespace {
 
-// The first round that may be a tile's last.
+// The first round that may be a tile's last: the one with which every pixel has kMinSppBeforeStop samples.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
-constexpr RoundIndex kFirstForecast = 3;  // rounds: 8 samples
+// Rounds that every group needs before a forecast; together they have 8 samples per pixel
+constexpr RoundIndex kFirstForecast = 3;
 
 constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }
 
@@ -80,7 +81,7 @@ double AdaptiveStop::gain(const Group& g) const {
 }
 
 void AdaptiveStop::advance(Group& g) {
-  while (!g.settled && g.stop <= g.sums.size()) {  // the rounds before `stop` are known
+  while (!g.settled && g.stop <= g.sums.size()) {  // gain() needs the errors of the rounds before `stop`
     if (g.stop == last_ || gain(g) <= level_) {
       g.settled = true;
       ++settled_;
@@ -176,8 +177,8 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error grows with the level: bisect on the level's exponent. The midpoint is a square root, which has
-  // the same bits on every machine.
+  // The error of the image grows with the level, so the level for `target` is found by bisection on its
+  // exponent. The midpoint is a square root, which has the same bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);

@@ -1,12 +1,15 @@
-// Adaptive sampling: decides when the tiles of a job with a target error stop, from the tiles' own errors
-// alone.
+// Adaptive sampling decides when the tiles of a job with a target error stop getting samples. It reads
+// nothing but the tiles' own error estimates. A round is a fixed range of sample indices
+// (common/image/frame/rounds.h); folding adds the pixel sums of a tile's round to the image. Tiles stop in
+// groups (stop_groups.h).
 //
-// The image's relMSE is the mean over its pixels. A group of p pixels whose (relative) variance per sample,
-// averaged over pixels and channels, is a, contributes p a / n to it after n samples and costs p n. For a
-// given cost the sum is least where one more sample lowers it equally everywhere: where a / n^2 is equal, so
-// n ~ sqrt(a). (Equal errors everywhere, n ~ a, would cost as much as uniform sampling.) In rounds: group g
-// continues after round k as long as its gain a / (n_k n_k+1), the error that the next round removes per
-// sample, exceeds a level common to all groups (marginal allocation, Fox 1966).
+// The image's relMSE is the mean over its pixels. Take a group of p pixels whose relative variance per
+// sample, averaged over pixels and channels, is a. After n samples per pixel it adds p a / n to the sum over
+// the image's pixels, and it has cost p n samples. For a given total cost the sum is least where one more
+// sample lowers it equally everywhere: where a / n^2 is equal, so n ~ sqrt(a). (Equal errors everywhere, n ~
+// a, would cost as much as uniform sampling.) In rounds: let n_k be the samples per pixel up to the end of
+// round k. Group g continues after round k as long as its gain a / (n_k n_k+1), the error that the next round
+// removes per sample, exceeds a level common to all groups (marginal allocation, Fox 1966).
 //
 // The right level for a target is not known in advance, and must not depend on which results arrive first. So
 // levels fall step by step on a fixed grid, 2^(-j/4). At each level every group stops independently; when all
@@ -37,31 +40,35 @@
 
 namespace ls::coordinator {
 
-// Returns the largest number of the grid {2^(-j/4)} that is less than `gain`; 0 for 0.
+// Returns the next level below `gain`: the largest number of the grid {2^(-j/4)}, j any integer, that is less
+// than `gain`. Returns 0 for 0.
 double level_below(double gain);
 
 class AdaptiveStop {
  public:
-  // `spp`: the most samples per pixel that any tile gets.
+  // `spp` is the sample limit: the most samples per pixel that any tile gets.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
-  // Adds the sum over the tile's pixels and channels of the relative squared error after rounds 0..round
-  // (TileError::relative.squares). The rounds of one tile must come in order; tiles may come in any order.
+  // Tells the rule that rounds 0..round of the tile are folded. `rel_error_sum` is the sum over the tile's
+  // pixels and channels of the relative squared error after these rounds (TileError::relative.squares). The
+  // rounds of one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
-  // The tile's last round that is certain to be needed, so that it may be folded. Once the image is accepted,
-  // the tile's last round.
+  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be folded.
+  // Once the image is accepted, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
-  // The tiles of this tile's group, which all stop together; includes the tile itself.
+  // Returns the tiles of this tile's group, which all stop together. The tile itself is one of them.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
   // True if all groups have stopped at this level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Whether the image meets the target at this level.
+  // Whether the image's relMSE at this level is at most `target`. `unknown`: not all groups have stopped, or
+  // the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
-  // relMSE of the image at this level, predicted from the rounds before each tile's last. Requires settled().
+  // Returns the relMSE of the image at this level, predicted from the rounds before each tile's last.
+  // Requires settled().
   double predicted() const;
   // True if every group has reached the sample limit: nothing can continue.
   bool exhausted() const;
@@ -70,46 +77,53 @@ class AdaptiveStop {
   void lower();
   double level() const { return level_; }
 
-  // Number of rounds of each tile at this level. Requires settled().
+  // Returns for each tile how many rounds it has if the image ends at this level. Requires settled().
   std::vector<RoundIndex> ends() const;
-  double mean_spp() const;  // over pixels
+  double mean_spp() const;  // samples per pixel at this level, mean over all pixels
 
   // True if some group has reached the sample limit.
   bool bound() const;
-  // Raises the sample limit. Requires !bound(): a group that reached the limit might have continued with a
-  // higher one.
+  // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group that reached the old limit
+  // might have continued under a higher one.
   void extend(std::uint64_t spp);
 
-  // Speculation: predicts the rounds that will probably be needed, so that they are rendered in time. Affects
-  // no pixel.
+  // Speculation: the functions below predict which rounds will probably be needed, so that workers render
+  // them in time. They affect no pixel.
   //
   // foresee() predicts the level at which the image will meet `target`. It does nothing until every group has
   // kFirstForecast rounds.
   void foresee(double target);
-  // Number of the tile's rounds that will probably be needed; never fewer than are certain to be.
+  // Returns how many rounds of the tile will probably be needed; never fewer than are certain to be needed.
   RoundIndex predicted_last(TileIndex tile) const;
-  // Variance per sample of the tile's group, from its last round; with it the queue predicts the order of
-  // gains, in whole rounds. NaN if unknown.
+  // Returns the variance per sample of the tile's group, estimated from its last known round; NaN if unknown.
+  // The queue of units (unit_queue.h) derives from it in which order the tiles' next rounds are worth
+  // rendering, in whole rounds.
   double variance(TileIndex tile) const;
-  // Pixel samples still to be taken up to the predicted ends; nullopt before foresee() has predicted them.
+  // Returns how many pixel samples are still to be taken up to the predicted ends of all groups; nullopt
+  // before foresee() has predicted them.
   std::optional<double> samples_left() const;
-  double samples_to_limit() const;  // pixel samples still to be taken up to the sample limit
-  std::uint64_t rounds_seen() const { return rounds_seen_; }  // summed over groups
+  double samples_to_limit() const;  // how many pixel samples are still to be taken up to the sample limit
+  // Number of rounds added so far, summed over all groups
+  std::uint64_t rounds_seen() const { return rounds_seen_; }
   std::size_t groups() const { return groups_.size(); }
 
  private:
   struct Group {
     std::vector<TileIndex> tiles;
     double pixels = 0;
-    std::vector<double> sums;       // error sums of the group's tiles, by round, added in tile order
-    RoundIndex stop = 0;            // the earliest round that may be the group's last
+    std::vector<double> sums;  // sums[k]: error sum of the group's tiles after round k, added in tile order
+    RoundIndex stop = 0;       // the earliest round that may be the group's last
     RoundIndex predicted_last = 0;  // the round that will probably be its last
     bool settled = false;           // `stop` is its last round at this level
   };
-  double variance(const Group& g, RoundIndex round) const;        // per sample, from rounds 0..round
-  double samples_missing(const Group& g, RoundIndex last) const;  // pixel samples, up to round `last`
-  double gain(const Group& g) const;                              // of one more round after `stop`
-  double measured() const;  // relMSE from the errors of the last rounds, which must be known
+  // Variance per sample, estimated from rounds 0..round
+  double variance(const Group& g, RoundIndex round) const;
+  // Pixel samples that the group still needs up to the end of round `last`
+  double samples_missing(const Group& g, RoundIndex last) const;
+  double gain(const Group& g) const;  // error that one more round after `stop` removes per sample
+  // relMSE of the image, from the errors of each group's last round, all of which must be known
+  double measured() const;
+  // True if the error of the group's round `stop` is known.
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }
   void advance(Group& g);
 
@@ -118,7 +132,7 @@ class AdaptiveStop {
   RoundIndex last_;  // the last round within the sample limit
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;
-  // Errors by tile, of rounds that other tiles of its group do not have yet
+  // waiting_[tile] holds the error sums of rounds that some other tile of the same group has not reached yet
   std::vector<std::vector<double>> waiting_;
   std::size_t settled_ = 0;
   double level_ = std::numeric_limits<double>::infinity();

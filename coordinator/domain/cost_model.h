@@ -1,5 +1,6 @@
-// Cost of a sample, measured from the CPU seconds that results report: per tile, with the job's running mean
-// for tiles not measured yet. Affects the size of leases and their deadlines, never a pixel.
+// The CPU seconds that one pixel sample costs, measured from what results report: for each tile, and as a
+// running mean over the job for tiles that have no result yet. The cost affects the size of leases and their
+// deadlines, never a pixel.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,8 @@ class CostModel {
  public:
   explicit CostModel(TileIndex tiles) : tile_cost_(tiles, 0.0f) {}
 
-  // Ignores implausible values (negative, not finite, more than a day).
+  // Adds the cost of one result of this tile. An implausible cost (negative, not finite, more than a day) is
+  // ignored.
   void measured(TileIndex tile, std::uint64_t pixel_samples, double cpu_seconds) {
     if (!(cpu_seconds >= 0 && cpu_seconds <= kMostUnitSeconds) || pixel_samples == 0) return;
     const double n = static_cast<double>(pixel_samples);
@@ -25,7 +27,8 @@ class CostModel {
   }
   bool known() const { return samples_ > 0; }
   double per_sample() const { return known() ? seconds_ / samples_ : 0; }
-  // Predicted CPU seconds; 0 if nothing has been measured.
+  // Predicts the CPU seconds of a unit of this tile with this many pixel samples; 0 if nothing has been
+  // measured.
   double predict(TileIndex tile, std::uint64_t pixel_samples) const {
     if (!known()) return 0;
     const double cost = tile_cost_[tile] > 0 ? tile_cost_[tile] : per_sample();
@@ -33,8 +36,10 @@ class CostModel {
   }
 
  private:
-  static constexpr double kLeastSeconds = 1e-4;     // the overhead of any unit
-  static constexpr double kMemory = 1 - 1.0 / 256;  // exponential mean over the last few hundred results
+  // CPU seconds that any unit costs at least, however few its samples
+  static constexpr double kLeastSeconds = 1e-4;
+  // Weight of the past per result: an exponential mean over the last few hundred results
+  static constexpr double kMemory = 1 - 1.0 / 256;
   double seconds_ = 0, samples_ = 0;
   std::vector<float> tile_cost_;
 };

@@ -1,4 +1,6 @@
-// Actions that the farm requests. The service carries them out in the order given.
+// Effects: the actions that the farm requests. The service carries them out in the order given.
+// A unit is one round (range of samples) of one tile, and a partial is the encoded pixel sums of one unit. To
+// fold a partial is to add it to the job's image, its film.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +17,15 @@
 
 namespace ls::coordinator {
 
-// Send the worker an AssignLease (its units are now leased to it), CancelLease or CancelJob.
+// Send this message to the worker: an AssignLease (from now on its units are leased to the worker), a
+// CancelLease or a CancelJob.
 struct Send {
   WorkerId worker;
   ToWorker message;
 };
 
-// These units have left this lease. Those that are still needed wait for another worker, unless another lease
-// holds them too.
+// These units have left this lease (the list of units that the worker was told to render). Those that are
+// still needed wait for another worker, unless another lease holds them too.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -31,7 +34,7 @@ struct UnitsFreed {
   FreedCause cause = FreedCause::worker_lost;
 };
 
-// This result is the unit's accepted one: store it (unit, worker, digest).
+// The farm accepts this result for the unit: store which worker delivered it and its digest.
 struct RecordUnit {
   UnitKey unit;
   SampleRange samples;
@@ -39,33 +42,35 @@ struct RecordUnit {
   WorkerId worker;
 };
 
-// Fold this unit's accepted partial into the film, then raise UnitFolded. The rounds of a tile come in order,
-// each once, and never beyond the tile's stop.
+// Fold this unit's accepted partial into the film, then raise the event UnitFolded. The farm requests the
+// rounds of a tile in order, each once, and never one after the tile's last round.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
 };
 
-// A second result of a unit, equal to the first: let the worker drop it.
+// The worker delivered a second result of a unit, equal to the accepted one. The second one is dropped.
 struct DropDuplicate {
   UnitKey unit;
   WorkerId worker;
 };
-// A result that is not needed: its job has ended, its round is past the tile's stop, or its range or numeric
-// class is another.
+// The worker delivered a result that is not needed, for the reason in `why`: its job has ended, its round is
+// after the tile's last one, or it has another sample range or numeric class than the job needs.
 struct DropUnwanted {
   UnitKey unit;
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ within one numeric class: one worker has bad memory or lies. A third worker
-// is asked to render the unit; if there is none, a running job fails.
+// Two results of one unit differ although both workers have the same numeric class (machines that compute the
+// same bits): one of them has bad memory or lies. A third worker is asked to render the unit; if there is
+// none, a running job fails.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
   WorkerId first_worker, second_worker;
 };
 
+// From now on only workers of this numeric class may render the job.
 struct JobPinned {
   JobId job;
   Digest numeric_class;
@@ -75,29 +80,29 @@ struct JobStateChanged {
   JobState from = JobState::queued;
   JobState to = JobState::queued;
 };
-// Every tile is folded up to the given round: time for a point of the convergence curve and a snapshot. With
-// a target error the tiles have different numbers of rounds: those of one level of the stop rule
-// (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend on the order of
-// arrival.
+// Of every tile at least as many rounds are folded as `rounds` gives for it. The service adds a point to the
+// convergence curve and may take a snapshot. With a target error, tiles have different numbers of rounds:
+// those of one level of the stop rule (coordinator/domain/adaptive_stop.h). The checkpoints and their order
+// do not depend on the order in which results arrive.
 struct Checkpoint {
   JobId job;
-  std::vector<RoundIndex> rounds;  // rounds that count, by tile
-  double spp = 0;                  // mean over pixels
+  std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
+  double spp = 0;                  // samples per pixel, mean over all pixels
 };
-// An extension renders the truncated round `round` again in full: its folded tail is to be replaced, and its
-// partials are void.
+// A job is extended whose last round `round` was truncated by its old sample count. The round is rendered
+// again in full: the service replaces the part that is folded (the tail), and the round's partials are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
 };
-// All units needed are folded. Follows the JobStateChanged to `done`.
+// All units that the image needs are folded. This follows the JobStateChanged to `done`.
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
   std::uint64_t unaudited = 0;  // results chosen for an audit when no other worker of the class was connected
 };
-// The failure for a person to read: what failed, where, what the workers reported and how to replay it.
-// Follows the JobStateChanged to `failed`.
+// The job has failed. `error` is a text for a person: what failed, where, what the workers reported and how
+// to replay it. This follows the JobStateChanged to `failed`.
 struct JobFailed {
   JobId job;
   std::string error;
@@ -109,7 +114,7 @@ struct WorkerStateChanged {
   WorkerState to = WorkerState::connected;
   std::string why;
 };
-// The worker gets no more units of this job for a while.
+// The worker has failed too often at units of this job: it gets no more of them for a while.
 struct WorkerBlocked {
   WorkerId worker;
   JobId job;
@@ -120,7 +125,7 @@ struct WorkerBlocked {
 // results may be accepted.
 struct WorkerFoundFaulty {
   WorkerId worker;
-  UnitKey unit;  // whose results revealed it
+  UnitKey unit;  // the unit of which two results revealed it
   std::string evidence;
 };
 // The film of this tile is void, since a quarantined worker rendered part of it: the tile is folded again

@@ -1,5 +1,7 @@
-// The farm's inputs. Every fact that decides anything arrives as an event; the farm reads no clock and no
-// file.
+// Events: the farm's inputs. Every fact on which a decision depends arrives as an event; the farm reads no
+// clock and no file.
+// A unit is one round (range of samples) of one tile; a lease is a set of units that one worker was told to
+// render.
 #pragma once
 
 #include <cstdint>
@@ -19,23 +21,25 @@
 
 namespace ls::coordinator {
 
-// A job's request, resolved: the scene's defaults are already filled in.
+// What a job asks for. The scene's defaults are already filled in.
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
-  std::optional<std::uint64_t> spp;                // nullopt: limits.h kMaxSppWithoutLimit
-  std::optional<double> target_error;              // relMSE of the image
-  std::optional<double> time;                      // seconds from the first ray
-  int priority = 0;                                // higher first
-  std::vector<std::string> tags;                   // a worker must have all of them
-  std::string replay = "lightshaft render SCENE";  // without pixel and sample: common/job/replay_command.h
+  std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: limits.h kMaxSppWithoutLimit
+  std::optional<double> target_error;  // the job ends when the image has this relMSE
+  std::optional<double> time;          // the job ends this many seconds after the first ray
+  int priority = 0;                    // higher first
+  std::vector<std::string> tags;       // a worker must have all of them
+  // Command that renders a sample again, without pixel and sample: common/job/replay_command.h
+  std::string replay = "lightshaft render SCENE";
   // Fair shares and limits (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence: jobs of one owner and group share their turns and run in order; empty: the job alone
+  // The sequence that the job is a frame of. Jobs of one owner and group share their turns and run in order.
+  // Empty: the job is alone
   std::string group;
   // Limits of the job, or of all jobs of its group together
-  std::uint32_t max_workers = 0;   // that hold units at the same time; 0: no limit
-  std::uint32_t max_units = 0;     // leased at the same time; 0: no limit
+  std::uint32_t max_workers = 0;   // most workers that hold units at the same time; 0: no limit
+  std::uint32_t max_units = 0;     // most units leased at the same time; 0: no limit
   std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
 };
 
@@ -49,7 +53,8 @@ struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    SampleRange samples;  // ignored if no longer needed (a truncated round that was extended since)
+    // A unit whose range is no longer needed is ignored (a truncated round that was extended since)
+    SampleRange samples;
     Digest digest;
     WorkerId worker;
   };
@@ -57,13 +62,16 @@ struct JobRestored {
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;    // set for a job that is done
   std::optional<Digest> numeric_class;  // the class that the job is pinned to
-  std::vector<Unit> accepted;           // durable results, in any order
-  // Rounds in the restored film (with tails), by tile; empty: none. Required for a job that is done.
+  std::vector<Unit> accepted;  // accepted results that are still there after the restart, in any order
+  // For each tile, how many rounds the restored film has folded, a truncated last round included. Empty: no
+  // film was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
-  // [round][tile] of the folded rounds, from UnitFolded; only with a target error
+  // rel_error[round][tile]: UnitFolded::rel_error_sum of each folded round; only for a job with a target
+  // error
   std::vector<std::vector<double>> rel_error;
   double elapsed_seconds = 0;  // from the first ray until the restart
-  // An audit that was open at the restart (Farm::open_audits)
+  // An audit (an accepted result that another worker renders again) that was open at the restart
+  // (Farm::open_audits)
   struct Audit {
     TileIndex tile = 0;
     RoundIndex round = 0;
@@ -82,7 +90,7 @@ struct JobPaused {
 struct JobResumed {
   JobId job;
 };
-// Finish the leased units only: the job ends as `done`, stopped by the user.
+// Only units that are leased already are still rendered. Then the job ends as `done`, stopped by the user.
 struct JobStopped {
   JobId job;
 };
@@ -90,10 +98,10 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
-// Changes the target error of a job that has one and was not stopped for another reason (Farm::may_retarget).
-// A smaller target also resumes a job that reached the larger one, and gives the bits of a job that had it
-// from the start: an image that missed the larger target misses the smaller one, too. A larger target applies
-// from the job's current state on.
+// Changes the target error of a job. The job must have one, and it must not have stopped for another reason
+// (Farm::may_retarget). A smaller target also resumes a job that reached the larger one. The image then has
+// the same bits as that of a job that had the smaller target from the start: an image that missed the larger
+// target misses the smaller one, too. A larger target applies from the job's current state on.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
@@ -104,7 +112,7 @@ struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
 };
-// Forget a job that has ended; its id may come again only with JobRestored.
+// Forget a job that has ended. A later job may have its id only if it comes with JobRestored.
 struct JobForgotten {
   JobId job;
 };
@@ -119,16 +127,17 @@ struct WorkerJoined {
   Digest numeric_class;
   int threads = 1;
   std::vector<std::string> tags;
-  std::uint64_t memory_bytes = 0;  // that its renderer may use; 0: unknown, so no job is kept from it
+  // Memory that the worker's renderer may use; 0: unknown, and then any job may go to it
+  std::uint64_t memory_bytes = 0;
   std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
 };
-// The worker rendered wrong pixels, found before a restart or by another coordinator: it gets no work, and
-// its results for jobs of this farm are void.
+// The worker rendered wrong pixels, as was found before a restart or by another coordinator. It gets no work,
+// and its results for jobs of this farm are void.
 struct WorkerQuarantined {
   WorkerId worker;
   std::string why;
 };
-// The stream has closed. Ignored unless the epoch is the worker's latest.
+// The worker's stream has closed. The event is ignored unless `epoch` is that of the worker's latest stream.
 struct WorkerLost {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -140,8 +149,8 @@ struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;
 };
-// A result of this worker has arrived and waits until the coordinator has room for it; later messages of the
-// worker wait behind it. This is not the worker's fault, so its leases are renewed.
+// A result of this worker has arrived, but the coordinator has no room for it yet. The result waits, and so
+// do all later messages of the worker. This is not the worker's fault, so its leases are renewed.
 struct ResultsWait {
   WorkerId worker;
 };
@@ -152,16 +161,18 @@ struct LeaseCameBack {
 
 // Units
 
-// A verified and durable result. Raised once per arrival; the farm detects duplicates.
+// A verified and durable result has arrived. The event is raised once per arrival; the farm finds out which
+// results are duplicates.
 struct UnitAccepted {
   UnitKey unit;
   SampleRange samples;
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
-  double wait_seconds = 0;  // that its thread waited meanwhile: core_share.h
+  // Seconds that the rendering thread waited for a core or for memory meanwhile: core_share.h
+  double wait_seconds = 0;
 };
-// The assembler has carried out a Fold.
+// The assembler has carried out a Fold (domain/effect.h): the unit's result is part of the image.
 struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // as in the Fold
@@ -169,7 +180,8 @@ struct UnitFolded {
   // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
 };
-// Reported by the worker, or by the service for a result that fails verification.
+// A worker has failed to render a unit. The worker reports it, or the service does for a result that fails
+// verification.
 struct UnitFailed {
   WorkerId worker;
   UnitFailure failure;

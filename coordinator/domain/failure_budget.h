@@ -1,6 +1,6 @@
-// Failures of units at workers: decides when a unit has failed often enough for its job to fail, and when a
-// worker is blocked. Lost workers, expired deadlines and returned leases are infrastructure failures and are
-// not counted.
+// Counts failed attempts to render a unit (one round of one tile). Decides when a unit has failed often
+// enough for its job to fail, and when a worker gets no more units of a job. If a worker is lost, misses a
+// deadline or returns a lease, the infrastructure has failed: this is not counted.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +21,15 @@ struct FailedAttempt {
   UnitFailure failure;
 };
 
-// Units of one job that have failed and are not accepted yet
+// The units of one job that have failed and have no accepted result yet
 class UnitFailures {
  public:
   void add(UnitCode code, FailedAttempt attempt);
   void accepted(UnitCode code) { units_.erase(code); }
+  // True if this worker has failed on this unit.
   bool failed_on(UnitCode code, WorkerIndex worker) const;
-  // True after failures on min(kUnitFailureWorkers, workers_known) distinct workers and at least
-  // kUnitFailureAttempts attempts.
+  // True if the unit has failed on min(kUnitFailureWorkers, workers_known) distinct workers and in at least
+  // kUnitFailureAttempts attempts. `workers_known`: connected workers that could render the job.
   bool exhausted(UnitCode code, std::size_t workers_known) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
   bool any() const { return !units_.empty(); }
@@ -38,7 +39,8 @@ class UnitFailures {
   }
 
  private:
-  std::map<UnitCode, std::vector<FailedAttempt>> units_;  // attempts per unit are bounded by exhausted()
+  // Few attempts each: a job fails when a unit is exhausted()
+  std::map<UnitCode, std::vector<FailedAttempt>> units_;
 };
 
 // Failures of one worker in one job
@@ -57,7 +59,8 @@ struct WorkerFailures {
   bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
-// The message for the job's owner: unit, pixel, signal, what each worker reported, how to replay it.
+// Returns the error message of a failed job for its owner: unit, pixel, signal, what each worker reported,
+// how to replay it.
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
                              const std::vector<FailedAttempt>& attempts, const std::string& replay);
 

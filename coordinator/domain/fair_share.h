@@ -4,9 +4,9 @@
 // leased units. The user or job with the smallest share goes next (start-time fair queueing, Goyal et al.
 // 1996, with measured instead of declared lengths).
 //
-// A user or job that arrives, or returns after a pause, starts at the share of the one served last: waiting
-// saves up no turns, and having used the farm alone costs none. So if two users both have work for all
-// workers all the time, their shares differ by at most one lease each, plus errors of prediction.
+// A user or job that arrives, or returns after a pause, starts at the share of the one that got the last
+// lease. So waiting saves up no turns, and having used the farm alone costs none. If two users both have work
+// for all workers all the time, their shares differ by at most one lease each, plus errors of prediction.
 //
 // Every operation costs O(log jobs).
 #pragma once
@@ -26,47 +26,53 @@ namespace ls::coordinator {
 
 class FairShare {
  public:
-  // The job has units to lease. True if it had none before. withdraw(): it has none.
+  // offer() says that the job has units to lease, and returns true if it had none before. withdraw() says
+  // that it has none.
   bool offer(Job& job);
   void withdraw(Job& job);
   bool empty() const { return ready_ == 0; }
 
-  // Core seconds that were leased (negative: no longer leased), and core seconds that a result reported.
+  // charge() adds predicted core seconds of units that were leased to the job (negative: no longer leased).
+  // spend() adds core seconds that a result reported.
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
-  // Forgets users and groups that have no work and are not ahead of the clock.
+  // Forgets users and groups that have no work and whose share is not greater than the clock, the share of
+  // the one served last: if they come back, they start at the clock anyway.
   void tidy();
-  // Call before the job's priority changes; the caller offers it again afterwards.
+  // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
+  // seconds of its leases at the new priority. The caller then offers the job again.
   void leave(Job& job);
-  void enter(Job& job);  // with its leased seconds
+  void enter(Job& job);
 
-  // Calls visit(job, lag) for the jobs in turn until it returns true; true if some visit did. lag: how many
-  // core seconds more the job's user has had than the first user, plus how many more the job's group has had
-  // than the user's first group; infinite below the highest priority that has jobs.
+  // Calls visit(job, lag) for the jobs that have units to lease, the next in turn first, until a call returns
+  // true; returns true if one did. `lag` is a number of core seconds: how many more the job's user has had
+  // than the user who is first in turn, plus how many more the job's group has had than the first group of
+  // that user. It is infinite below the highest priority that has jobs.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
-  // The job was chosen: later arrivals start at its share.
+  // The job gets a lease: users and groups that arrive later start at the share that its user and its group
+  // have now.
   void served(const Job& job);
 
   struct Figure {
     std::string owner;
     std::int64_t priority;
     double seconds, leased;
-    bool waits;  // has units to lease
+    bool waits;  // true if one of its jobs has units to lease
   };
   std::vector<Figure> figures() const;
   std::size_t kept() const;  // number of priorities, users and groups remembered
 
  private:
   struct Share {
-    double spent = 0, out = 0;
-    std::uint32_t at_work = 0;  // jobs that are offered or leased
+    double spent = 0, out = 0;  // core seconds that results reported, and those predicted for leased units
+    std::uint32_t at_work = 0;  // number of its jobs that have units to lease or units that are leased
     double had() const { return spent + out; }
   };
   template <class T>
   struct Turn {
     double had;
-    JobSeq first;  // waiting job: ties are decided by order of submission
+    JobSeq first;  // first of its jobs that wait: equal shares are served in order of submission
     T* who;
     bool operator<(const Turn& o) const { return std::tie(had, first) < std::tie(o.had, o.first); }
   };
@@ -78,9 +84,10 @@ class FairShare {
     Share share;
     double clock = 0;  // the share of the group served last
     std::map<std::string, Group> groups;
-    std::set<Turn<Group>> turns;  // groups with ready jobs
+    std::set<Turn<Group>> turns;  // groups that have jobs with units to lease
     std::set<JobSeq> ready;
   };
+  // All users that have jobs of one priority.
   struct Level {
     double clock = 0;
     std::map<std::string, User> users;
@@ -92,10 +99,10 @@ class FairShare {
     Group& group;
   };
   Place place_of(const Job& job);
-  // Applies `change` to user and group, and updates the positions of both in the order.
+  // Applies `change` to the job's user and group, and updates the positions of both in the order of turns.
   template <class Change>
   void change(Job& job, Change&& change);
-  static std::optional<Turn<User>> turn_of(User& user);  // nullopt: it has no ready job
+  static std::optional<Turn<User>> turn_of(User& user);  // nullopt: no job of the user has units to lease
   static std::optional<Turn<Group>> turn_of(Group& group);
   template <class T>
   static void place(std::set<Turn<T>>& turns, const std::optional<Turn<T>>& before,

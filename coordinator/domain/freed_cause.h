@@ -1,4 +1,4 @@
-// Why a unit left a worker's lease without a result.
+// Why a unit (one round of one tile) left a worker's lease without a result.
 #pragma once
 
 #include <string_view>
@@ -10,14 +10,14 @@ enum class FreedCause {
   worker_lost,
   newer_stream,  // the worker has connected again
   deadline_passed,
-  returned,        // by a worker that is draining or could not load the job
-  failed,          // on this worker
-  moved,           // from behind other work of its worker to an idle worker
+  returned,        // the worker returned it, since it is draining or could not load the job
+  failed,          // the worker failed to render it
+  moved,           // it waited behind other work of its worker and is given to an idle worker
   paused,          // the job was paused
-  round_reopened,  // an extension renders it again with more samples
+  round_reopened,  // the job was extended, and the round is rendered again with more samples
   worker_quarantined,
-  not_wanted,  // beyond the round in which its tile ended: not rendered again
-  job_ended    // the job failed or was cancelled: not rendered again
+  not_wanted,  // its tile has ended with an earlier round: it is not rendered again
+  job_ended    // the job failed or was cancelled: it is not rendered again
 };
 inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::worker_lost, "worker lost"},

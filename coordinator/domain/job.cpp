@@ -36,7 +36,8 @@ void Job::move_windows(int farm_threads) {
 
 void Job::move_window(TileIndex tile, int farm_threads) {
   if (!adaptive_running()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
-  // Small images need more rounds in flight to keep a large farm busy.
+  // `busy`: rounds that each tile needs ahead so that all threads of the farm have work. A small image has
+  // few tiles, so it needs more of them.
   const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->predicted_last(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));

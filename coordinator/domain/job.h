@@ -1,4 +1,5 @@
-// A job in the farm. At every moment each of its planned units is done (accepted), leased or queued.
+// A job in the farm. A unit is one round (range of samples) of one tile. At every moment each planned unit of
+// the job is done (its result is accepted), leased to a worker, or queued.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace ls::coordinator {
 using JobSeq = std::uint64_t;    // order of submission
 using LeaseSeq = std::uint64_t;  // order of leasing; 0: no lease
 
-// The leases that hold a unit: one, or two when an idle worker renders a copy
+// The leases that hold a unit: one, or two if an idle worker renders a copy of it
 struct Holders {
   std::array<LeaseSeq, 2> lease{};
   bool full() const { return lease[0] != 0 && lease[1] != 0; }
@@ -33,33 +34,39 @@ struct Holders {
   }
 };
 
-// Units leased at the moment, of a job or of all jobs of a user or group
+// Counts the units that are leased at the moment, of one job or of all jobs of a user or group
 struct Load {
-  std::uint32_t units = 0;                                   // including copies, without audits
-  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // by worker; never 0
+  std::uint32_t units = 0;                                   // copies of units included, audits not
+  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
 };
 
-// An accepted result that another worker renders again. If the second result differs, a third one decides.
+// An audit: another worker renders the unit of an accepted result again. If the second result differs, a
+// third one decides.
 struct Audit {
-  WorkerIndex first = kNoWorker;
+  WorkerIndex first = kNoWorker;  // worker of the accepted result
+  // The second result, if it differs from the accepted one
   std::optional<std::pair<WorkerIndex, Digest>> second;
-  // A differing result that was not requested: no vote, but the reason for the audit
+  // A differing result that nobody asked this worker for. It counts as no vote, but an audit is made because
+  // of it
   std::optional<std::pair<WorkerIndex, Digest>> claim;
-  std::vector<WorkerIndex> tried;  // workers that tried and failed
+  std::vector<WorkerIndex> tried;  // workers that tried to render it for the audit and failed
   TimePoint since{};               // time of the second result, or of the restart
-  bool restored = false;           // begun before a restart
-  LeaseSeq lease = 0;              // under which it is rendered; 0: waiting
+  bool restored = false;           // true if the audit began before a restart
+  LeaseSeq lease = 0;              // lease under which the unit is rendered; 0: it waits for a worker
+  // True if this worker may render the unit for the audit: it has not delivered a result of it or failed at
+  // it.
   bool asks(WorkerIndex worker) const {
     return worker != first && (!second || worker != second->first) && (!claim || worker != claim->first) &&
            std::find(tried.begin(), tried.end(), worker) == tried.end();
   }
 };
 
-// A level of the adaptive stop rule whose image makes a checkpoint as soon as all of it is folded
+// A level of the adaptive stop rule (adaptive_stop.h). A checkpoint is taken of its image as soon as all of
+// it is folded.
 struct LevelMark {
-  std::vector<RoundIndex> rounds;  // by tile
-  double spp = 0;                  // mean over pixels
-  TileIndex missing = 0;           // tiles not folded up to their round yet
+  std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
+  double spp = 0;                  // samples per pixel, mean over all pixels
+  TileIndex missing = 0;           // number of tiles that are not folded that far yet
 };
 
 struct Job {
@@ -67,14 +74,16 @@ struct Job {
 
   JobSeq seq;
   JobPlan plan;
-  std::uint64_t spp;  // the plan's, or kMaxSppWithoutLimit; even
+  std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
-  // The end is decided, but leased or unfolded units are still pending; final once done
+  // Why the job ends. It is set once the last rounds of all tiles are decided, though units of them may still
+  // be leased or not folded. It is final once the job is done
   std::optional<StopReason> stopping;
-  bool frozen = false;  // stopped by time or user: units leased before are still accepted, no others are
+  bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
   std::optional<Digest> numeric_class;
-  std::optional<TimePoint> first_ray;    // shifted by the time that the job has stood still since
-  std::optional<TimePoint> still_since;  // while paused or done its time budget does not run
+  // Start of the job's clock, moved on by the times for which the clock was stopped
+  std::optional<TimePoint> first_ray;
+  std::optional<TimePoint> still_since;  // set while the job is paused or done: its time budget does not run
 
   UnitTable units;
   UnitQueue queue;
@@ -82,20 +91,21 @@ struct Job {
   CostModel cost;
   UnitFailures failures;
   std::map<UnitCode, Audit> audits;
-  std::uint64_t audits_missed = 0;  // chosen, but no other worker of the class was connected
+  // Results chosen for an audit when no other worker of the class was connected
+  std::uint64_t audits_missed = 0;
   VoterTable voters;
   Load load;
   std::uint32_t leased = 0;   // units under all leases, including audits
-  bool has_units = false;     // units to lease, when last checked
-  bool offered = false;       // is in FairShare
-  double charge_out = 0;      // core seconds charged for its leases (fair_share.h)
-  double checkpoint_spp = 0;  // of the last checkpoint of whole rounds
+  bool has_units = false;     // true if it had units to lease when this was last checked
+  bool offered = false;       // true if FairShare counts it among the jobs that have units to lease
+  double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
+  double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
 
-  std::optional<AdaptiveStop> adaptive;  // with a target error
+  std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
   double level_seen = 0;                 // the last level at which the image was judged; 0: none
-  std::deque<LevelMark> marks;           // ascending
-  double marked_spp = 0;                 // of the last mark
-  std::uint64_t predicted_at = 0;        // rounds_seen() at the last call of foresee()
+  std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
+  double marked_spp = 0;        // LevelMark::spp of the last mark made
+  std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
   bool leasable() const { return state == JobState::queued || state == JobState::running; }
@@ -112,20 +122,25 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // The tiles' errors decide where the tiles end, and have not decided yet.
+  // True if the tiles' errors decide where the tiles end, and have not decided yet.
   bool adaptive_running() const { return adaptive && !stopping; }
-  // Starts, drops or re-evaluates the target.
+  // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
+  // image judged again.
   void steer();
+  // Returns the last round of the tile that may be folded now.
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // Sets how far rounds may be leased ahead of the folded ones, for a farm of this many threads.
+  // Sets how far ahead of the folded rounds further rounds may be leased, in a farm whose workers have this
+  // many threads in total.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
-  // Ends each tile after ends[tile] rounds, or earlier if it ends earlier already, and forgets results
-  // accepted beyond. Does nothing if no tile ends earlier than before.
+  // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets results that
+  // were accepted of later rounds. `reason` is why the job ends. Does nothing if no tile ends earlier than
+  // before.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
-  void plan_all();  // every tile ends with the requested samples
+  void plan_all();  // sets every tile's end to the requested samples
+  // Returns the time at which the job's time budget is used up; nullopt: it has none, or no ray yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
   // Call both around a change of state that may stop or start the job's clock.
   void stand_still(TimePoint now);

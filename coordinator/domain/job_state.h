@@ -12,12 +12,13 @@ constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
   return kWords[static_cast<std::size_t>(state)];
 }
-// True for final states; only an extension of a done job leaves them.
+// True for final states. A job leaves one only if it is done and then extended.
 constexpr bool is_terminal(JobState state) {
   return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
 }
 
-// Why a done job went no further. Names in the report: "spp", "error", "time", "user".
+// Why a done job ended: it has its samples per pixel, has reached its target error, has used up its time, or
+// its user stopped it.
 enum class StopReason { spp, error, time, user };
 constexpr std::string_view to_string(StopReason reason) {
   constexpr std::string_view kWords[] = {"spp", "error", "time", "user"};

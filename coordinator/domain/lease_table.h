@@ -1,4 +1,5 @@
-// All leases, oldest first, with their deadlines.
+// All leases, oldest first, with their deadlines. A lease is a list of units (rounds of tiles) that one
+// worker was told to render.
 #pragma once
 
 #include <map>
@@ -14,15 +15,18 @@ struct LeaseRecord {
   LeaseSeq seq = 0;
   Job* job = nullptr;
   Worker* worker = nullptr;
-  // Including finished ones; those still leased have this lease in their Holders
+  // All units of the lease, finished ones included. A unit is still leased if this lease is among its Holders
+  // (job.h)
   std::vector<UnitCode> units;
-  std::uint32_t remaining = 0;
-  std::uint32_t reported = 0;   // units done, from the worker's progress reports
-  double seconds_per_unit = 0;  // predicted CPU seconds, mean over its units
-  double charge_per_unit = 0;   // seconds_per_unit, or kAssumedUnitSeconds if nothing is measured
-  bool audit = false;           // renders one accepted unit again
+  std::uint32_t remaining = 0;  // number of units still leased
+  std::uint32_t reported = 0;   // number of units done, as the worker's progress reports say
+  double seconds_per_unit = 0;  // predicted CPU seconds of a unit, mean over all units of the lease
+  // Core seconds charged to the owner's share: as above, or kAssumedUnitSeconds if nothing is measured
+  double charge_per_unit = 0;
+  bool audit = false;  // true if it holds one unit that is accepted already and is rendered again to compare
   TimePoint issued{};
-  Duration predicted{};  // from `issued` until the last unit is done, including the worker's earlier leases
+  // Predicted time from `issued` until its last unit is done, after the worker's earlier leases
+  Duration predicted{};
   TimePoint deadline{};
 };
 
@@ -36,7 +40,7 @@ class LeaseTable {
   LeaseRecord* find(const LeaseId& id);
   void erase(LeaseSeq seq);
   void renew(LeaseRecord& lease, TimePoint deadline);
-  // The lease with the earliest deadline if that has passed, else null.
+  // Returns the lease with the earliest deadline if that has passed at `now`, else null.
   LeaseRecord* expired(TimePoint now);
 
   std::map<LeaseSeq, LeaseRecord>& all() { return leases_; }

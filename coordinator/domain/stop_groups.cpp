@@ -10,16 +10,17 @@ namespace {
 
 std::int64_t divided_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
 
-// Tiles along one side of the frame, in blocks of `block` tiles; the remainder joins the last block. Only
-// whole tiles form blocks: `whole` is their number, at least 1.
+// One side of the frame: how many tiles it has, and how they form blocks of `block` tiles. `whole` is the
+// number of tiles that are not cut by the frame's edge, at least 1. Only these form blocks; what is left over
+// joins the last block.
 struct Side {
   int tiles, whole, block;
   int blocks() const { return std::max(1, whole / block); }
   int block_of(int tile) const { return std::min(tile / block, blocks() - 1); }
 };
 
-// Blocks of as many tiles as kMinStopPixels need; `across` is a block's extent in the other direction, in
-// pixels.
+// Divides a side of `frame` pixels into blocks of as many tiles (of `tile` pixels) as it takes for a block to
+// have kMinStopPixels pixels. `across` is the block's extent in the other direction, in pixels.
 Side side_of(int frame, int tile, int across) {
   const int whole = std::max(1, frame / tile);
   const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));

@@ -1,7 +1,7 @@
-// Groups of tiles that stop together. A decision to stop that rests on few pixels biases the image, so at
-// least kMinStopPixels decide together: small tiles form blocks, and the remainder at the right and bottom
-// edges joins the neighbouring block. Only an image with fewer pixels than that forms one smaller group.
-// Depends on the tiling alone.
+// Groups of tiles that stop getting samples together (adaptive_stop.h). A decision to stop that rests on few
+// pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form blocks, and
+// the remainder at the right and bottom edges joins the neighbouring block. Only an image of fewer pixels
+// forms one smaller group. The groups depend on the tiling alone.
 #pragma once
 
 #include <vector>

@@ -1,8 +1,9 @@
-// The units of a job that wait for a worker. Each tile has its own end, since the tiles of an adaptive job
-// stop after different numbers of rounds. A tile's waiting units are all rounds from `next` to its end and
-// the earlier ones that came back. Lower rounds go first, so that a complete picture is available early. In
-// an adaptive job some rounds are speculative: they go behind all that are certain, in the order in which the
-// stop rule would come to need them (adaptive_stop.h).
+// The units of a job that wait for a worker; a unit is one round (range of samples) of one tile. Each tile
+// has its own end, since the tiles of an adaptive job (one with a target error) stop after different numbers
+// of rounds. A tile's waiting units are all rounds from `next` to its end, and those earlier ones that were
+// leased and came back without a result. Lower rounds go first, so that a complete picture is available
+// early. In an adaptive job some rounds are speculative: they may turn out not to be needed. They go behind
+// all that are certain, in the order in which the stop rule would come to need them (adaptive_stop.h).
 //
 // Every operation costs O(log tiles) at most, amortised; memory is 20 bytes per tile, 60 if there are
 // speculative units.
@@ -33,9 +34,10 @@ class UnitQueue {
   }
 
   TileIndex tiles() const { return static_cast<TileIndex>(next_.size()); }
-  // Number of rounds of the tile that belong to the job
+  // Returns how many rounds of the tile belong to the job
   RoundIndex end(TileIndex tile) const { return end_[tile]; }
   RoundIndex longest() const { return *std::max_element(end_.begin(), end_.end()); }
+  // True if the unit belongs to the job: its round is before its tile's end.
   bool plans(UnitCode code) const { return round_of(code) < end_[tile_of(code)]; }
   std::uint64_t planned() const { return planned_; }
   void set_end(TileIndex tile, RoundIndex rounds) {
@@ -46,15 +48,15 @@ class UnitQueue {
     forget_from(tile, rounds);
     if (!was_open) offer(tile);
   }
-  // Holds back the tile's rounds from `window` on until the window moves.
+  // Holds back the tile's rounds from number `window` on, until a later call sets a higher one.
   void set_window(TileIndex tile, RoundIndex window) {
     const bool was_open = open(tile);
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // The tile's rounds before `before` are certain to be needed. Later ones are speculative, ordered by the
-  // error that each removes per sample: `variance` (per sample, of the tile's group; NaN: unknown) divided by
-  // the product of the sample counts without and with that round.
+  // Says that the tile's rounds before `before` are certain to be needed. Later ones are speculative and
+  // ordered by the error that each removes per sample: `variance` divided by the product of the sample counts
+  // without and with that round. `variance` is the variance per sample of the tile's group; NaN: unknown.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
     const float weight =
@@ -65,6 +67,7 @@ class UnitQueue {
     counting(tile, [&] { wanted_[tile] = {before, weight}; });
     if (!was_wanted || !wanted(unit_code(next_[tile], tile))) offer(tile);
   }
+  // Says that all rounds of all tiles are certain to be needed.
   void want_all() {
     if (wanted_.empty()) return;
     wanted_.clear();
@@ -77,10 +80,12 @@ class UnitQueue {
     }
   }
   bool wanted(UnitCode code) const { return round_of(code) < wanted_before(tile_of(code)); }
-  // Number of waiting units that are certain to be needed; may include some that were accepted out of turn.
+  // Returns how many waiting units are certain to be needed. May count units that have an accepted result
+  // already, because it arrived before their turn.
   std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
 
-  // Every round of the tile before this one has been leased at least once, or accepted.
+  // Returns the number of the tile's round that is next in order: every earlier round of the tile has been
+  // leased at least once, or accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
   // Makes the tile's rounds from `round` on wait again.
   void rewind(TileIndex tile, RoundIndex round) {
@@ -90,8 +95,9 @@ class UnitQueue {
     offer(tile);
   }
 
-  // Returns the first waiting unit for which `excluded` is false; exclusion applies only to units that came
-  // back. Those go first among the certain units, and first among the speculative ones.
+  // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units go before
+  // speculative ones, and within each of the two those that came back go first. Of the units that came back,
+  // those are skipped for which `excluded` is true; other units are not asked.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -115,28 +121,30 @@ class UnitQueue {
     else
       forget(code);
   }
-  // A leased unit waits again.
+  // Says that a leased unit came back without a result: it waits again.
   void put_back(UnitCode code) {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
       (wanted(code) ? returned_ : returned_perhaps_).insert(code);
   }
-  // A late result arrived for a unit that may be waiting.
+  // Says that a late result arrived for this unit, which may be waiting: it no longer waits.
   void forget(UnitCode code) {
     returned_.erase(code);
     returned_perhaps_.erase(code);
   }
   bool returned(UnitCode code) const { return returned_.contains(code) || returned_perhaps_.contains(code); }
   std::size_t returned_count() const { return returned_.size() + returned_perhaps_.size(); }
-  std::size_t entries() const { return heads_.size() + perhaps_.size(); }  // a measure of memory use
+  // Number of entries in the two heaps, to measure memory use
+  std::size_t entries() const { return heads_.size() + perhaps_.size(); }
 
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // Per tile; unused if no tile is adaptive, where all units are certain.
+  // What set_wanted() said of a tile. Not used while no tile has speculative units.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
   };
+  // A speculative unit, with the error that it removes per sample.
   struct Perhaps {
     float gain;
     UnitCode code;
@@ -212,7 +220,7 @@ class UnitQueue {
   std::uint64_t planned_, surely_;
   std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads_;
   std::priority_queue<Perhaps> perhaps_;
-  std::vector<Wanted> wanted_;  // empty: all units are certain
+  std::vector<Wanted> wanted_;  // by tile; empty: all units are certain
   std::set<UnitCode> returned_, returned_perhaps_;
 };
 

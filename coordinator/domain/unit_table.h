@@ -1,5 +1,6 @@
-// The state of one job's units: accepted results (digest and worker, 36 bytes per unit, allocated round by
-// round as rounds begin) and how far each tile is folded.
+// The state of one job's units; a unit is one round (range of samples) of one tile. For each unit the
+// accepted result is kept (digest and worker, 36 bytes per unit, allocated round by round as rounds begin),
+// and for each tile how many rounds are folded, that is, added to the image.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +13,8 @@
 
 namespace ls::coordinator {
 
-// (round, tile) in one number, ordered as units are rendered: every tile's round 0, then every tile's round
-// 1...
+// A unit as one number, made of its round and tile. Numbers ascend in the order in which units are rendered:
+// every tile's round 0, then every tile's round 1...
 using UnitCode = std::uint64_t;
 constexpr UnitCode unit_code(RoundIndex round, TileIndex tile) { return UnitCode{round} << 32 | tile; }
 constexpr RoundIndex round_of(UnitCode code) { return static_cast<RoundIndex>(code >> 32); }
@@ -34,35 +35,39 @@ class UnitTable {
   TileIndex tiles() const { return tiles_; }
 
   // Accepted results
-  const Result* find(UnitCode code) const;  // null: not accepted
+  const Result* find(UnitCode code) const;  // null: the unit has no accepted result
   bool accepted(UnitCode code) const { return find(code) != nullptr; }
-  void accept(UnitCode code, const Result& result);  // the unit must not be accepted yet
+  void accept(UnitCode code, const Result& result);  // the unit must not have an accepted result yet
   std::uint64_t accepted_count() const { return accepted_count_; }
-  RoundIndex end_of_accepted(TileIndex tile) const;  // one past its last accepted round
-  // Forgets results accepted from `end` on; none of them may be folded
+  // One past the tile's last round that has an accepted result
+  RoundIndex end_of_accepted(TileIndex tile) const;
+  // Forgets the tile's accepted results of rounds from `end` on; none of these may be folded
   void truncate(TileIndex tile, RoundIndex end);
-  void reopen(RoundIndex round);  // forgets round `round`, accepted or folded; no later round may be known
-  // Forgets all results and folds of the tile. Returns the units that were accepted, ascending.
+  // Forgets round `round` of all tiles, accepted or folded; nothing of later rounds may be known
+  void reopen(RoundIndex round);
+  // Forgets all results and folds of the tile. Returns the units that had an accepted result, ascending.
   std::vector<UnitCode> void_tile(TileIndex tile);
-  // Tiles with an accepted result of this worker, ascending
+  // Returns the tiles with an accepted result of this worker, ascending
   std::vector<TileIndex> tiles_of(WorkerIndex worker) const;
   void mark_workers(std::vector<bool>& used) const;  // sets used[worker] for the workers of accepted results
   void forget_results();  // for a failed job: frees the memory, keeps the fold counts
 
   // Folding
 
-  // Returns the tile's next round if it is accepted, below `end` and at most `limit`, and counts it as issued
-  // from now on.
+  // Returns the next round of the tile to be folded if its result is accepted and it is below `end` and at
+  // most `limit`; from then on it counts as issued. Otherwise returns nullopt.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
-  RoundIndex issued(TileIndex tile) const { return issued_[tile]; }  // number of folds requested
-  // False if `round` is not the next issued round to be folded.
+  // Number of rounds whose fold was requested
+  RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
+  // Notes that the tile's round is folded. False, and nothing changes, if it is not the next issued round.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);
   RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
   std::uint64_t folded_count() const { return folded_count_; }
-  RoundIndex rounds_complete() const { return rounds_complete_; }  // rounds folded in all tiles
-  double error(RoundIndex round, TileIndex tile) const;            // NaN: unknown
+  // Number of rounds that are folded in all tiles
+  RoundIndex rounds_complete() const { return rounds_complete_; }
+  double error(RoundIndex round, TileIndex tile) const;  // rel_error_sum after this round; NaN: unknown
 
  private:
   struct Round {

@@ -1,6 +1,7 @@
-// Workers that once held a lease on a unit but did not deliver its accepted result. Only they may vote when
-// results differ (farm_trust.cpp). Bounded: beyond kMaxVoters the entries of the earliest rounds are dropped,
-// and later results of those units are mere claims.
+// Remembers workers that once held a lease on a unit (one round of one tile) but did not deliver its accepted
+// result. If results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is
+// bounded: beyond kMaxVoters the entries of the earliest rounds are dropped, and later results of those units
+// are mere claims, not votes.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-// All known workers: their connection, leases and failures.
+// All known workers: their connection, leases and failures. A unit is one round (range of samples) of one
+// tile; a lease is a list of units that one worker was told to render.
 #pragma once
 
 #include <map>
@@ -17,9 +18,9 @@ namespace ls::coordinator {
 // Why a connected worker gets no work at the moment
 enum class Pause {
   none,
-  silent,   // a deadline passed without a message; until it reports
-  stuck,    // it reports but finishes nothing; until it finishes a unit or is idle
-  returned  // it returned a lease; until the next tick
+  silent,   // the deadline of a lease passed without a message; until the worker reports
+  stuck,    // the worker reports but finishes nothing; until it finishes a unit or is idle
+  returned  // the worker returned a lease; until the next tick
 };
 
 struct Worker {
@@ -29,35 +30,41 @@ struct Worker {
   std::uint64_t epoch = 0;
   Digest numeric_class;
   int threads = 1;
-  std::vector<std::string> tags;     // sorted
-  std::uint64_t memory_bytes = 0;    // 0: unknown
-  std::vector<std::uint64_t> blobs;  // first bytes of the digests that it reports to hold, sorted
-  bool quarantined = false;          // it rendered wrong pixels
+  std::vector<std::string> tags;   // sorted
+  std::uint64_t memory_bytes = 0;  // 0: unknown
+  // head_of() the digests of the blobs that the worker reports to hold, sorted
+  std::vector<std::uint64_t> blobs;
+  bool quarantined = false;  // it rendered wrong pixels
   bool connected = false;
   bool draining = false;
   Pause pause = Pause::none;
   std::optional<TimePoint> unhealthy_since;
   TimePoint lost_at{};
-  TimePoint progress_at{};  // when it last finished something, or began after being idle
+  TimePoint progress_at{};  // when it last finished a unit, or got its first unit after being idle
 
   std::set<LeaseSeq> leases;
-  std::uint32_t units_out = 0;
-  double seconds_out = 0;  // predicted CPU seconds of its leased units
+  std::uint32_t units_out = 0;  // units leased to it
+  double seconds_out = 0;       // predicted CPU seconds of its leased units
   std::uint64_t units_done = 0;
   CoreShare core_share;
-  std::set<JobSeq> briefed;    // jobs whose brief was sent on this stream
-  std::set<JobSeq> warmed_up;  // jobs of which it has finished a unit on this stream: the world is loaded
+  std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent on this stream
+  // Jobs of which it has finished a unit on this stream: it has loaded their world
+  std::set<JobSeq> warmed_up;
   std::map<JobSeq, WorkerFailures> failures;
 
-  // Cores that its threads get together: CPU seconds rendered per second of wall-clock time.
+  // Returns how many cores its threads get together: the CPU seconds that they use per second of wall-clock
+  // time.
   double cores() const { return threads * core_share.get(); }
   double seconds_until_free() const { return seconds_out / cores(); }
+  // True if it holds at least one unit for each of its threads.
   bool saturated() const { return units_out >= static_cast<std::uint32_t>(threads); }
   bool blocked(JobSeq job, TimePoint now) const {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
   }
-  // Wants at least two units per thread; beyond that, up to three leases, or the work of three full ones.
+  // True if the worker should get another lease. It should while it holds fewer than kUnitsAThread units per
+  // thread; beyond that, while it holds fewer than kQueuedLeases leases and its work lasts less than as many
+  // full leases. It never holds more than kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -75,14 +82,17 @@ struct Worker {
 
 class WorkerTable {
  public:
-  // Returns the worker of this id, creating it if unknown. A worker keeps its index over its absences.
+  // Returns the worker of this id, and creates it if it is unknown. A worker keeps its index when it is lost
+  // and comes back.
   Worker& get(const WorkerId& id);
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
-  WorkerIndex index_of(const WorkerId& id);  // for workers that only a record names
+  // Also for workers of which only the id is known, from a stored record
+  WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
-  // Names outlive their workers, since results refer to them; preemptible workers bring new names every hour.
+  // True if it is time for keep_names(). Names outlive their workers, since results refer to them, and
+  // preemptible workers bring new names every hour.
   bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
   std::size_t names() const { return index_.size(); }
   // Forgets all names except those of known workers and of indices marked in `used`, and reuses their
@@ -90,28 +100,28 @@ class WorkerTable {
   void keep_names(std::vector<bool> used);
   std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
-  // Updates wanting_work(); call it after any change to a worker.
+  // Puts the worker into wanting_work() or takes it out; call it after any change to a worker.
   void settle(Worker& worker);
   const std::set<WorkerIndex>& wanting_work() const { return wanting_work_; }
   Worker& at(WorkerIndex index) { return *workers_.at(index); }
 
   const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
-  int threads() const { return threads_; }  // of all connected workers
-  // Cores of all connected workers (threads times core share), up to rounding
+  int threads() const { return threads_; }  // threads of all connected workers
+  // Returns the cores of all connected workers (threads times core share), up to rounding
   double cores() const { return cores_; }
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
-  // Updates its core share (core_share.h)
+  // Adds a measurement to the worker's core share (core_share.h)
   void measured(Worker& worker, double cpu_seconds, double wait_seconds);
   void quarantine(Worker& worker);
-  // Connected workers of the class that are not quarantined
+  // Returns the number of connected workers of this numeric class that are not quarantined
   std::uint32_t of_class(const Digest& numeric_class) const;
 
  private:
   std::vector<WorkerId> ids_;
   std::unordered_map<WorkerId, WorkerIndex> index_;
   std::vector<WorkerIndex> free_;
-  std::size_t kept_ = 0;  // names left by the last keep_names()
+  std::size_t kept_ = 0;  // number of names that the last keep_names() left
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> wanting_work_;
   int threads_ = 0, connected_ = 0;
@@ -119,15 +129,15 @@ class WorkerTable {
   std::map<Digest, std::uint32_t> classes_;
 };
 
-// The first bytes of a digest, as in Worker::blobs
+// Returns the first 8 bytes of a digest, as in Worker::blobs
 std::uint64_t head_of(const Digest& digest);
-// True if the worker has the job's world, or at least its files.
+// True if the worker has loaded the job's world, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
 // True if the worker has the job's numeric class and tags, enough memory, and is not quarantined. Ignores
 // what the worker is doing.
 bool fits(const Job& job, const Worker& worker);
-// True if it also may take units of the job now.
+// True if the worker fits the job and may also take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);
 
 }  // namespace ls::coordinator

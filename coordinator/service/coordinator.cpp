@@ -1,4 +1,4 @@
-// Opening and closing the service, and its threads.
+// Opens and closes the service, and runs its threads.
 #include "coordinator/service/coordinator.h"
 
 #include <fmt/format.h>
@@ -36,7 +36,7 @@ JoinCheck join_check(std::string token) {
 }
 
 namespace {
-// Interval of checks that the blob store answers
+// Time between two checks whether the blob store answers
 constexpr Duration kBlobsLookedAt = std::chrono::seconds(5);
 
 Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options, const std::string& node) {
@@ -48,7 +48,8 @@ Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options
   return open_redis_job_store(std::move(*local), std::move(redis));
 }
 
-// A random audit seed: workers must not be able to predict which results are rendered again.
+// Returns a random number, used as the seed that decides which results are rendered again: workers must not
+// be able to predict it.
 std::uint64_t random_number() {
   std::random_device device;
   return std::uint64_t{device()} << 32 | device();
@@ -133,8 +134,8 @@ void Service::start_threads() {
       [this](const std::stop_token& token) { every(*options_.tick, token, [&] { tick(); }); });
 }
 
-// Accepted results are durable already, and unacknowledged ones are sent again: nothing is flushed here, so a
-// clean shutdown and a crash are the same.
+// Accepted results are durable already, and workers send those again that were not acknowledged. So nothing
+// is flushed here, and after a clean shutdown the state is the same as after a crash.
 Service::~Service() {
   *alive_ = false;
   budget_.close();
@@ -170,7 +171,8 @@ bool Service::ready(std::string* why_not) const {
   return trouble.empty();
 }
 
-// Nobody may request a blob for hours, so the availability of the blob store is checked separately.
+// Checks whether the blob store is available. It may be that nobody requests a blob for hours, so requests
+// alone would not tell.
 void Service::look_at_blobs() {
   const auto answer = blobs_->answers();
   const std::string trouble = answer ? "" : "the store of blobs does not answer: " + answer.error().message;

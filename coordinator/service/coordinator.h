@@ -1,5 +1,6 @@
-// The coordinator without sockets: domain, store and assembler behind one thread-safe object. rpc/ and http/
-// put it on the network; `lightshaft render` uses it in process.
+// The coordinator without sockets: domain (the farm, which decides what is rendered where), store and
+// assembler behind one thread-safe object. rpc/ and http/ put it on the network; `lightshaft render` uses it
+// in process.
 #pragma once
 
 #include <cstdint>
@@ -25,23 +26,25 @@ namespace ls::coordinator {
 class Coordinator {
  public:
   struct Options {
-    std::filesystem::path data;  // empty: everything in memory, nothing survives (`lightshaft render`)
+    std::filesystem::path data;  // empty: everything is in memory and nothing survives (`lightshaft render`)
     // Where jobs are stored: sqlite, or a redis:// address (store/redis/redis_link.h)
     std::string store = "sqlite";
     std::shared_ptr<JobStore> jobs;    // set by tests; null: opened as `store` says
     std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened as `blobs_at` says
-    std::string blobs_at;              // empty: under `data`; else a folder, or an s3:// address
-    // How long a blob is kept that no job needs and nobody requests, and an interrupted upload that does not
-    // grow. nullopt: blobs are kept for good, interrupted uploads for a day.
+    // Where blobs are: empty for a folder under `data`; else a folder, or an s3:// address
+    std::string blobs_at;
+    // How long a blob (file of a scene) is kept that no job needs and nobody requests, and an interrupted
+    // upload that does not grow. nullopt: blobs are kept for good, interrupted uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
     bool shared = false;      // other coordinators use the same store and blobs
     std::string join_token;   // empty: any worker may join
-    JoinCheck may_join;       // if set, replaces the check of join_token
-    bool allow_fake = false;  // workers that invent their pixels may join
+    JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
+    bool allow_fake = false;  // true: workers that make up their pixels may join (for tests)
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that another worker renders again
     std::shared_ptr<const Clock> clock;
-    // Interval of Tick events, raised by a thread of the coordinator; nullopt: the caller calls tick()
+    // Time between two Tick events, which a thread of the coordinator raises. nullopt: there is no such
+    // thread, and the caller calls tick()
     std::optional<Duration> tick;
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
@@ -49,12 +52,14 @@ class Coordinator {
 
   // Jobs
 
-  // With spec.frames the returned id is the sequence's. Functions that change or show a job also accept a
-  // sequence's id; functions on a single image need the id of a frame, frame_job().
+  // If spec.frames is set, the job is a sequence (a job with frames), and the returned id is the sequence's.
+  // Functions that change or show a job also accept a sequence's id; functions on a single image need the id
+  // of a frame, which frame_job() gives.
   virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
   virtual std::vector<JobView> jobs() const = 0;  // a sequence counts as one job; its frames are not listed
   virtual Result<JobView> job(const JobId& id) const = 0;
-  virtual Result<std::string> owner(const JobId& id) const {  // JobView::owner, at less cost
+  // Returns JobView::owner, at less cost than job()
+  virtual Result<std::string> owner(const JobId& id) const {
     const auto view = job(id);
     if (!view) return tl::unexpected(view.error());
     return view->owner;
@@ -75,12 +80,12 @@ class Coordinator {
   virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
   virtual Result<std::string> report_json(const JobId& id) const = 0;
   virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
-  // Path of `name` (image.exr, report.json) of a done job; empty if there is no such file: then use the
-  // functions above.
+  // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if there is no such
+  // file: then use the functions above.
   virtual std::filesystem::path final_file(const JobId&, const std::string&) const { return {}; }
   virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
   virtual Result<std::string> job_log(const JobId& id) const = 0;
-  virtual Result<void> wait(const JobId& id) const = 0;  // until the job is done, failed or cancelled
+  virtual Result<void> wait(const JobId& id) const = 0;  // returns when the job is done, failed or cancelled
 
   // Workers
   virtual std::vector<WorkerView> workers() const = 0;
@@ -102,13 +107,14 @@ class Coordinator {
 
   // Other coordinators (Options::shared)
 
-  // Sets the addresses at which they, workers and clients reach this one: http://HOST:PORT and HOST:PORT.
+  // Tells the other coordinators, workers and clients where they reach this one: http://HOST:PORT and
+  // HOST:PORT (gRPC).
   virtual void announce(const std::string&, const std::string&) {}
   // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
   virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
   virtual AuditFigures audits() const { return {}; }
   virtual FarmFigures figures() const { return {}; }
-  // Reports that a blob that a worker requested is missing or damaged here: the jobs that need it are paused
+  // Says that a worker requested a blob that is missing or damaged here. The jobs that need it are paused
   // until it is available again.
   virtual void blob_missing(const Digest&, const Error&) {}
   virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // counts bytes sent to a worker

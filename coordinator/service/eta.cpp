@@ -12,7 +12,8 @@ struct CoreSeconds {
   std::optional<std::pair<double, double>> ci95;
 };
 
-// nullopt: unknown.
+// Predicts the core seconds that the job still needs; nullopt: unknown. May raise out.progress to what the
+// forecast of the target says.
 std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<const ErrorPoint> points,
                                              Eta& out) {
   const auto known = [](double core) {
@@ -32,15 +33,17 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
-// How long threads idle at the end of a job with a target, in units' times (they then render only units that
-// will be dropped): between 0 and 1 unit until the last needed one is done (Graham 1969: list scheduling
-// takes at most W / P + (1 - 1 / P) u), and as long again until a thread is free for it. If the samples end
-// the job, the number of units is known and they come out even.
+// How long threads wait at the end of a job with a target error, as multiples of a unit's duration (they then
+// render only units that will be dropped). Until the last needed unit is done they wait between 0 and 1 unit
+// (Graham 1969: list scheduling takes at most W / P + (1 - 1 / P) u), and as long again until a thread is
+// free for that unit. If the samples end the job, the number of units is known, and all threads end at about
+// the same time.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
-// Wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one thread, so at
-// most units_at_once cores are busy, and the result is at least the duration of one unit, or of what is left
-// of the last one. `wait`: how long threads wait for the last units, as a share of a unit's duration.
+// Returns the wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one
+// thread, so at most facts.units_at_once cores are busy. The result is at least facts.unit_seconds, the
+// duration of one unit, or `core` if less than that is left. `wait` says how long threads wait for the last
+// units, as a multiple of a unit's duration.
 double seconds_on(double cores, double core, double wait, const EtaInputs& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);

@@ -1,4 +1,5 @@
-// Predicts when a job will be done, from what has been measured so far. No state, no clock.
+// Predicts when a job will be done, from what has been measured so far. It has no state and no clock. A unit
+// is one round (range of samples) of one tile; a worker renders it on one thread.
 #pragma once
 
 #include <optional>
@@ -11,32 +12,33 @@ namespace ls::coordinator {
 
 struct EtaInputs {
   double done = 0;          // fraction of the requested samples, 0 to 1
-  double core_seconds = 0;  // spent so far, as counted in the convergence points
-  // Until the job ends by its samples or, in an adaptive job, by the scheduler's own prediction of the
-  // target; 0: unknown
+  double core_seconds = 0;  // core seconds spent so far, counted as in the convergence points
+  // Predicted core seconds until the job ends. For an adaptive job (one with a target error) this is the
+  // scheduler's own prediction; 0: unknown
   double core_left = 0;
-  double core_to_limit = 0;            // until the sample limit, regardless of the error; 0: unknown
-  std::optional<double> target, time;  // relMSE; seconds since the first ray
-  double elapsed = 0;                  // seconds since the first ray
-  double cores = 0;  // of the threads that work on it, or would: CPU seconds per second of wall-clock time
-  double cores_with_more = 0;  // with more workers; at most `cores` if they would not help
+  double core_to_limit = 0;  // the same until the sample limit, whatever the error; 0: unknown
+  // Target error (relMSE) and time budget (seconds since the first ray), if requested
+  std::optional<double> target, time;
+  double elapsed = 0;          // seconds since the first ray
+  double cores = 0;            // cores that work on it, or would: CPU seconds per second of wall-clock time
+  double cores_with_more = 0;  // the same with more workers; at most `cores` if they would not help
   double unit_seconds = 0;     // mean core seconds of a remaining unit; 0: unknown
-  double units_at_once = 0;    // most units that can be rendered at once, each on one thread; 0: no limit
+  double units_at_once = 0;    // most units that can be rendered at the same time; 0: no limit
 };
 
 struct Eta {
   double progress = 0;
-  std::optional<double> seconds;                  // from now; nullopt: unknown
-  std::optional<std::pair<double, double>> ci95;  // if the target ends the job
+  std::optional<double> seconds;                  // seconds from now until the job is done; nullopt: unknown
+  std::optional<std::pair<double, double>> ci95;  // 95 % interval of `seconds`, if the target ends the job
   std::optional<double> with_more;                // `seconds` with more workers, if that is less
   std::optional<std::pair<double, double>> with_more_ci95;
 };
 
-// The job ends by samples, target or time, whichever comes first. The forecast of the target counts from the
-// last point (convergence.h), minus what has been spent since. Until the first checkpoint, adaptive jobs use
-// the scheduler's own prediction, without an interval. A unit runs on one thread, so few units use few
-// threads, and at the end of a job with a target threads wait for the last units. A forecast's interval is
-// cut at the sample limit.
+// The job ends by samples, target or time, whichever comes first. The core seconds until the target are
+// forecast at the last of `points` (convergence.h); what has been spent since is subtracted. Until the first
+// checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit runs on one
+// thread, few units keep few threads busy, and at the end of a job with a target threads wait for the last
+// units. A forecast's interval is cut at the sample limit.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

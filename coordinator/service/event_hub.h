@@ -1,5 +1,6 @@
-// Publishes events to listeners: numbered, kept in a bounded ring for readers that reconnect, and delivered
-// in order on a separate thread, so that no listener runs under a lock of the service.
+// Publishes events to listeners. Events are numbered and the latest ones are kept, for readers that
+// reconnect. They are delivered in order on a separate thread, so that no listener runs under a lock of the
+// service.
 #pragma once
 
 #include <condition_variable>
@@ -17,14 +18,17 @@ namespace ls::coordinator {
 
 class EventHub {
  public:
-  // Durably reserves the next `count` ids, so that no id is ever used twice, and returns the first of them.
+  // Durably reserves the next `count` ids, so that no id is ever used twice. Returns the number before the
+  // first of them.
   using Reserve = std::function<Result<std::uint64_t>(std::uint64_t count)>;
   explicit EventHub(Reserve reserve);
   ~EventHub();
 
   void publish(std::string type, std::string data, std::string job, std::string owner = {});
-  // Listeners are called from the hub's thread, after publish() returns. Once the handle is destroyed no call
-  // is in progress (unless its own callback destroyed it). The handle may outlive the hub.
+  // Calls `on_event` for every kept event with an id above `after_id`, then for new ones. The calls come from
+  // the hub's thread, after publish() returns. The subscription ends when the returned handle is destroyed.
+  // After that no call is in progress (unless the callback itself destroyed the handle). The handle may
+  // outlive the hub.
   std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event);
   std::uint64_t last_id() const;
 

@@ -10,8 +10,8 @@ namespace {
 
 double pixels_of(const JobView& frame) { return static_cast<double>(frame.size.width) * frame.size.height; }
 
-// Mean over the pixels of all frames that have an estimate. Frames have different seeds, so their estimates
-// are independent: the half-widths of the intervals add in quadrature.
+// Returns the mean error over the pixels of all frames that have an estimate. Frames have different seeds, so
+// their estimates are independent: the half-widths of the intervals add in quadrature.
 std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   double pixels = 0;
   for (const JobView& f : frames)
@@ -30,7 +30,8 @@ std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   return ErrorFigures{std::sqrt(square), relmse, relmse - std::sqrt(below), relmse + std::sqrt(above)};
 }
 
-// The worst convergence status: an untrustworthy frame would disappear in a mean.
+// Returns the worst convergence status of the frames: in a mean, a frame that cannot be trusted would
+// disappear.
 std::optional<ConvergenceStatus> worst_of(std::span<const JobView> frames) {
   std::optional<ConvergenceStatus> worst;
   for (const JobView& f : frames) {
@@ -62,7 +63,7 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   return v;
 }
 
-// The error of the first failed frame; otherwise the reason why the first open frame waits.
+// Returns the error of the first failed frame. If there is none, returns why the first open frame waits.
 std::string trouble_of(std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
@@ -82,8 +83,8 @@ struct WorkLeft {
   std::uint64_t units = 0;
 };
 
-// A frame that has not begun is expected to cost as much as the others, scaled to their full cost by their
-// progress.
+// Predicts the work that is left. A frame that has not begun is expected to cost as much as the others will:
+// their core seconds so far, divided by their progress.
 WorkLeft work_left(std::span<const JobView> frames) {
   double spent = 0, progress = 0;
   WorkLeft out;
@@ -123,7 +124,8 @@ void add_up(JobView& v, std::span<const JobView> frames) {
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
 }
 
-// Cores of the farm that the sequence can use: limited by its number of workers and by one thread per unit.
+// Returns how many cores of the farm the sequence can use. Its number of workers limits them, and so do its
+// units, each of which runs on one thread.
 double cores_for(const JobView& v, const SequenceFacts& facts, std::uint64_t units_left) {
   double cores = facts.cores;
   if (v.max_workers && facts.workers > 0)

@@ -1,4 +1,4 @@
-// A sequence shown as one job: combines the values of its frames. Pure functions.
+// Shows a sequence (a job with frames) as one job, by combining the values of its frames. Pure functions.
 #pragma once
 
 #include <span>
@@ -9,8 +9,9 @@
 
 namespace ls::coordinator {
 
-// While any frame is open: running, unless no frame has begun (queued) or all open frames are paused.
-// Otherwise failed or cancelled if any frame is, else done.
+// Returns the state of the sequence. While any frame is open (not ended), it is running, unless no frame has
+// begun (then it is queued) or all open frames are paused (then it is paused). When all frames have ended, it
+// is failed or cancelled if any frame is, else done.
 JobState sequence_state(std::span<const JobView> frames);
 
 struct SequenceFacts {
@@ -18,12 +19,13 @@ struct SequenceFacts {
   FrameRange range;
   std::vector<std::string> warnings;  // of all frames, without duplicates
   double elapsed_seconds = 0;
-  double cores = 0;  // of the connected workers
-  int workers = 0;   // connected
+  double cores = 0;  // cores of the connected workers
+  int workers = 0;   // number of connected workers
 };
-// `frames`: at least one, ascending. The error is the mean over the pixels of the frames that have one, with
-// an interval as for independent estimates. The cost of the remaining frames is extrapolated from the work
-// done so far; their remaining time assumes as many cores as the sequence's limits and units can keep busy.
+// `frames` has at least one frame, ascending. The error is the mean over the pixels of the frames that have
+// one, with an interval as for independent estimates. The cost of the remaining frames is extrapolated from
+// the work done so far. Their remaining time assumes as many cores as the sequence's limits allow and its
+// units (rounds of tiles) can keep busy.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

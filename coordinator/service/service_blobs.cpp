@@ -1,5 +1,6 @@
-// Jobs that wait for a missing or damaged blob. They are paused, without consequences for units and workers,
-// and resume automatically when the blob is available again, whichever way it arrived.
+// Jobs that wait for a blob (a file of their scene) that is missing or damaged. They are paused; this does
+// not count against units or workers. They resume automatically when the blob is available again, whichever
+// way it arrived.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,8 +18,8 @@ std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
   return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
 }
 
-// Tells the user what to send again: a file can be uploaded, but the scene is stored in our own format, which
-// only a submission makes.
+// Returns a text that tells the user what to send again. A file can be uploaded, but the scene is stored in
+// our own format, which only a submission makes.
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
   return fmt::format(
@@ -71,7 +72,8 @@ void Service::blob_missing(const Digest& digest, const Error& why) {
   });
 }
 
-// Under the lock only digests are collected: looking the blobs up may need the network.
+// Under the lock this only collects the digests of missing blobs. Another thread looks them up, since this
+// may need the network.
 void Service::look_for_missing_locked() {
   if (now() - last_look_ < limits::kMissingBlobLook || looks_.size() > 0) return;
   std::set<Digest> missing_blobs;
@@ -86,7 +88,7 @@ void Service::look_for(const std::set<Digest>& missing_blobs) {
   std::set<Digest> here;
   for (const Digest& digest : missing_blobs) {
     const auto found = blobs_->find(digest);
-    if (!found) break;  // the store is unavailable: until the next lookup
+    if (!found) break;  // the store is unavailable: this is tried again at the next lookup
     if (*found) here.insert(digest);
   }
   if (here.empty()) return;

@@ -1,4 +1,4 @@
-// Changes to jobs by users: every change is checked completely before any part of it is applied.
+// Changes that users make to jobs. Every change is checked completely before any part of it is applied.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ Result<void> Service::become_locked(const EntryPtr& entry, JobState asked) {
       run_locked(JobPaused{id});
     else
       persist_locked(*entry);
-  } else if (entry->finishing) {  // its image could not be written
+  } else if (entry->finishing) {  // its final image could not be written: this is tried again
     entry->finishing = ++last_final_;
     entry->trouble.clear();
     background_writes_.push([this, entry, number = last_final_] { finish(entry, number); });
@@ -155,7 +155,7 @@ Result<void> Service::wake_locked(JobEntry& entry) {
   auto restored = restored_locked(entry, JobState::done);
   if (!restored) return tl::unexpected(restored.error());
   entry.unloaded = false;
-  restoring_ = true;  // replaying folds of a lost film publishes nothing
+  restoring_ = true;  // folds that are replayed because the film is lost publish no events
   run_locked(std::move(*restored));
   restoring_ = false;
   entry.replay_at.clear();
@@ -198,7 +198,7 @@ Result<void> Service::remove(const JobId& id) {
   return {};
 }
 
-// Drops the job from memory after its record has been removed.
+// Drops the job from memory, after its record in the store was removed.
 void Service::drop_locked(const EntryPtr& entry) {
   const JobId id = entry->stored.id;
   entry->removed = true;

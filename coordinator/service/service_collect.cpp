@@ -1,4 +1,5 @@
-// Determines which blobs are needed, and when the others are collected (store/blobs/collected_blobs.h).
+// Finds out which blobs (files of scenes) jobs need, and decides when the others are removed
+// (store/blobs/collected_blobs.h).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +11,12 @@
 namespace ls::coordinator {
 namespace {
 constexpr Duration kLongestPause = std::chrono::hours(1);
-constexpr int kSweepsPerTime = 4;         // so that nothing stays longer than 1.25 times `keep`
-constexpr std::size_t kJobsAtOnce = 256;  // copied under the lock
+constexpr int kSweepsPerTime = 4;  // sweeps per keep_unused: so no blob stays longer than 1.25 times that
+constexpr std::size_t kJobsAtOnce = 256;  // jobs whose blobs are collected under one lock
 }  // namespace
 
-// nullopt: the files of some job are unknown, because its record is damaged.
+// Returns the digests of all blobs that jobs need. nullopt: the files of some job are unknown, because its
+// record is damaged.
 std::optional<std::set<Digest>> Service::needed_blobs() const {
   std::vector<EntryPtr> entries;
   {

@@ -1,4 +1,4 @@
-// Carries out the farm's effects, in order.
+// Carries out the farm's effects (domain/effect.h), in order.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,7 +19,8 @@ void Service::run_locked(Event first) {
     todo.pop_front();
     for (const Effect& effect : farm_.handle(event, now())) carry_out(effect, todo);
   }
-  // Only at the end: the convergence points that a snapshot includes must precede it in the writer's queue.
+  // Snapshots are taken only when all events are handled. A snapshot includes convergence points, and these
+  // must precede it in the writer's queue.
   for (const EntryPtr& entry : std::exchange(folded_, {})) snapshot_if_due_locked(entry);
   for (const JobId& id : farm_.take_changed_audits()) keep_audits_locked(id);
 }
@@ -59,7 +60,7 @@ void Service::on(const UnitsFreed& e, Todo&) {
   }
 }
 
-// The log has the record already; this only starts the job's clock.
+// The result is in the job's log already, so nothing is written here: this only starts the job's clock.
 void Service::on(const RecordUnit& e, Todo&) {
   const auto entry = find_locked(e.unit.job);
   if (!entry) return;
@@ -71,7 +72,8 @@ void Service::on(const RecordUnit& e, Todo&) {
     entry->stored.totals.began_unix = unix_now() - elapsed_locked(*entry);
 }
 
-// From memory, or from the log if the partial arrived before a restart or too many are waiting.
+// Returns the accepted partial (the encoded pixel sums of one unit) that is to be folded. It is read from the
+// log if it is no longer in memory: it arrived before a restart, or too many partials are waiting.
 Result<WaitingPartial> Service::partial_for_locked(JobEntry& entry, const Fold& e) {
   auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
   if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
@@ -96,7 +98,7 @@ void Service::on(const Fold& e, Todo& todo) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // Never fold a wrong pixel: the tile stops and the job waits.
+    // A wrong pixel must never be folded: the tile stops and the job waits.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -155,8 +157,9 @@ void Service::on(const JobPinned& e, Todo& todo) {
   if (!save_pin_locked(*entry)) todo.push_back(JobPaused{e.job});
 }
 
-// After a restart a class that is not stored would be forgotten, and the job could be pinned to another one:
-// until it is stored, the job waits and none of its results is accepted.
+// Stores the numeric class that the job is pinned to, if it is not stored yet. After a restart a class that
+// was not stored would be forgotten, and the job could be pinned to another one. So until it is stored, the
+// job waits and none of its results is accepted.
 Result<void> Service::save_pin_locked(JobEntry& entry) {
   if (!entry.pin_unsaved || persist_locked(entry)) return {};
   entry.trouble =
@@ -164,10 +167,10 @@ Result<void> Service::save_pin_locked(JobEntry& entry) {
   return fail(Errc::unavailable, entry.trouble);
 }
 
-// `done` is published and stored only when the final image is written: see finish().
+// The state `done` is published and stored only when the final image is written: see finish().
 void Service::on(const JobStateChanged& e, Todo&) {
   const auto entry = find_locked(e.job);
-  // A removed job continues elsewhere, or nowhere.
+  // A job that is removed here continues at another coordinator or not at all.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
@@ -211,16 +214,16 @@ void Service::on(const Checkpoint& e, Todo&) {
     if (!compared) compare_locked(entry, e.rounds, error.spp);
     return;
   }
-  // A tile is being rendered again, and the earlier errors of the other tiles are lost: no exact point is
-  // possible.
+  // If the errors are not exact, some tile is being rendered again, and earlier errors of the other tiles are
+  // no longer kept: this checkpoint gets no point.
   if (!exact) return;
   add_point_locked(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
   compare_locked(entry, e.rounds, error.spp);
 }
 
-// The final image of a job that ends by time or cancellation may have more samples than its last checkpoint:
-// the curve gets a last point for it, so that all views agree.
+// If a job ends by time or is cancelled, its final image may have more samples than its last checkpoint. The
+// curve then gets a last point for that image, so that all views agree.
 void Service::end_curve_locked(const EntryPtr& entry) {
   if (!entry->assembly || entry->assembly->film().pixels_without_samples() > 0) return;
   const ImageError error = image_error(entry->assembly->film().error());
@@ -240,7 +243,8 @@ void Service::add_point_locked(const EntryPtr& entry, const ConvergencePoint& po
   });
 }
 
-// Drops points of wrong or lost pixels: checkpoints are taken again as tiles are folded again.
+// Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as tiles are
+// folded again.
 void Service::forget_curve_locked(JobEntry& entry) {
   ++entry.curve;
   entry.stored.totals.doubt.clear();

@@ -1,4 +1,4 @@
-// Counters for /metrics.
+// Fills in the counters that /metrics shows.
 #include "coordinator/service/service_impl.h"
 
 namespace ls::coordinator {

@@ -1,5 +1,5 @@
-// Files of a job written on the writer thread: occasional snapshots, and at the end the final image and
-// report.
+// Writes the files of a job, on the writer thread: now and then a snapshot, and at the end the final image
+// and the report.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,12 +16,12 @@
 namespace ls::coordinator {
 namespace {
 
-// Names the layout of TileError: snapshots are read only by builds with the same one.
+// Returns a name for the layout of TileError: a snapshot is read only by builds that have the same layout.
 std::string snapshot_format() { return fmt::format("1-{}", sizeof(TileError)); }
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
-constexpr TileIndex kTilesAtOnce = 64;  // tiles of a snapshot copied under the lock at once
+constexpr TileIndex kTilesAtOnce = 64;  // tiles of a snapshot that are copied under one lock
 
 class ImageFile final : public ByteSink {
  public:
@@ -70,7 +70,7 @@ CryptomatteManifests Service::cryptomatte_manifests_of(const StoredJob& job) con
   return {};
 }
 
-// All except the digest of the pixels, which takes time.
+// Returns all facts for the report except the digest of the pixels, which takes time.
 ReportFacts Service::facts_locked(const JobEntry& entry) const {
   ReportFacts facts;
   facts.job = entry.stored;
@@ -98,9 +98,9 @@ void Service::snapshot_if_due_locked(const EntryPtr& entry) {
   background_writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while folding continues; folds of a tile after it was copied are repeated after a restart.
-// The convergence points that the snapshot includes must be stored before it: they are in the writer's queue
-// already, so the snapshot is queued behind them.
+// Takes a snapshot while folding continues. What is folded into a tile after it was copied is folded again
+// after a restart. The convergence points that the snapshot includes must be stored before it; they are in
+// the writer's queue already, so the snapshot is queued behind them.
 void Service::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -112,7 +112,7 @@ void Service::take_snapshot(const EntryPtr& entry) {
   background_writes_.push([this, entry, done, before = entry->snapshots,
                            file = std::make_shared<SnapshotFile>(std::move(*file))] {
     std::unique_lock lock(mutex_);
-    // No later one has been written
+    // The snapshot is dropped if the job was removed or a later snapshot has been written meanwhile
     const bool wanted = entry->assembly && !entry->removed && entry->snapshots == before;
     lock.unlock();
     if (!wanted) return done({});
@@ -176,7 +176,7 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   return write_snapshot(entry, folded);
 }
 
-// Returns the number of values that the image cannot represent.
+// Writes the final image. Returns how many values it cannot represent.
 Result<std::uint64_t> Service::write_image(const Film& film, const ReportFacts& facts) {
   auto file = AtomicFile::create(folder(facts.job.id) / "image.exr");
   if (!file) return tl::unexpected(file.error());
@@ -218,7 +218,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
       if (auto done = write_atomically(where / "report.json", bytes_of(coordinator::report_json(facts)));
           !done)
         return done;
-      // Last and required: an extension continues from this snapshot.
+      // The snapshot comes last and must succeed: an extension continues from it.
       return write_snapshot(entry, folded);
     }();
     if (!written) {
@@ -248,7 +248,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   ended_.notify_all();
 }
 
-// For a failed or cancelled job: writes its current image to disk and frees the memory.
+// Writes the current image of a failed or cancelled job to disk and frees its memory.
 void Service::retire(const EntryPtr& entry) {
   if (!on_disk()) return;
   const auto written = write_snapshot_now(entry);
@@ -266,8 +266,8 @@ void Service::retire(const EntryPtr& entry) {
   forget_locked(*entry);
 }
 
-// Unloads the job: only its files and its record remain; the farm's state and the film are freed. Results
-// that still arrive for it are dropped.
+// Unloads an ended job: what the farm knows of it and its film (the image in memory) are freed; only its
+// files and its record remain. Results that still arrive for it are dropped.
 void Service::forget_locked(JobEntry& entry) {
   const auto figures = farm_.job(entry.stored.id);
   if (!on_disk() || !figures || entry.unloaded) return;

@@ -43,39 +43,44 @@ namespace ls::coordinator {
 class SnapshotFile;
 
 inline constexpr const char* kRemovedExtension = ".removed";  // suffix of a removed job's folder
-// Waiting for the disk; above this, results wait, too
+// Writes that wait for the disk; above this number, results wait, too
 inline constexpr std::size_t kMaxBackgroundWrites = 4096;
-inline constexpr std::size_t kMaxLogWrites = 1024;  // above this, log lines are dropped
+// Writes that wait for the disk; above this number, log lines are dropped
+inline constexpr std::size_t kMaxLogWrites = 1024;
 
 struct JobEntry {
   StoredJob stored;
   Digest settings_digest;
   TileGrid grid;
-  std::shared_ptr<PartialLog> log;                // null in memory
-  std::optional<Assembly> assembly;               // nullopt once an ended job is on disk
-  std::optional<ReferenceTiles> reference_tiles;  // only with a reference, while there is an assembly
-  std::optional<ReferenceNoise> reference_noise;  // from the last comparison; nullopt: unknown
+  std::shared_ptr<PartialLog> log;   // file of accepted results; null if the job is only in memory
+  std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
+  // Pictures to compare with the reference, if it has one, while there is an assembly
+  std::optional<ReferenceTiles> reference_tiles;
+  // Noise of the reference, from the last comparison; nullopt: unknown
+  std::optional<ReferenceNoise> reference_noise;
   std::vector<ConvergencePoint> points;
-  // Number of the current curve: points of an older curve (wrong or lost pixels) are dropped
+  // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
+  // dropped
   std::uint64_t curve = 0;
-  bool unloaded = false;        // ended and on disk; the farm has forgotten it
-  bool removed = false;         // by its user; nothing more of it is stored
+  bool unloaded = false;  // true if it has ended and is on disk only: the farm has forgotten it
+  // True if its user removed it, or another coordinator has it: nothing more of it is stored
+  bool removed = false;
   bool pin_unsaved = false;     // its numeric class is not stored yet, so its results cannot be stored either
-  std::string audits;           // open audits, as last written to disk (store/log/audit_file.h)
+  std::string audits;           // its open audits, as they were last written to disk (store/log/audit_file.h)
   std::string broken;           // why it could not be restored at the start
-  std::uint64_t finishing = 0;  // number of the final image being made; 0: none
+  std::uint64_t finishing = 0;  // number of the final image that is being made; 0: none is
   bool snapshot_running = false;
   std::uint64_t snapshots = 0;  // number of snapshots committed; used by the writer thread only
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
-  JobState last_state = JobState::queued;  // as last published
-  std::optional<TimePoint> clock_zero;     // zero of the job's seconds, while it runs
-  std::optional<TimePoint> still_since;    // paused since; its clock stands still
-  double fold_seconds = 0;                 // job seconds at the last fold
-  std::string trouble;                     // why it is waiting
-  // Workers by leased unit, for display
+  JobState last_state = JobState::queued;  // its state when it was last published
+  std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
+  std::optional<TimePoint> still_since;    // since when its clock stands still, because the job is paused
+  double fold_seconds = 0;                 // seconds on the job's clock at the last fold
+  std::string trouble;                     // why the job waits
+  // The workers that each leased unit (tile and round) is leased to, for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
-  // During a restart's replay: job seconds of each durable result
+  // Seconds on the job's clock of each durable result, while a restart replays the results
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
 };
 
@@ -92,9 +97,10 @@ struct Connection {
   Digest numeric_class;
   bool fake = false;
   std::shared_ptr<WorkerSink> sink;
-  bool open = true;                    // guarded by the service's lock
-  std::atomic<bool> held_back{false};  // a result of this worker waits for room; its stream is not read
-  // False once the service is gone; a session may outlive it
+  bool open = true;  // guarded by the service's lock
+  // true: a result of this worker waits for room, and its stream is not read meanwhile
+  std::atomic<bool> held_back{false};
+  // False once the service is gone: a session may outlive the service
   std::shared_ptr<const std::atomic<bool>> service_lives;
   std::optional<std::uint64_t> first_lease;  // number of the first lease assigned over this stream
 };
@@ -166,8 +172,8 @@ class Service final : public Coordinator {
     EntryPtr job;
     UnitHeader expected;
     bool duplicate = false;
-    bool quarantined = false;  // its worker was found faulty meanwhile
-    std::size_t bytes = 0;     // charged to budget_
+    bool quarantined = false;  // true if its worker was found faulty meanwhile
+    std::size_t bytes = 0;     // bytes requested from budget_
     TimePoint at{};            // time of arrival
   };
   struct Checked {
@@ -183,13 +189,14 @@ class Service final : public Coordinator {
 
   // Restart (service_restore.cpp)
   EntryPtr make_entry(StoredJob stored) const;
-  // `missing`: the blobs that the job needs and the store lacks. The job waits for them.
+  // Gives a stored job to the farm again. `missing` lists the blobs that the job needs and the store lacks:
+  // the job waits for them.
   Result<void> take_up_locked(JobEntry& entry, JobState state, const Result<std::vector<BlobRef>>& missing);
   void set_aside_locked(JobEntry& entry, const Error& why);
   bool image_is_lost(const StoredJob& job) const;
   static void begin_again(StoredJob& job);
   bool has_quarantined_locked(const JobEntry& entry) const;
-  // Opens the log and loads the folded image, without the results of quarantined workers.
+  // Opens the job's log and loads its folded image, without the results of quarantined workers.
   Result<void> load_locked(JobEntry& entry);
   void remove_unknown_folders(const std::vector<StoredJob>& jobs) const;
   void remove_leftovers() const;
@@ -211,7 +218,7 @@ class Service final : public Coordinator {
   void leave_sequence_locked(const EntryPtr& entry);
   struct Inheritance {
     JobStore::Inherited job;
-    TimePoint again{};  // earliest next attempt
+    TimePoint again{};  // the job is not tried again before this time
   };
   void take_over(Inheritance inheritance);
   void apply_quarantine_locked(const std::vector<QuarantinedWorker>& workers);
@@ -290,7 +297,7 @@ class Service final : public Coordinator {
   // Final images and snapshots (service_finish.cpp), on the writer thread
   void finish(const EntryPtr& entry, std::uint64_t number);
   void retire(const EntryPtr& entry);
-  struct Folded {  // a cheap copy to use outside the lock
+  struct Folded {  // a copy of the folded image, cheap to make, to use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;
@@ -357,17 +364,19 @@ class Service final : public Coordinator {
   mutable std::condition_variable ended_;
   Farm farm_;
   std::map<JobId, EntryPtr> entries_;
-  std::map<JobId, Sequence> sequences_;    // by sequence id; their frames are in entries_
-  std::vector<JobId> order_;               // in order of submission; a sequence stands for its frames
-  std::set<EntryPtr>* unsaved_ = nullptr;  // while several jobs change together: the jobs to store afterwards
+  std::map<JobId, Sequence> sequences_;  // by sequence id; their frames are in entries_
+  std::vector<JobId> order_;             // in order of submission; a sequence stands for its frames
+  // While several jobs change together: collects the jobs to store afterwards
+  std::set<EntryPtr>* unsaved_ = nullptr;
   std::map<WorkerId, WorkerEntry> workers_;
   std::uint64_t last_epoch_ = 0, last_final_ = 0, submissions_ = 0;
-  // Found, but not stored yet; until then no result may be stored
+  // Faulty workers that are found but not stored yet; until they are, no result may be stored
   std::vector<QuarantinedWorker> quarantined_unsaved_;
-  std::vector<Inheritance> inherited_;  // to be taken over later; guarded by mutex_
-  std::string store_trouble_;           // why the last result could not be stored; empty if it was
-  std::string blobs_trouble_;           // why the blob store is unavailable; empty if it is available
-  std::vector<EntryPtr> folded_;        // jobs of which the events being handled have folded units
+  // Jobs of other coordinators to be taken over later; guarded by mutex_
+  std::vector<Inheritance> inherited_;
+  std::string store_trouble_;     // why the last result could not be stored; empty if it was
+  std::string blobs_trouble_;     // why the blob store is unavailable; empty if it is available
+  std::vector<EntryPtr> folded_;  // jobs of which units were folded by the events that are being handled
   bool restoring_ = false;
   FarmFigures figures_;  // figures() fills in the current values (..._now)
   std::atomic<std::uint64_t> blob_bytes_{0};
@@ -378,13 +387,13 @@ class Service final : public Coordinator {
   WorkQueue<Arrived> arrived_;
   WorkQueue<Checked> checked_;
   WorkQueue<std::function<void()>> background_writes_, comparisons_;
-  // Lookups of missing blobs, on a thread of their own since the blob store may be unavailable
+  // Lookups of missing blobs. They have a thread of their own since the blob store may be unavailable
   WorkQueue<std::set<Digest>> looks_;
   TimePoint last_look_{};
-  std::shared_ptr<const Reference> reference_;  // used by the last comparison
+  std::shared_ptr<const Reference> reference_;  // the reference image that the last comparison used
   Digest reference_digest_;
   std::unique_ptr<EventHub> hub_;
-  // Last member: joined before everything that the threads use is destroyed
+  // This is the last member, so the threads are joined before anything that they use is destroyed
   std::vector<std::jthread> threads_;
 };
 

@@ -1,4 +1,4 @@
-// Jobs: submission and what users do to them.
+// Jobs: how they are submitted, and what users do to them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +11,8 @@
 namespace ls::coordinator {
 namespace {
 
-// `wide`: 64 bits, for a store in which other coordinators make ids, too, and cannot be asked.
+// Returns a random job id of 32 bits; if `wide`, of 64 bits. That is for a store in which other coordinators
+// make ids, too, and cannot be asked which they have used.
 JobId random_job_id(bool wide) {
   std::random_device device;
   return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
@@ -25,7 +26,8 @@ JobId Service::unused_id_locked() const {
   return id;
 }
 
-// Limits a single user, so that it cannot use up all jobs.
+// Returns an error if there is no room for `jobs` more jobs. The limit per user is lower than that for all,
+// so that no single user can use up all jobs.
 Result<void> Service::room_for_locked(const std::string& owner, std::size_t jobs) const {
   if (entries_.size() + jobs > limits::kMaxJobs)
     return fail(Errc::resource_exhausted,

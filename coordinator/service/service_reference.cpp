@@ -1,6 +1,6 @@
-// Jobs with a reference: the picture of every checkpoint is compared with it on a separate thread, since
-// comparing pictures takes longer than summing errors. A job's final image and report wait for its
-// comparisons.
+// Jobs with a reference image. The picture of every checkpoint is compared with the reference on a separate
+// thread, since comparing pictures takes longer than summing errors. A job's final image and report wait for
+// its comparisons.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,11 +13,12 @@
 
 namespace ls::coordinator {
 namespace {
-// Waiting comparisons, each with a picture; above this, checkpoints other than the last go without.
+// Comparisons that may wait, each of which holds a picture. With more, only the last checkpoint of a job is
+// compared
 constexpr std::size_t kMaxComparisons = 64;
 }  // namespace
 
-// Compares the checkpoint just taken, or one from before a restart that has no comparison.
+// Has a checkpoint compared: the one just taken, or one from before a restart that was not compared then.
 void Service::compare_locked(const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp) {
   if (!entry->reference_tiles) return;
   auto tiles = entry->reference_tiles->at(rounds);
@@ -28,7 +29,7 @@ void Service::compare_locked(const EntryPtr& entry, std::span<const RoundIndex> 
   });
 }
 
-// Compares the final image, so that the report is complete.
+// Has the final image compared, so that the report is complete.
 void Service::compare_last_locked(const EntryPtr& entry) {
   if (!entry->reference_tiles || entry->points.empty()) return;
   auto tiles = entry->reference_tiles->latest();
@@ -39,8 +40,8 @@ void Service::compare_last_locked(const EntryPtr& entry) {
 
 namespace {
 
-// FLIP takes about a second per exposure of an HD frame, so it is computed only at doubling samples and at
-// the end.
+// True if FLIP (the perceived error) should be computed for this checkpoint. It takes about a second per
+// exposure of an HD frame, so it is computed only each time the samples have doubled, and at the end.
 bool wants_flip(const std::vector<ConvergencePoint>& points, double spp) {
   return std::none_of(points.begin(), points.end(), [&](const ConvergencePoint& p) {
     return p.reference_error && p.reference_error->flip && p.spp <= spp && spp < 2 * p.spp;
@@ -49,7 +50,8 @@ bool wants_flip(const std::vector<ConvergencePoint>& points, double spp) {
 
 }  // namespace
 
-// Keeps only the reference of the last comparison in memory: waiting jobs cost nothing.
+// Returns the job's reference. Only that of the last comparison is kept in memory: jobs that wait cost
+// nothing.
 std::shared_ptr<const Reference> Service::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;
@@ -95,7 +97,8 @@ void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp,
   });
 }
 
-// Queues `write` behind the job's pending comparisons, if it has a reference.
+// Runs `write` on the writer thread. If the job has a reference, `write` is queued behind the job's
+// comparisons that are still to be made.
 void Service::after_comparisons(const EntryPtr& entry, std::function<void()> write) {
   if (!entry->reference_tiles) return background_writes_.push(std::move(write));
   comparisons_.push([this, write = std::move(write)] { background_writes_.push(write); });

@@ -1,5 +1,5 @@
-// Restart: jobs are read from the store and films from snapshots; later results are folded again from the
-// partial logs.
+// What happens at a restart: jobs are read from the store, and their images from snapshots. Results that are
+// not in the snapshot are folded again from the logs of partials (the encoded results of units).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ Service::EntryPtr Service::make_entry(StoredJob stored) const {
   return entry;
 }
 
-// A job that cannot be restored is reported and left unchanged on disk; the others continue.
+// Restores all jobs. One that cannot be restored is reported and left unchanged on disk; the others continue.
 Result<void> Service::restore() {
   const std::lock_guard lock(mutex_);
   remove_leftovers();
@@ -99,8 +99,8 @@ Result<void> Service::load_locked(JobEntry& entry) {
     entry.log = std::move(*log);
   }
   load_folded(entry);
-  // The snapshot may be older than the discovery that a worker is faulty: fold everything again from the
-  // others' results.
+  // The snapshot may be older than the discovery that a worker is faulty. So everything is folded again from
+  // the results of the other workers.
   if (has_quarantined_locked(entry))
     entry.assembly.emplace(entry.grid, entry.stored.spec.target_error.has_value(),
                            aovs_of(entry.stored.settings));
@@ -115,14 +115,16 @@ bool Service::has_quarantined_locked(const JobEntry& entry) const {
                      [&](const PartialLog::Entry& e) { return farm_.quarantined(e.record.worker); });
 }
 
-// True if a done job's image is gone: a record in Redis can outlive the disk with the pixels.
+// True if a done job's image is gone, which can happen if a record in Redis outlives the disk with the
+// pixels.
 bool Service::image_is_lost(const StoredJob& job) const {
-  std::error_code unknown;  // a folder that cannot be read is not lost
+  std::error_code unknown;  // set if the folder cannot be read: then the image does not count as lost
   return on_disk() && !job.damaged && job.state == JobState::done &&
          !std::filesystem::exists(folder(job.id) / "image.exr", unknown) && !unknown;
 }
 
-// The same samples give the same bits, so only time is lost.
+// Resets a job whose image is lost, so that it is rendered again. The same samples give the same bits, so
+// only time is lost.
 void Service::begin_again(StoredJob& job) {
   log_warn(fmt::format("job={}", job.id.value), "its image is not in --data any more: it is rendered again");
   job.state = JobState::queued;
@@ -138,7 +140,7 @@ void Service::set_aside_locked(JobEntry& entry, const Error& why) {
                 "the job could not be taken up: {}; repair this and restart the coordinator, or delete "
                 "the job",
                 why.message);
-  entry.stored.state = JobState::failed;  // as shown; the stored record stays unchanged
+  entry.stored.state = JobState::failed;  // this is what is shown; the record in the store stays unchanged
   entry.stored.error = entry.broken;
   entry.unloaded = true;
   entry.assembly.reset();
@@ -158,8 +160,8 @@ void Service::remove_leftovers() const {
   for (const auto& path : left) std::filesystem::remove_all(path, error);
 }
 
-// With a shared store: removes what is left of jobs that other coordinators have taken over. A finished image
-// stays.
+// If other coordinators share the store, removes what is left here of jobs that they have taken over. A
+// finished image stays.
 void Service::remove_unknown_folders(const std::vector<StoredJob>& jobs) const {
   if (!on_disk() || !options_.shared) return;
   std::set<std::string> known;
@@ -194,8 +196,8 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // Full ranges are identified by their code alone, since there may be millions; truncated ones by code and
-  // end.
+  // Which units have been seen. Units of full rounds are identified by their code alone, since there may be
+  // millions; those of truncated rounds by code and end of their sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());
@@ -213,7 +215,7 @@ void Service::take_up_records(JobEntry& entry, JobRestored& event) {
     if (record.tile >= entry.grid.count() || !first_of(record)) continue;
     const bool folded = record.round < event.folded[record.tile];
     if (!folded && record.samples == cut_range(record.round, spp)) {
-      // A result that cannot be read is not accepted: it is rendered again, to the same bits.
+      // A result that cannot be read does not count as accepted: it is rendered again, to the same bits.
       if (const auto readable = entry.log->read(place); !readable) {
         log_warn(fmt::format("job={} tile={} round={}", entry.stored.id.value, record.tile, record.round),
                  readable.error().message);

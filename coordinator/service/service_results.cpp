@@ -1,5 +1,5 @@
-// The path of a result: verified on its own, made durable together with others, then reported to the farm and
-// acknowledged.
+// The path of a result: each is verified by itself, made durable together with others, then reported to the
+// farm and acknowledged to its worker.
 #include <fmt/format.h>
 
 #include <set>
@@ -13,8 +13,8 @@
 namespace ls::coordinator {
 
 namespace {
-// Clamps the worker's numbers: their sums go into records that must be readable, so implausible values count
-// as 0. Values that are not numbers are rejected with the result (verify_result).
+// Sets implausible times that the worker reports to 0: their sums go into records that must stay readable.
+// Values that are not numbers are rejected with the result (verify_result).
 void drop_impossible_times(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
   for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
@@ -23,7 +23,8 @@ void drop_impossible_times(UnitResult& result) {
 }
 }  // namespace
 
-// Calls `next` when another message may come: this one was dropped, or there is room for it.
+// Takes a result. Calls `next` when the worker's next message may come: when this result was dropped, or when
+// there is room for it.
 void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult result,
                              std::function<void()> next) {
   failpoint("result-arrived");
@@ -51,8 +52,8 @@ void Service::receive_result(const std::shared_ptr<Connection>& from, UnitResult
                         wanted.samples};
     arrived.duplicate = wanted.verdict == Wanted::Verdict::duplicate;
   }
-  // Bytes of the message and of its decoded floats. Without room only this stream is held back; no thread
-  // blocks.
+  // The bytes of the message and of the floats decoded from it. If there is no room for them, only this
+  // worker's stream is held back; no thread blocks.
   arrived.bytes = 2 * arrived.result.exr.size();
   const std::size_t bytes = arrived.bytes;
   arrived.from->held_back = true;
@@ -82,8 +83,8 @@ void Service::commit_loop(const std::stop_token& token) {
   }
 }
 
-// All waiting results share one sync per file: under load a batch grows while the disk works, so a result
-// waits for at most two syncs.
+// Makes a batch of results durable, with one sync for each log file. Under load a batch grows while the disk
+// works on the one before, so a result waits for at most two syncs.
 void Service::commit(std::vector<Checked> batch) {
   struct Stored {
     std::optional<PartialLog::Place> place;
@@ -97,7 +98,8 @@ void Service::commit(std::vector<Checked> batch) {
     const std::lock_guard lock(mutex_);
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const Arrived& a = batch[i].arrived;
-      // A copy of a unit accepted meanwhile need not be stored; the farm compares its digest.
+      // If the unit has an accepted result meanwhile, this further one need not be stored; the farm compares
+      // its digest.
       batch[i].arrived.duplicate = farm_.wanted(a.result.unit).verdict != Wanted::Verdict::yes;
       batch[i].arrived.quarantined = farm_.quarantined(a.from->worker);
       // Pinning to a fake worker's class marks the job as fake; this does so whatever class the worker names.
@@ -144,7 +146,7 @@ void Service::commit(std::vector<Checked> batch) {
     else
       accept_locked(item, stored[i].place);
   }
-  lock.unlock();  // requests granted now may continue at once, on this thread
+  lock.unlock();  // requests that release() grants may continue on this thread, before it returns
   for (const Checked& item : batch) budget_.release(item.arrived.bytes);
 }
 
@@ -177,7 +179,8 @@ void Service::accept_locked(Checked& item, std::optional<PartialLog::Place> plac
   acknowledge_locked(a, std::nullopt);
 }
 
-// Presumably the worker's fault: counts as a failure of the unit and the worker.
+// Handles a result that failed verification. This is presumably the worker's fault: it counts as a failure of
+// the unit and the worker.
 void Service::refuse_locked(const Arrived& a, const Error& error) {
   const UnitKey& unit = a.result.unit;
   ++figures_.refused;
@@ -193,8 +196,8 @@ void Service::refuse_locked(const Arrived& a, const Error& error) {
   acknowledge_locked(a, error);
 }
 
-// The coordinator's fault: the unit is returned and the job waits for a person, instead of rendering for a
-// full disk.
+// Handles a result that could not be stored. This is the coordinator's fault: the unit waits again, and the
+// job is paused until a person resumes it. Otherwise workers would render for a full disk.
 void Service::cannot_store_locked(const Arrived& a, const Error& error) {
   const UnitKey& unit = a.result.unit;
   ++figures_.not_stored;

@@ -1,6 +1,6 @@
-// Sequences: one job per frame, each named by frame_job() and otherwise like any other job. This file
-// creates, changes and removes the jobs of a sequence together. Only their ids make them a sequence: nothing
-// else is stored that could be lost.
+// Sequences (jobs with frames): each frame is a job of its own, named by frame_job() and otherwise like any
+// other job. This file creates, changes and removes the jobs of a sequence together. Only their ids make them
+// a sequence: nothing else is stored that could be lost.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ double pixels_of(const StoredJob& job) {
   return static_cast<double>(job.settings.size.width) * job.settings.size.height;
 }
 
-// Checks that done frames with this many pixels in total can be resumed at once.
+// Checks that done frames with this many pixels in total may be resumed together.
 Result<void> may_wake(double pixels) {
   if (pixels <= static_cast<double>(limits::kMaxWokenPixels)) return {};
   return fail(Errc::failed_precondition,
@@ -80,7 +80,7 @@ tl::expected<JobId, Rejected> Service::submit_sequence(const SubmitRequest& requ
   return id;
 }
 
-// Registers a job; a frame joins its sequence, which is listed where its first frame was.
+// Registers a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
 void Service::register_locked(const EntryPtr& entry) {
   const JobId& id = entry->stored.id;
   entries_.emplace(id, entry);
@@ -104,7 +104,8 @@ void Service::publish_sequence_locked(const JobId& id, bool at_once) {
   const auto found = sequences_.find(id);
   if (found == sequences_.end() || restoring_) return;
   Sequence& sequence = found->second;
-  at_once &= sequence.frames.size() <= limits::kFramesPerEvent;  // otherwise with the next tick
+  // A longer sequence is published with the next tick instead
+  at_once &= sequence.frames.size() <= limits::kFramesPerEvent;
   const double period = limits::kProgressSeconds * (1 + static_cast<double>(sequence.frames.size()) /
                                                             static_cast<double>(limits::kFramesPerEvent));
   sequence.progress_due = !at_once && seconds(now() - sequence.last_progress) < period;
@@ -116,7 +117,8 @@ void Service::publish_sequence_locked(const JobId& id, bool at_once) {
 
 // Changes
 
-// All in one transaction, or nothing is changed.
+// Applies `edit` to the stored jobs of all frames in one transaction: either all are stored or nothing is
+// changed.
 Result<void> Service::edit_locked(const std::vector<EntryPtr>& frames,
                                   const std::function<void(StoredJob&)>& edit) {
   std::vector<StoredJob> edited;
@@ -129,11 +131,11 @@ Result<void> Service::edit_locked(const std::vector<EntryPtr>& frames,
   return {};
 }
 
-// As for a single job: everything is checked before anything is applied. Ended frames change only for more
-// samples.
+// Changes a sequence. As for a single job, everything is checked before anything is applied. Frames that have
+// ended change only if they are to get more samples.
 Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& sequence,
                                              const JobChange& change) {
-  std::vector<EntryPtr> sound, open, retargeted, extended;  // unreadable records are left out
+  std::vector<EntryPtr> sound, open, retargeted, extended;  // `sound`: frames whose record can be read
   for (const EntryPtr& frame : sequence.frames) {
     if (!frame->broken.empty()) continue;
     sound.push_back(frame);
@@ -181,7 +183,8 @@ Result<void> Service::change_sequence_locked(const JobId& id, const Sequence& se
   return {};
 }
 
-// The frames whose end is not decided yet, and those that a larger target has ended.
+// Returns the frames that a new target error concerns: those whose end is not decided yet, and those that
+// ended because they reached a larger target.
 Result<std::vector<Service::EntryPtr>> Service::may_retarget_locked(const JobId& id,
                                                                     const std::vector<EntryPtr>& sound,
                                                                     double target_error) const {
@@ -208,7 +211,7 @@ Result<std::vector<Service::EntryPtr>> Service::may_retarget_locked(const JobId&
   return chosen;
 }
 
-// All frames except those that have that many samples already, as after an interrupted change.
+// Returns all frames except those that have `spp` samples already, as after a change that was interrupted.
 Result<std::vector<Service::EntryPtr>> Service::may_extend_locked(const Sequence& sequence,
                                                                   std::uint64_t spp) const {
   std::vector<EntryPtr> chosen;
@@ -233,7 +236,8 @@ Result<std::vector<Service::EntryPtr>> Service::may_extend_locked(const Sequence
   return chosen;
 }
 
-// Stores all jobs that `changes` modifies in one transaction: a sequence may have thousands of frames.
+// Calls `changes` and then stores all jobs that it has modified, in one transaction: a sequence may have
+// thousands of frames.
 Result<void> Service::save_all_locked(const std::function<void()>& changes) {
   std::set<EntryPtr> unsaved;
   unsaved_ = &unsaved;
@@ -248,8 +252,8 @@ Result<void> Service::save_all_locked(const std::function<void()>& changes) {
   return put;
 }
 
-// Stores their new states together. A frame whose image is being written is left to end, unless the writing
-// failed and is to be repeated.
+// Changes the state of the frames and stores them together. A frame whose image is being written is left to
+// end, unless the writing has failed and is to be repeated.
 Result<void> Service::become_all_locked(const std::vector<EntryPtr>& frames, JobState asked) {
   Result<void> done;
   const auto saved = save_all_locked([&] {
@@ -262,7 +266,8 @@ Result<void> Service::become_all_locked(const std::vector<EntryPtr>& frames, Job
   return done ? saved : done;
 }
 
-// As for a single job: open frames are cancelled and kept; an ended sequence is removed with all frames.
+// Removes a sequence. As for a single job, open frames are cancelled and kept; a sequence that has ended is
+// removed with all its frames.
 Result<void> Service::remove_sequence_locked(const JobId& id, const Sequence& sequence) {
   std::vector<EntryPtr> open;
   std::vector<JobId> ids;

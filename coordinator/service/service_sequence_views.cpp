@@ -49,7 +49,8 @@ JobView Service::sequence_view_locked(const JobId& id, const Sequence& sequence,
   return view;
 }
 
-// Values of every frame, and of all together. Frames without results have no pixel digest.
+// Returns the report of a sequence as JSON: values of every frame, and of all together. Frames without
+// results have no pixel digest.
 Result<std::string> Service::sequence_report(const JobId& id) const {
   JobView view;
   {
@@ -143,7 +144,8 @@ Result<std::string> Service::sequence_report(const JobId& id) const {
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-// The log lines of all frames by time; the oldest beyond kLogLinesKept are left out.
+// Returns the log lines of all frames, by time. If there are more than kLogLinesKept, the oldest are left
+// out.
 Result<std::string> Service::sequence_log(const JobId& id) const {
   std::vector<std::pair<JobId, std::uint32_t>> frames;
   {

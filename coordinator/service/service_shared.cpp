@@ -8,14 +8,16 @@
 
 namespace ls::coordinator {
 namespace {
-constexpr Duration kTakeOverPause = std::chrono::seconds(5);  // after the blob store did not answer
-}
+// Time until a job is tried again for which the blob store did not answer
+constexpr Duration kTakeOverPause = std::chrono::seconds(5);
+}  // namespace
 
 void Service::announce(const std::string& http, const std::string& grpc) { store_->announce(http, grpc); }
 
 Result<std::optional<JobLocation>> Service::locate_job(const JobId& id) { return store_->locate_job(id); }
 
-// The changes are applied on the writer thread, after earlier writes of these jobs.
+// Takes over jobs of coordinators that are gone, and drops those that another coordinator owns now. Both
+// happen on the writer thread, after earlier writes of these jobs.
 void Service::look_for_moved_jobs() {
   if (!options_.shared) return;
   JobStore::Moved moved = store_->moved();
@@ -35,7 +37,8 @@ void Service::look_for_moved_jobs() {
     background_writes_.push([this, one = std::move(one)] { take_over(one); });
 }
 
-// Drops a job that another coordinator owns now. Its record there must not be touched.
+// Drops a job that another coordinator owns now. The job's record in the store belongs to that one and must
+// not be touched.
 void Service::let_go(const JobId& id) {
   {
     const std::lock_guard lock(mutex_);
@@ -74,7 +77,7 @@ void Service::leave_sequence_locked(const EntryPtr& entry) {
 
 void Service::take_over(Inheritance inheritance) {
   StoredJob job = inheritance.job.job;
-  // Without the lock: the blob store may need the network.
+  // This is done without the lock, since the blob store may need the network.
   const auto missing = missing_blobs_of(job);
   if (!missing) {
     log_warn(fmt::format("job={}", job.id.value),
@@ -86,7 +89,7 @@ void Service::take_over(Inheritance inheritance) {
   }
   const std::lock_guard lock(mutex_);
   if (entries_.contains(job.id)) return;
-  if (on_disk()) {  // local files are from an earlier ownership and outdated
+  if (on_disk()) {  // local files are of a time when this coordinator owned the job before: they are outdated
     std::error_code error;
     std::filesystem::remove_all(folder(job.id), error);
   }

@@ -1,4 +1,4 @@
-// Public views.
+// Makes the views: what clients see of jobs, tiles and workers (views/job_view.h).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -37,16 +37,16 @@ Result<std::string> Service::owner(const JobId& id) const {
   const auto sequence = sequences_.find(id);
   if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;
   if (const auto entry = find_locked(id)) return entry->stored.owner;
-  // A frame that does not exist belongs to the owner of its sequence, who then gets an error that names the
-  // frames.
+  // The id may be that of a frame that does not exist, of a sequence that does. Its owner is that of the
+  // sequence, who then gets an error that names the frames.
   const auto frame = frame_of(id);
   const auto of = frame ? sequences_.find(frame->sequence) : sequences_.end();
   if (of != sequences_.end()) return of->second.frames.front()->stored.owner;
   return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
 }
 
-// Fails for a job that could not be restored at the start: only the reason is known, and it can only be
-// removed.
+// Returns the job, or an error if it could not be restored at the start: then only the reason is known, and
+// the job can only be removed.
 Result<Service::EntryPtr> Service::usable_locked(const JobId& id) const {
   auto entry = entry_locked(id);
   if (entry && !(*entry)->broken.empty()) return fail(Errc::failed_precondition, (*entry)->broken);
@@ -54,19 +54,20 @@ Result<Service::EntryPtr> Service::usable_locked(const JobId& id) const {
 }
 
 JobState Service::shown_state(const JobEntry& entry) const {
-  return entry.stored.state;  // stays `running` until finish() has written the image
+  return entry.stored.state;  // this stays `running` until finish() has written the final image
 }
 
 namespace {
 
 double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
 
-// Progress by samples, not units: units of late rounds have many times the samples of the first ones.
+// Returns the progress of a job with a number of samples, from 0 to 1. It counts samples, not units: units of
+// late rounds have many times the samples of the first ones.
 double done_of(const StoredJob& job, double spp_done) {
   return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
 }
 
-// Derives convergence status, trend and efficiency from the curve.
+// Sets the convergence status, trend and efficiency of `v` from its curve.
 void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::string& doubt) {
   const std::vector<ErrorPoint> points = error_points(all, !v.reference_same_seed);
   v.convergence_status = judge(points, doubt);
@@ -77,7 +78,7 @@ void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::
 
 }  // namespace
 
-// `v` must have the times and the samples so far.
+// Predicts when the job is done. `v` must have its times and its samples so far already.
 Eta Service::eta_locked(const JobEntry& entry, const JobFigures& figures, const JobView& v) const {
   const StoredJob& job = entry.stored;
   EtaInputs facts;
@@ -188,7 +189,8 @@ Result<JobView> Service::job(const JobId& id) const {
   return view_locked(**entry);
 }
 
-// The current film, copied under the lock or read from disk without it.
+// Returns the job's current film (its image) and facts. The film is copied under the lock, or read from disk
+// without the lock.
 Result<Service::Picture> Service::picture(const JobId& id) const {
   std::unique_lock lock(mutex_);
   const auto entry = usable_locked(id);

@@ -1,4 +1,4 @@
-// Workers: registration, messages, departure.
+// Workers: how they join, what messages they send, and how they leave.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class Session final : public WorkerSession {
       : service_(service), connection_(std::move(connection)) {}
   ~Session() override { disconnected(); }
   void receive(FromWorker message) override {
-    // Blocks until there is room or the coordinator ends (then the promise is broken).
+    // This blocks until there is room or the coordinator ends (then the promise is broken).
     auto room = std::make_shared<std::promise<void>>();
     const auto granted = room->get_future();
     receive(std::move(message), [room = std::move(room)] { room->set_value(); });
@@ -72,15 +72,15 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// A client that names an id gets the stream of that worker, so that it can continue after a broken
-// connection: therefore ids must not be guessable.
+// Makes the id of a new worker. A client that names an id gets the stream of that worker, so that the worker
+// can continue after a broken connection. Therefore ids must not be guessable.
 std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
   std::random_device device;
   const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
   return fmt::format("w-{:x}-{:x}-{:012x}", start, number, secret);
 }
 
-// Returns n of "PREFIX-n"; nullopt for a lease of another start.
+// Returns n of a lease id "PREFIX-n"; nullopt if the lease is of another start of the coordinator.
 std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& prefix) {
   const std::size_t dash = prefix.size();
   if (!id.value.starts_with(prefix) || id.value.size() <= dash || id.value[dash] != '-') return std::nullopt;
@@ -99,7 +99,8 @@ Result<std::unique_ptr<WorkerSession>> Service::connect(const WorkerHello& hello
   const std::lock_guard lock(mutex_);
   WorkerId id = hello.previous_id;
   const auto known = workers_.find(id);
-  // An id from a copied folder belongs to the worker that already uses it.
+  // The worker may have its id from a copied folder. Then the id stays with the worker that uses it already,
+  // and this one gets a new id.
   const bool taken = known != workers_.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken) id.value = new_worker_id(start_, last_epoch_ & 0xffffffff);
   if (workers_.size() >= limits::kMaxWorkers && !workers_.contains(id))
@@ -163,7 +164,8 @@ void Service::receive_locked(const std::shared_ptr<Connection>& from, FromWorker
                         [](const WorkerHello&) {},  // handled by connect(); a second one is rejected earlier
                         [&](const WorkerProgress& m) { on_message_locked(from, m); },
                         [&](const UnitFailure& m) {
-                          // First, so that the worker does not mistake it for the answer to its next attempt.
+                          // The acknowledgement goes first, so that the worker does not take it for the
+                          // answer to its next attempt.
                           from->sink->send(ResultAck{m.unit, std::nullopt});
                           if (!find_locked(m.unit.job)) return;  // no log for a job that does not exist
                           log_job(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
@@ -187,7 +189,8 @@ void Service::on_message_locked(const std::shared_ptr<Connection>& from, const W
     totals.peak_rss_bytes = std::max(totals.peak_rss_bytes, m.rss_bytes);
     if (m.load_seconds < 1e9) totals.load_seconds = std::max(totals.load_seconds, m.load_seconds);
   }
-  // Leases of an earlier stream were given to others when that stream broke.
+  // The worker may still report leases of an earlier stream; their units went to others when that stream
+  // broke.
   for (const auto& lease : m.leases) {
     const auto n = lease_number(lease.lease, lease_prefix());
     const bool ours = n && from->first_lease && *n >= *from->first_lease;
@@ -237,9 +240,9 @@ void Service::on(const WorkerBlocked& e, Todo&) {
   log_job(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
-// Stored apart from the jobs, and for longer: nothing of this worker is accepted after a restart, or in jobs
-// that are extended then. Until it is stored every job waits, since a restart would accept the worker's
-// results in the log.
+// A faulty worker is stored apart from the jobs, and for longer: none of its results is accepted after a
+// restart, or in jobs that are extended then. Until it is stored every job waits, since a restart would
+// accept the worker's results that are in the log.
 void Service::on(const WorkerFoundFaulty& e, Todo& todo) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

@@ -7,7 +7,8 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::string_view kMark = "-frame";  // in no other id: those are "j-" and hexadecimal digits
+// Cannot be part of any other id: those are "j-" and hexadecimal digits
+constexpr std::string_view kMark = "-frame";
 
 }  // namespace
 
@@ -22,7 +23,7 @@ std::optional<FrameId> frame_of(const JobId& job) {
   FrameId id{{job.value.substr(0, at)}, 0};
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), id.frame);
   const bool whole = error == std::errc{} && end == digits.data() + digits.size();
-  // Only the canonical form counts: "-frame07" is no frame.
+  // Only the form that frame_job() writes counts: "-frame07" is no frame.
   if (!whole || id.frame > kMaxFrameNumber || frame_job(id.sequence, id.frame) != job) return std::nullopt;
   return id;
 }

@@ -1,4 +1,5 @@
-// Public views of jobs, frames, tiles and workers, and the changes that a user may request of a job.
+// Views: what clients see of jobs, frames, tiles and workers. Also the changes that a user may request of a
+// job.
 #pragma once
 
 #include <cstdint>
@@ -21,36 +22,39 @@
 
 namespace ls::coordinator {
 
-inline constexpr int kMoreWorkers = 8;  // for JobView::eta_with_more
+inline constexpr int kMoreWorkers = 8;  // workers that JobView::eta_with_more adds
 
-struct ErrorFigures {  // of the image folded up to one complete round in all tiles
+struct ErrorFigures {  // estimated errors of the image that was folded up to one complete round in all tiles
   double rmse = 0;
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  double rmse_lo = 0, rmse_hi = 0;      // both 0: unknown, stored by a version without them
+  double rmse_lo = 0, rmse_hi = 0;      // both are 0 if unknown: a version without them stored the error
 };
-// Error against a reference, the reference's own noise subtracted (common/image/reference/reference.h)
+// Error against a reference image, from which the reference's own noise is subtracted
+// (common/image/reference/reference.h)
 struct ReferenceError {
   double rmse = 0, relmse = 0;
-  std::optional<double> flip;  // mean HDR-FLIP (common/image/reference/flip.h); at doubling samples only
+  // Mean HDR-FLIP (common/image/reference/flip.h); computed when the samples have doubled, and at the end
+  std::optional<double> flip;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};
-  // True if the error is too small to be distinguished from the reference's own noise; this is shown instead
-  // of it.
+  // True if the error is too small to be distinguished from the reference's own noise. Clients then show this
+  // fact instead of the error.
   bool rmse_below_noise() const { return below_noise(rmse * rmse, mse_stderr); }
   bool relmse_below_noise() const { return below_noise(relmse, relmse_stderr); }
   bool operator==(const ReferenceError&) const = default;
 };
 struct ConvergencePoint {
-  double seconds = 0;       // since the first ray
-  double core_seconds = 0;  // CPU time of workers
+  double seconds = 0;       // seconds since the first ray
+  double core_seconds = 0;  // CPU seconds of workers for these samples
   double spp = 0;
   ErrorFigures error;
-  // nullopt: the job has no reference, the comparison is not finished, or the coordinator restarted during
-  // the checkpoint
+  // nullopt: the job has no reference, the comparison is not finished, or the coordinator was restarted
+  // during the checkpoint
   std::optional<ReferenceError> reference_error = {};
 };
 
-// Sequences: jobs with frames. Every frame is a job, too; its id is made of the sequence's id and its number.
+// A sequence is a job with frames. Every frame is a job, too; its id is made of the sequence's id and the
+// frame's number.
 struct FrameId {
   JobId sequence;
   std::uint32_t frame = 0;
@@ -71,25 +75,26 @@ struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
   std::uint32_t current = 0;   // the frame to show: the first that is being rendered, or has been
-  std::vector<FrameView> all;  // ascending; filled by Coordinator::job() only
+  std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
 
 struct JobView {
   JobId id;
-  std::string name;  // scene file name, for display
-  // User whose token submitted it; empty: the administrator, or submitted before there were users
+  std::string name;  // name of the scene file, for display
+  // The user whose token submitted it. Empty: the administrator, or it was submitted before there were users
   std::string owner;
   JobState state = JobState::queued;
-  std::string stopped;                 // "spp", "error", "time", "user" once done
-  double progress = 0;                 // 0..1
-  std::uint64_t spp = 0;               // requested, or the limit
-  bool spp_asked = true;               // false: its target or its time ends it
-  std::optional<double> target_error;  // relMSE, requested
-  double spp_done = 0;                 // mean over pixels
+  std::string stopped;    // "spp", "error", "time", "user" once done
+  double progress = 0;    // 0..1
+  std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
+  bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
+  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
+  double spp_done = 0;                 // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
-  std::optional<ReferenceError> reference_error;  // of the last checkpoint that has one
-  // Reference and image share scene and seed, hence noise: reference_error means nothing (see same_noise()
-  // there)
+  // At the last checkpoint that was compared with the reference
+  std::optional<ReferenceError> reference_error;
+  // True if the reference and the image share scene and seed. Then they share their noise as well, and
+  // reference_error means nothing (see same_noise() there)
   bool reference_same_seed = false;
   std::optional<ConvergenceStatus> convergence_status;  // nullopt: no samples yet
   std::optional<std::uint64_t> few_hits;                // pixels with few hits in the current image
@@ -97,35 +102,40 @@ struct JobView {
   std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
   std::optional<std::uint64_t> pixels_without_samples;  // in the current image; nullopt: unknown
   std::optional<double> eta_seconds;
-  std::optional<std::pair<double, double>> eta_ci95;  // if an error target ends the job
-  std::optional<double> eta_with_more;                // with kMoreWorkers more workers like the present ones
-  std::optional<std::pair<double, double>> eta_with_more_ci95;  // as eta_ci95
-  std::string error;                                            // why it failed
-  std::vector<std::string> warnings;                            // of the scene
+  // 95 % interval of eta_seconds, if an error target ends the job
+  std::optional<std::pair<double, double>> eta_ci95;
+  // eta_seconds if kMoreWorkers more workers like the present ones joined
+  std::optional<double> eta_with_more;
+  // Interval of eta_with_more, if an error target ends the job
+  std::optional<std::pair<double, double>> eta_with_more_ci95;
+  std::string error;                  // why it failed, or why it waits
+  std::vector<std::string> warnings;  // warnings about the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
   std::optional<std::uint32_t> max_workers, max_units;  // requested
-  std::uint64_t memory_bytes = 0;                       // the least a worker needs
+  std::uint64_t memory_bytes = 0;                       // the least memory that a worker needs for it
   std::uint64_t units_done = 0, units_total = 0;
-  double queued_core_seconds = 0;  // predicted for units that wait for a worker; 0: nothing measured yet
+  // Predicted CPU seconds of units that wait for a worker; 0: nothing measured yet
+  double queued_core_seconds = 0;
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
-  double submitted_unix = 0;      // wall clock, for display
-  Health health;                  // of the folded units; for a sequence only the totals
-  std::vector<HealthNote> notes;  // the same in words; empty: no problems
-  bool fake = false;              // fake workers invent its pixels; for a sequence: those of any frame
-  // Only for a sequence; its other values combine all frames: sums, means over pixels, and elapsed_seconds
-  // from the first ray of any frame to the last fold.
+  double submitted_unix = 0;  // time of submission by the wall clock, for display
+  Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
+  std::vector<HealthNote> notes;  // the same as sentences for people; empty: no problems
+  bool fake = false;  // true if fake workers made up its pixels; of a sequence: those of any frame
+  // Set only for a sequence. Its other values combine all frames: they are sums or means over pixels, and
+  // elapsed_seconds counts from the first ray of any frame to the last fold.
   std::optional<FramesView> frames;
 };
 
-// Changes to a job requested by a user. Either all are applied or, if any is rejected, none.
+// Changes that a user requests of a job. Either all are applied or, if any is rejected, none.
 struct JobChange {
-  std::optional<JobState> state;  // paused, running or cancelled
+  std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
-  std::optional<std::uint64_t> spp;  // the new total
-  // Only for a job that has one and was not stopped for another reason; a smaller target resumes it
+  std::optional<std::uint64_t> spp;  // the new total of samples per pixel
+  // The new target error; only for a job that has one and was not stopped for another reason. A smaller
+  // target resumes a job that reached the larger one
   std::optional<double> target_error;
 };
 
@@ -134,7 +144,7 @@ struct TileView {
   PixelRect rect;
   RoundIndex rounds_folded = 0;
   std::uint64_t spp = 0;
-  std::optional<double> relmse;      // estimated; nullopt: no samples yet
+  std::optional<double> relmse;      // estimated error of the tile; nullopt: it has no samples yet
   std::vector<std::string> workers;  // names of the workers rendering it now
 };
 
@@ -143,7 +153,7 @@ struct WorkerView {
   std::string name;
   std::string build;
   Digest numeric_class;
-  bool fake = false;  // renders nothing and invents its pixels
+  bool fake = false;  // a fake worker (for tests) renders nothing and makes up its pixels
   int threads = 1;
   std::vector<std::string> tags;
   std::string state;     // "connected", "draining", "lost", "sick"
@@ -152,8 +162,8 @@ struct WorkerView {
   std::uint64_t units_done = 0;
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
-  std::uint64_t memory_bytes = 0;  // that it may use; 0: unknown
-  double last_seen_seconds = 0;    // seconds ago
+  std::uint64_t memory_bytes = 0;  // memory that it may use; 0: unknown
+  double last_seen_seconds = 0;    // seconds since its last message
 };
 
 // An event of the event stream. `data` is JSON. Ids increase by one and survive restarts.
@@ -161,9 +171,10 @@ struct StreamEvent {
   std::uint64_t id = 0;
   std::string type;  // "job", "tile", "worker"
   std::string data;
-  // Job that a `job` or `tile` event is about; empty: about no single job, sent to every reader
+  // The job that a `job` or `tile` event is about. Empty: the event is about no single job and is sent to
+  // every reader
   std::string job;
-  std::string owner = {};  // of that job; for a `worker` event: of the job it works on
+  std::string owner = {};  // owner of that job; for a `worker` event: of the job that the worker works on
 };
 
 }  // namespace ls::coordinator

@@ -18,7 +18,7 @@ struct SubmitRequest {
   // The files that the scene may name; their blobs must be in the store
   std::map<std::string, Digest> assets;
   JobSpec spec;
-  std::string owner = {};  // JobView::owner
+  std::string owner = {};  // the user who submits it: JobView::owner
 };
 struct Rejected {
   Error error;

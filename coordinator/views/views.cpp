@@ -15,7 +15,7 @@ json pair_or_null(const std::optional<std::pair<double, double>>& v) {
   return v ? json{number(v->first), number(v->second)} : json();
 }
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
-// Names come from users: invalid UTF-8 is replaced.
+// Writes `j` as text. Names in it come from users, so invalid UTF-8 is replaced.
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 json to_value(const FramesView& v) {

@@ -1,4 +1,5 @@
-// The coordinator's two ends of one worker's stream, and the check whether a worker may join.
+// A worker's stream as the coordinator sees it: the end that it sends to (WorkerSink) and the end that it
+// receives from (WorkerSession). Also the check whether a worker may join.
 #pragma once
 
 #include <functional>
@@ -10,7 +11,8 @@
 
 namespace ls::coordinator {
 
-// Sends messages to one worker. Called from any thread; must not block and must not call back.
+// Sends messages to one worker. The functions are called from any thread; they must not block and must not
+// call back into the coordinator.
 class WorkerSink {
  public:
   virtual ~WorkerSink() = default;
@@ -18,13 +20,13 @@ class WorkerSink {
   virtual void close() = 0;
 };
 
-// One registered stream. After disconnected() nothing more is sent to its sink.
+// The stream of one worker that has joined. After disconnected() nothing more is sent to its sink.
 class WorkerSession {
  public:
   virtual ~WorkerSession() = default;
   virtual void receive(FromWorker message) = 0;
-  // Without blocking: `next` is called when there is room for another message, at once or later on another
-  // thread; never if the coordinator closes first.
+  // Takes a message without blocking. `next` is called when there is room for another message: during this
+  // call, or later on another thread. It is never called if the coordinator closes first.
   virtual void receive(FromWorker message, std::function<void()> next) {
     receive(std::move(message));
     next();
@@ -32,9 +34,9 @@ class WorkerSession {
   virtual void disconnected() = 0;
 };
 
-// True if a worker with this token may join. Called from any thread; must not block.
+// A function that returns true if a worker with this token may join. Called from any thread; must not block.
 using JoinCheck = std::function<bool(std::string_view token)>;
-// Checks against one token; an empty token admits every worker.
+// Returns a check that admits workers with this token; if the token is empty, it admits every worker.
 JoinCheck join_check(std::string token);
 
 }  // namespace ls::coordinator

@@ -1,4 +1,4 @@
-// Checks of the farm's invariants.
+// Farm::audit(), which checks the farm's invariants, and Farm::sizes().
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -69,7 +69,7 @@ std::string audit_load(const std::string& whose, const Load& kept, const Load& c
   return "";
 }
 
-// What is leased of each job, group and user, according to the leases
+// Units and charges of each job, group and user, added up anew from the leases
 struct Leased {
   std::map<JobSeq, Load> jobs;
   std::map<std::string, Load> users, groups;
@@ -96,7 +96,7 @@ std::string audit_job_load(const Job& job, Leased& leased, const ShareLimits& li
   const double charge = leased.charges[job.seq];
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
     return fmt::format("{}: charged with {} s, leased {} s", name, job.charge_out, charge);
-  const bool alone = plan.group.empty();  // otherwise the limits are the group's
+  const bool alone = plan.group.empty();  // a job in a group has no limits of its own: they are the group's
   return audit_load(name, job.load, leased.jobs[job.seq],
                     alone ? tighter(plan.max_units, limits.units_per_job) : 0,
                     alone ? tighter(plan.max_workers, limits.workers_per_job) : 0);
@@ -172,8 +172,8 @@ std::string Farm::audit() const {
   if (wrong.empty())
     wrong = audit_loads("group", state.groups, leased.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
-  // The table adds and subtracts as workers come, go and are measured: each time it loses about 2^-52 of the
-  // farm's threads to rounding.
+  // The table of workers keeps `cores` by adding and subtracting as workers come, go and are measured: each
+  // time it loses about 2^-52 of the farm's threads to rounding.
   if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }

@@ -1,4 +1,4 @@
-// Changes by the user: samples and target error of a job.
+// Changes that a user makes to a job: its samples and its target error.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -41,7 +41,8 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   if (job.state == JobState::failed || job.state == JobState::cancelled)
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
-  // The current total: if the job's end is decided, what its tiles end with, else what was requested.
+  // now_spp is the job's current total of samples per pixel. If the job's end was decided by something else
+  // than its samples, that is what its longest tile ends with; otherwise it is what was requested.
   const RoundIndex rounds = job.queue.longest();
   const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
   const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;
@@ -122,7 +123,7 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
 
 void Farm::State::take_up_again(Job& job) {
   work_appeared = true;
-  // Results of quarantined workers were kept while the job was ended: its image stood. Now they are void.
+  // While the job was ended its image stood, so results of quarantined workers were kept. Now they are void.
   for (const auto& [worker, why] : quarantined)
     if (const WorkerIndex faulty = workers.index_of(worker); !job.units.tiles_of(faulty).empty())
       void_results(job, faulty);

@@ -29,7 +29,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // It may be offered already, for an audit that not every worker can do
+  // The job may be offered already, because of an audit that not every worker can do
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -52,7 +52,8 @@ void Farm::State::on(const JobRestored& event) {
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return;
 
-  // If the film of a done job is lost, its tiles' ends are unknown: it is folded again from its results.
+  // If the film (the folded image) of a done job is lost, it is unknown where its tiles ended: the film is
+  // folded again from the job's results.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
@@ -101,8 +102,8 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
-  // Leases being rendered are finished; the others come back at once. The last first, since a lease waits
-  // behind earlier ones.
+  // Leases that are being rendered are finished; the others are taken back now. The last one goes first:
+  // whether a lease has begun depends on the earlier ones of its worker.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
@@ -134,8 +135,8 @@ void Farm::State::on(const JobPriority& event) {
   refresh(*job);
 }
 
-// The workers' failures in it stay on record until forgiven: a worker that fails in two jobs is unhealthy,
-// even if the first job is gone.
+// Forgets the job, but not what workers failed in it; that stays on record until it is forgiven. A worker
+// that fails in two jobs is unhealthy, even if the first job is gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
@@ -154,7 +155,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // Including results that a target held back
+  // This also folds results that the target error held back
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -162,7 +163,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
 
 void Farm::State::finish_if_complete(Job& job) {
   if (job.ended() || !job.complete()) return;
-  // Audits must end first: they decide whether the image is right
+  // Open audits must end first: they decide whether the image is right
   if (!job.audits.empty()) return refresh(job);
   if (!job.stopping) job.stopping = StopReason::spp;
   set_state(job, JobState::done);

@@ -1,4 +1,5 @@
-// Leasing units and taking them back: only here do leases, holders and a worker's load change.
+// Leases units to workers and takes them back. Only here does it change which leases exist, which of them
+// hold a unit, and what a worker has to do.
 #include <algorithm>
 #include <limits>
 

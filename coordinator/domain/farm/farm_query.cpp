@@ -1,4 +1,4 @@
-// Read-only queries.
+// Queries of the farm; none of them changes it.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -78,7 +78,8 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.rounds_complete = job->units.rounds_complete();
   f.priority = job->plan.priority;
   f.seconds_per_sample = job->cost.per_sample();
-  // A complete round covers every pixel; rounds in progress count by their share of units.
+  // Samples are counted over all pixels. A round of which some units are missing counts by the share of its
+  // units that are undone, as if all tiles had the same size.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());

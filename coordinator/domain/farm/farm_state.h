@@ -1,5 +1,6 @@
-// The state of the farm. Handlers are grouped by subject into farm_jobs, farm_changes, farm_workers,
-// farm_units, farm_leases, schedule, farm_stop and farm_trust.
+// The state of the farm, and what it does on each event. The functions are grouped by subject into the files
+// farm_jobs, farm_changes, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
+// is one round (range of samples) of one tile; a lease is a list of units that one worker was told to render.
 #pragma once
 
 #include <functional>
@@ -16,7 +17,7 @@
 
 namespace ls::coordinator {
 
-// The smaller of two limits, where 0 means no limit
+// Returns the smaller of two limits, where 0 means no limit
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
 
 struct Farm::State {
@@ -29,18 +30,20 @@ struct Farm::State {
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
   FairShare shares;                    // the jobs with units to lease, and their order
-  std::map<std::string, Load> users;   // by owner; without the administrator
-  std::map<std::string, Load> groups;  // by group
+  std::map<std::string, Load> users;   // units leased of each owner; without the administrator
+  std::map<std::string, Load> groups;  // units leased of each sequence (JobPlan::group)
   std::map<WorkerId, std::string> quarantined;
   AuditFigures audited;
   std::set<JobId> audits_changed;
 
   // State of the event being handled
   TimePoint now{};
-  TimePoint ticked{};  // time of the last Tick: blocks are forgiven at ticks, when all workers are checked
+  // Time of the last Tick. Whether a worker is still blocked is decided by this time, since blocks are
+  // forgiven at ticks, when all workers are checked
+  TimePoint ticked{};
   std::vector<Effect> effects;
-  bool work_appeared = false;   // there may be new units for any worker
-  std::set<WorkerIndex> dirty;  // workers that may want more work
+  bool work_appeared = false;   // there may be units that any worker could take now
+  std::set<WorkerIndex> dirty;  // workers that may want more work, since something about them has changed
 
   // farm_jobs.cpp, farm_changes.cpp
   void on(const JobSubmitted& event);
@@ -56,11 +59,12 @@ struct Farm::State {
   static Result<void> may_retarget(const Job& job, double target_error);
   static Result<void> may_extend(const Job& job, std::uint64_t spp);
   void reopen(Job& job, RoundIndex last);  // renders the truncated last round again in full
-  void take_up_again(Job& job);            // resumes a job that had an end, with a new one
+  void take_up_again(Job& job);            // resumes a job after its samples or its target were changed
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
-  void refresh(Job& job);  // offers or withdraws the job; call after any change of its queue, state or window
+  // Tells FairShare whether the job has units to lease; call after any change of its queue, state or window
+  void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
   void finish_if_complete(Job& job);
@@ -81,32 +85,36 @@ struct Farm::State {
   void note_progress(Worker& worker);  // the worker has finished a unit
   void expire_leases();
   void forgive_and_forget();
-  void forget_names();  // of workers that are gone and that no job refers to
+  void forget_names();  // forgets names of workers that are gone and that no job refers to
 
   // farm_units.cpp
   void on(const UnitAccepted& event);
   void on(const UnitFolded& event);
   void on(const UnitFailed& event);
-  void charge(Job& job, double cpu_seconds);  // to its owner's share
+  void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
   void issue_folds(Job& job, TileIndex tile);
   void checkpoint(Job& job, RoundIndex round);
 
   // farm_trust.cpp: audits and faulty workers
-  void compare(Job& job, UnitCode code, const UnitAccepted& event);  // with the accepted result
+
+  // Compares a further result of a unit with the accepted one
+  void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void restore_audits(Job& job, const JobRestored& event);
   void consider_audit(Job& job, UnitCode code, WorkerIndex first);
-  // The audit that this worker may do; nullopt if there is none.
+  // Returns an audit of the job that this worker may do; nullopt if there is none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
-  // True if the worker's result of this unit counts as a vote.
+  // True if this worker was told to render this unit, so that its result counts as a vote.
   bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;
   void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
+  // Which workers could render the unit of an audit: none; only workers that are connected but get no work
+  // now (away); or one that may begin (there).
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
-  void settle_audits(Job& job);  // drops or decides the audits that no worker can do
+  void settle_audits(Job& job);  // drops the open audits that no worker can do, or decides them
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
@@ -117,16 +125,17 @@ struct Farm::State {
 
   // farm_stop.cpp
 
-  // Passes the error of a folded round to the stop rule and acts on its decision.
+  // Tells the stop rule the error of the tile after this round, which has just been folded, and acts on its
+  // decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  void judge(Job& job);  // at every level that all groups have reached
+  void judge(Job& job);  // judges the image at every level that all groups have reached
   void mark_level(Job& job, bool last);
-  void take_marks(Job& job);  // emits checkpoints for the marks that are folded
+  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) that is folded
   void stop_at_level(Job& job);
-  // Shortly before the time limit: decides the last round of each tile from measured unit costs.
+  // Decides the last round of each tile from measured unit costs; called shortly before the job's time limit.
   void plan_end(Job& job, TimePoint limit);
   void give_back_beyond(Job& job);  // takes back units leased beyond the tiles' ends
-  // The lease under which the worker holds the unit; null: none
+  // Returns the lease under which the worker holds the unit; null: it does not
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
@@ -134,18 +143,20 @@ struct Farm::State {
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  void leave_load(Job& job, const Worker& worker);  // one lease less
-  // Number of the job's units that the limits still allow the worker. Audits are exempt: the farm orders
-  // them, not the user, and an audit that waited for the user's other work would delay the end of a finished
-  // job.
+  void leave_load(Job& job, const Worker& worker);  // counts one lease of the job less for the worker
+  // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
+  // Audits are exempt: the farm orders them, not the user, and an audit that waited for the user's other work
+  // would delay the end of a finished job.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
-  // Removes the unit from the lease without queueing it. True if no other lease holds it.
+  // Removes the unit from the lease without queueing it. True if no other lease holds the unit.
   bool detach(LeaseRecord& lease, UnitCode code);
-  // Removes the unit from all leases because its result arrived (from `by`).
+  // Removes the unit from all leases because its result arrived. `by` is the worker that delivered it, null
+  // if unknown.
   void settle_unit(Job& job, UnitCode code, const Worker* by);
-  // Queues the lease's units for which `which` is true again; an empty lease ends.
+  // Takes those units of the lease for which `which` is true from the worker and queues them again. A lease
+  // without units ends. `send_worker`: the worker is told so.
   template <class Which>
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
@@ -157,23 +168,24 @@ struct Farm::State {
   void dispatch();
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
-  Job* choose(const Worker& worker);  // the next job for this worker
+  Job* choose(const Worker& worker);  // the job that this worker gets units of next; null: none
   enum class Takes { nothing, later, now };
   Takes takes(Job& job, const Worker& worker);
   bool may_pin(const Job& job, const Worker& worker) const;
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
-  // True if a speculative unit should wait: the worker, with `units` and `cost` more than it holds, is not
-  // nearly idle.
+  // True if the unit is speculative and the worker should not get it yet, because it still has enough to do.
+  // `units` and `cost` (predicted CPU seconds) are what the lease being made adds to what the worker holds.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
+  // True if a connected worker other than `but` may take units of the job and has not failed on this one.
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
-  // At a job's tail: moves units that wait behind other work of their worker to an idle one. True if units
-  // were queued again.
+  // Near the end of a job: takes a lease that waits behind other work of its worker away from it, so that an
+  // idle worker can have its units. True if units were queued again.
   bool take_back_for_idle();
-  bool untouched(const LeaseRecord& lease) const;  // its worker is busy with earlier leases
+  bool untouched(const LeaseRecord& lease) const;  // true if its worker is still busy with earlier leases
   double waits_behind_others(const LeaseRecord& lease) const;
   LeaseRecord* longest_waiting_for(const Worker& idle);
-  void copy_overdue(Worker& worker);  // speculative copies at the tail
+  void copy_overdue(Worker& worker);  // near the end of a job: leases copies of overdue units to the worker
 };
 
 template <class Which>

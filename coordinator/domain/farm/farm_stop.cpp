@@ -1,5 +1,5 @@
-// Stopping by target error (feeds the stop rule, judges its levels, takes their checkpoints) and by time
-// limit.
+// How a job ends by its target error or by its time limit. For the error, this file passes errors to the stop
+// rule (adaptive_stop.h), judges its levels and takes their checkpoints.
 #include <algorithm>
 
 #include "coordinator/domain/farm/farm_state.h"
@@ -59,7 +59,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Folds issued so far cannot be taken back: they may be more than the level needs if the target was raised.
+  // Folds that were requested cannot be taken back. If the target was raised, they may be more than the level
+  // needs.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
@@ -67,11 +68,11 @@ void Farm::State::stop_at_level(Job& job) {
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
 }
 
-// Decides which units are still rendered before the time limit. Units wait in the order of rounds; as many
-// are kept as their predicted cost fits into the time of all cores that leased units leave. A unit is kept if
-// at least half of it fits, so the job ends as often before the limit as after it. Leased units stay leased,
-// however long they take: dropping slow units would bias the image. Repeated until the limit, since
-// predictions improve.
+// Decides which units are still rendered before the time limit. Queued units are looked at in the order of
+// rounds, and kept as long as there is time for their predicted cost: the time of all cores until the limit,
+// minus what the leased units need. A unit is kept if at least half of it fits, so the job ends as often
+// before the limit as after it. Leased units stay leased, however long they take: dropping slow units would
+// bias the image. This is repeated until the limit, since predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {

@@ -1,7 +1,8 @@
-// Audits: detection of faulty workers. A random share of the results is rendered again by another worker;
-// copies of slow units are compared, too. Only workers that held a lease on a unit may vote on it
-// (voter_table.h). If two results of a unit differ, a third worker decides, and the outvoted one is
-// quarantined: every tile that it has contributed to, in any running job, is folded again from round 0.
+// Audits detect faulty workers. A random share of the accepted results is rendered again by another worker,
+// and the two results are compared; so are copies that were leased because a unit was slow. Only workers that
+// held a lease on a unit may vote on it (voter_table.h). If two results of a unit differ, a third worker
+// decides, and the outvoted one is quarantined: every tile that it has contributed to, in any running job, is
+// folded again from round 0.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 namespace ls::coordinator {
 namespace {
 
-// A pseudo-random 64-bit number (splitmix64, Steele et al. 2014).
+// Returns a pseudo-random 64-bit number that depends on x alone (splitmix64, Steele et al. 2014).
 std::uint64_t mixed(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15u;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -167,7 +168,7 @@ void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool
   const WorkerIndex by = workers.index_of(with.worker);
   if (found == job.audits.end() || by == first.worker) return;
   const Audit audit = found->second;
-  // The worker has delivered another digest before.
+  // Has this worker delivered another digest of this unit before? Then it is faulty.
   for (const auto& before : {audit.second, audit.claim})
     if (before && by == before->first)
       return found_faulty(with.unit, by, contradiction(with, before->second));
@@ -214,9 +215,9 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
-// A worker that delivers a differing result without having been asked has chosen the unit itself, so its
-// result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the
-// claimant is faulty.
+// Handles a differing result that nobody asked this worker for. The worker has chosen the unit itself, so its
+// result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the worker
+// that made the claim is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair claimed{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {

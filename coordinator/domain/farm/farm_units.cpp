@@ -1,4 +1,5 @@
-// Results and failures of units, folding, and the end of a job.
+// What the farm does with results and failures of units (rounds of tiles) and when they are folded, and how a
+// job fails.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -64,7 +65,7 @@ void Farm::State::on(const UnitFolded& event) {
   Job* job = find(event.unit.job);
   if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
-  if (event.samples != job->range(code)) return;  // a truncated round that was reopened since
+  if (event.samples != job->range(code)) return;  // the round was truncated and has been reopened since
   const RoundIndex before = job->units.rounds_complete();
   if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
   for (RoundIndex r = before; r < job->units.rounds_complete(); ++r) checkpoint(*job, r);
@@ -73,10 +74,12 @@ void Farm::State::on(const UnitFolded& event) {
   if (job->units.rounds_complete() != before) refresh(*job);
 }
 
-// In an adaptive job, checkpoints are taken after the rounds that all tiles get; after these, at levels.
+// Takes a checkpoint after a round that is folded in all tiles. In an adaptive job (one with a target error)
+// this holds only for the rounds that all tiles get for certain; later checkpoints are taken at levels of the
+// stop rule.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   const double spp = static_cast<double>(cut_range(round, job.spp).s1);
-  // A round that is folded a second time (a truncated one, reopened) makes no further checkpoint.
+  // A truncated round that was reopened is folded a second time: it makes no further checkpoint.
   if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
       spp > job.checkpoint_spp) {
     job.checkpoint_spp = spp;
@@ -108,7 +111,8 @@ void Farm::State::on(const UnitFailed& event) {
   note_progress(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
   if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
-  // Only a worker that holds the unit can fail at it; a unit taken back from it is rendered elsewhere.
+  // Only a worker that holds the unit can fail at it. A unit that was taken back from it is rendered
+  // elsewhere.
   LeaseRecord* lease = lease_of(*job, code, *worker);
   if (lease == nullptr) return;
   if (lease->audit) return audit_failed(*job, code, *worker, *lease);
@@ -133,7 +137,7 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
     fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
          failure);
   };
-  // "The scene is at fault" is only one worker's claim, too: its memory may be bad, or it lies.
+  // That the scene is at fault is only what one worker says, too: its memory may be bad, or it lies.
   const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
   if (job.failures.exhausted(code, known)) return report(at_fault);
   if (known > 0 && willing == 0) {

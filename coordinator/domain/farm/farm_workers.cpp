@@ -1,4 +1,4 @@
-// Workers: joining, reporting, leaving, and the passage of time.
+// What the farm does when workers join, report and leave, and as time passes.
 #include <algorithm>
 #include <span>
 
@@ -17,7 +17,7 @@ void Farm::State::touch(Worker& worker) {
 void Farm::State::on(const WorkerJoined& event) {
   Worker& worker = workers.get(event.worker);
   if (worker.connected) {
-    if (event.epoch <= worker.epoch) return;  // a late message of an older stream
+    if (event.epoch <= worker.epoch) return;  // the event is of an older stream and comes late
     lose(worker, FreedCause::newer_stream);
   }
   worker.epoch = event.epoch;
@@ -130,14 +130,14 @@ void Farm::State::on(const Tick&) {
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
-    if (limit && now >= *limit)
-      freeze(*job, StopReason::time);
-    else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)  // well before leases extend to the limit
+    if (limit && now >= *limit) freeze(*job, StopReason::time);
+    // Early enough that no lease reaches the limit yet
+    else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }
   work_appeared = true;
   for (const WorkerIndex index : workers.wanting_work()) {
-    if (!workers.at(index).saturated()) dirty.insert(index);  // may copy overdue units
+    if (!workers.at(index).saturated()) dirty.insert(index);  // they may copy overdue units
   }
 }
 
@@ -146,7 +146,7 @@ void Farm::State::expire_leases() {
     Worker& worker = *lease->worker;
     worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
-    // The worker is not notified: if it recovers and finishes before the others, its results are welcome.
+    // The worker is not told. If it recovers and finishes before the others, its results are welcome.
     free_lease(lease->seq, FreedCause::deadline_passed, false);
   }
 }

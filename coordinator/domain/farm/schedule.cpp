@@ -1,6 +1,7 @@
-// Which worker gets which units next. Higher priorities first, equal shares within one (fair_share.h),
-// previews first (the order of unit codes). Idle workers go before busy ones, and among them those that hold
-// the world; leases shrink at a job's tail.
+// Decides which worker gets which units next; a unit is one round (range of samples) of one tile. Higher
+// priorities go first, jobs of one priority get equal shares (fair_share.h), and within a job lower rounds go
+// first, which give a preview (the order of unit codes). Idle workers go before busy ones, and among them
+// those that hold the job's world. Leases shrink near the end of a job.
 #include <algorithm>
 #include <limits>
 
@@ -11,24 +12,27 @@ namespace {
 
 struct LeaseSize {
   std::uint64_t units = 1;
-  double seconds = 0;  // CPU seconds; reaching them completes the lease
+  double seconds = 0;  // CPU seconds; a lease is complete when its predicted cost reaches them
 };
 
-// Seconds until the job's time limit, minus the time that the worker needs for the leases it holds.
+// Returns the seconds until the job's time limit, minus those that the worker needs for the leases it holds.
+// Infinite if no limit applies.
 double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
   return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
 }
 
-// Guided self-scheduling: a thread gets half of an even split of the waiting units, so that all threads end
-// at about the same time. Under a time budget a lease ends with the first unit that reaches `seconds`.
+// Guided self-scheduling: a worker gets half of what an even split of the waiting units over all threads of
+// the farm (`farm_threads`) would give its threads. So all threads end at about the same time. The lease also
+// ends with the unit that makes its predicted cost reach `seconds`, which is less shortly before a time
+// limit.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
-  // With single units a worker with many threads would reach kMaxLeasesPerWorker before all threads have
-  // work.
+  // `least`: with leases of single units, a worker with many threads would hold kMaxLeasesPerWorker leases
+  // before all its threads have work.
   const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
   const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
   const std::uint64_t most =
@@ -37,8 +41,8 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   return {std::min(share, most), lasts * worker.cores()};
 }
 
-// A job with a time budget leases nothing after its limit, and nothing ahead that would only begin after it.
-// Every tile gets its first round.
+// True if the job's time limit keeps this unit from the worker: nothing is leased after the limit, or when
+// the worker is busy until the limit. Every tile gets its first round all the same.
 bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen || round_of(code) == 0) return false;
@@ -78,8 +82,8 @@ bool Farm::State::take_back_for_idle() {
   return false;
 }
 
-// A worker processes its leases in order: this one has not begun as long as earlier ones keep all threads
-// busy.
+// A worker processes its leases in order: it has not begun this one as long as its earlier leases keep all
+// its threads busy.
 bool Farm::State::untouched(const LeaseRecord& lease) const {
   std::uint32_t units = 0;
   for (const LeaseSeq seq : lease.worker->leases) {
@@ -89,14 +93,14 @@ bool Farm::State::untouched(const LeaseRecord& lease) const {
   return lease.reported == 0 && units >= static_cast<std::uint32_t>(lease.worker->threads);
 }
 
-// Seconds until the worker begins the lease; 0 if it may have begun.
+// Returns the predicted seconds until the worker begins the lease; 0 if it may have begun.
 double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
   if (!untouched(lease)) return 0;
   double before = 0;
   for (const LeaseSeq seq : lease.worker->leases) {
     if (seq >= lease.seq) break;
     const LeaseRecord& earlier = leases.all().at(seq);
-    // Predicted now: when the first leases were granted, nothing was measured
+    // The cost is predicted anew: when the first leases were granted, nothing was measured
     before += earlier.remaining * earlier.job->predict(earlier.units.front());
   }
   return before / lease.worker->cores();
@@ -109,7 +113,8 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
     LeaseRecord& lease = it->second;
     const Job& job = *lease.job;
-    // The idle worker must be able to begin at once: it has the world, and nothing keeps it from the units.
+    // The idle worker must be able to begin immediately: it has loaded the job's world, and no rule keeps the
+    // units from it.
     if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
         !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
       continue;
@@ -142,8 +147,8 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// Nobody can audit a worker that is alone in its class, so a job is pinned to a class with several workers if
-// there is one. Without audits it does not matter.
+// Nobody can audit a worker that is alone in its numeric class. So, if some class has several workers that
+// fit the job, the job is pinned to such a class. Without audits it does not matter.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
   std::map<Digest, int> others;
@@ -157,10 +162,10 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   return true;
 }
 
-// The next job for this worker: the first in turn, or one whose world the worker holds, unless that has had
-// much more than its share (loading a world costs time). A job that no worker renders is not passed over in
-// this way. Null also if the first job will take the worker later: another job's leases in between would
-// prevent that.
+// Returns the next job for this worker. This is the first in turn, or one whose world the worker holds
+// (loading a world costs time), unless that one has had much more than its share. But if no worker renders
+// the first job in turn, it is not passed over in this way. Null if there is none. Null also if the worker
+// will get units of the first job, but not yet: leases of another job in between would prevent that.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -193,8 +198,8 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
 }
 
-// Leased early, a speculative unit would delay units that turn out to be needed, and would more likely be
-// dropped.
+// If a speculative unit were leased early, it would delay units that turn out to be needed, and it would more
+// likely be dropped.
 bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
                             double cost) const {
   return !job.queue.wanted(code) &&
