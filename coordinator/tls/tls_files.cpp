@@ -75,7 +75,7 @@ Result<void> write_pair(const fs::path& folder, const std::string& name, const C
 
 Result<Certificate> authority_of(const fs::path& folder, std::int64_t now) {
   const bool cert = fs::exists(folder / "ca.pem"), key = fs::exists(folder / "ca.key");
-  if (!cert) {  // a key without a certificate: the last start ended between the two
+  if (!cert) {  // also if there is a key: the last start may have ended before it wrote the certificate
     auto made = make_authority("Lightshaft farm", now);
     if (!made) return made;
     if (auto done = write_pair(folder, "ca", *made); !done) return tl::unexpected(done.error());

@@ -53,7 +53,7 @@ std::string listed(const std::vector<std::string>& names) {
   return names.size() > kMostShown ? text + fmt::format(" and {} more", names.size() - kMostShown) : text;
 }
 
-// The scene's name in the archive: the only .xml at the top.
+// Returns the name in the archive of the only .xml file at the top, which is the scene.
 Result<std::string> only_scene(const std::vector<BundleFile>& files, const std::string& top) {
   std::vector<std::string> found;
   for (const BundleFile& file : files) {
@@ -108,7 +108,7 @@ Result<JobFile> read_job_file(const std::string& text) {
   return out;
 }
 
-// `name` relative to `folder` ("" or "a/b/").
+// Returns `name` relative to `folder` ("" or "a/b/"), as a scene in that folder would write it.
 std::string seen_from(std::string_view folder, std::string_view name) {
   std::size_t common = 0;
   for (std::size_t i = 0; i < std::min(folder.size(), name.size()) && folder[i] == name[i]; ++i)
