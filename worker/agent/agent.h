@@ -25,7 +25,7 @@ namespace ls::worker {
 struct AgentOptions {
   WorkerHello hello;  // the agent fills in threads, numeric_class and blobs_held
   int threads = 1;
-  std::size_t outbox_bytes = 64 << 20;  // while unacknowledged results have more bytes, no unit is begun
+  std::size_t outbox_bytes = 64 << 20;  // no unit is begun while unacknowledged results have this many bytes
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_first = std::chrono::milliseconds(100);
   Duration backoff_most = std::chrono::seconds(10);

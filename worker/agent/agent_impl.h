@@ -125,7 +125,8 @@ struct Agent::Impl {
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
-  std::string loading;  // name of the file or job that the loader fetches or builds now; empty: none
+  std::string
+      loading;  // name of the file that the loader fetched last for the job that it is loading; else empty
 
   std::vector<std::jthread> threads;
 };

@@ -34,8 +34,8 @@ class HeldLeases {
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in);
   // Takes the first waiting unit of a job in `ready` and marks it running.
   std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
-  // Marks a running unit as handed in and returns the lease to which it belongs now; nullopt: it was dropped
-  // meanwhile.
+  // Removes a unit that was running and has been rendered. Returns the lease to which it belongs now;
+  // nullopt: it was dropped meanwhile.
   std::optional<LeaseId> finish(const UnitKey& key);
   // Removes a unit whose result the coordinator has acknowledged. If the coordinator rejected the result
   // (`refused`), the unit waits to be rendered again.

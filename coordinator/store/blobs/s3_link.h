@@ -56,8 +56,8 @@ class S3Link {
   };
   Result<Object> look_at(const std::string& key) const;  // not_found
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  // Reads the whole object and passes its bytes to `sink`, in order. If the connection breaks, the object is
-  // read again from its start; `restart` is called before, so that the caller can discard what the sink has
+  // Reads the whole object and passes its bytes to `sink`, in order. If an attempt fails, the next one reads
+  // the object from its start; `restart` is called before every attempt and must discard what `sink` has
   // received.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
