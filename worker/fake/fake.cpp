@@ -95,7 +95,7 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // False if stopped meanwhile.
+  // Sleeps for `delay`. False: `stop` was set meanwhile.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
     while (!stop && std::chrono::steady_clock::now() < end)
