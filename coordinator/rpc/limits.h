@@ -13,9 +13,9 @@ inline constexpr int kFetches = 512;  // blob transfers in progress; further one
 inline constexpr int kReadThreads = 64;
 // Messages that may wait for a worker that does not read them; a worker with more is disconnected
 inline constexpr std::size_t kQueuedMessages = 8192;
-inline constexpr int kUnreadBytes = 64
-                                    << 10;  // bytes that a worker may send before the coordinator reads them
-inline constexpr int kHelloSeconds = 20;    // how long after opening its stream a worker must send its hello
+// Bytes that a worker may send before the coordinator reads them.
+inline constexpr int kUnreadBytes = 64 << 10;
+inline constexpr int kHelloSeconds = 20;  // how long after opening its stream a worker must send its hello
 inline constexpr int kHandshakeMs = 10'000;
 // Keepalive, the same on both sides (worker/client/channel.cpp): a vanished peer is noticed within 30 s.
 inline constexpr int kKeepaliveMs = 20'000;

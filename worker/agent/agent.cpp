@@ -151,9 +151,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    if (it != jobs.end() &&
-        it->second.brief !=
-            *assign.brief) {  // the same id, but another job: the coordinator's data were replaced
+    // A job with a known id but another brief is another job: it comes from other data of a coordinator.
+    if (it != jobs.end() && it->second.brief != *assign.brief) {
       table.drop_job(id);
       outbox.drop_job(id);
       stop_dropped_units();

@@ -99,8 +99,8 @@ struct Agent::Impl {
   // Used by the control thread only.
   std::uint64_t connection_count = 0;
   Backoff backoff;
-  TimePoint
-      connection_timer{};  // while the connection is down: when to retry; while opening: when to give up
+  // While the connection is down: when to retry; while opening: when to give up.
+  TimePoint connection_timer{};
   TimePoint up_since{};
   TimePoint next_progress{};
   TimePoint drain_deadline{};
@@ -125,8 +125,8 @@ struct Agent::Impl {
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
-  std::string
-      loading;  // name of the file that the loader fetched last for the job that it is loading; else empty
+  // Name of the file that the loader fetched last for the job that it is loading; else empty.
+  std::string loading;
 
   std::vector<std::jthread> threads;
 };

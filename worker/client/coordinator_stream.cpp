@@ -61,8 +61,8 @@ void WorkCall::OnReadDone(bool ok) {
     if (!writing_) release_hold_locked();
     return;
   }
-  if (!wire::known(
-          incoming_)) {  // a newer coordinator's message: newer ones must not depend on it being handled
+  // A kind of message that only newer versions know: a newer coordinator must not depend on our handling it.
+  if (!wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
   }

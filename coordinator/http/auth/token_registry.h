@@ -28,8 +28,8 @@ struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
   Role role = Role::read;
   std::string user;
-  bool of_file =
-      false;  // the token is in DATA/token or DATA/join-token and is revoked only by deleting that file
+  // The token is in DATA/token or DATA/join-token and is revoked only by deleting that file.
+  bool of_file = false;
 };
 
 class TokenRegistry {

@@ -20,8 +20,8 @@ struct BundleFile {
 
 struct BundleContents {
   std::vector<BundleFile> files;  // in the archive's order
-  std::map<std::string, std::string>
-      job_files;  // the text of every file that may turn out to be the job.json
+  // The text of every file that may turn out to be the job.json.
+  std::map<std::string, std::string> job_files;
 };
 
 Result<Bundle> sorted_out(const BundleContents& contents);

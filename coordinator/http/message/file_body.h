@@ -13,8 +13,8 @@
 namespace ls::http {
 
 struct FileBody {
-  std::shared_ptr<const int>
-      fd;  // closed with the last copy of the FileBody; readable even after the file's removal
+  // Closed with the last copy of the FileBody; readable even after the file's removal.
+  std::shared_ptr<const int> fd;
   std::uint64_t size = 0;  // bytes
 };
 

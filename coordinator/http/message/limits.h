@@ -56,8 +56,8 @@ struct Limits {
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
-  std::size_t event_streams =
-      128;                         // how many of `connections` may be event streams; the rest is for requests
+  // How many of `connections` may be event streams; the rest is for requests.
+  std::size_t event_streams = 128;
   std::size_t event_queue = 4096;  // events waiting for one reader
   std::size_t event_queue_bytes = 4u << 20;
   double header_seconds = 10;  // from the first byte of a request to the end of its header

@@ -66,8 +66,8 @@ struct StoredJob {
   Digest scene;  // digest of its blob
   RenderSettings settings;
   JobSpec spec;  // as requested; spp as last extended
-  std::optional<std::uint64_t>
-      spp;  // samples per pixel to render; nullopt: until an error target or a time limit
+  // Samples per pixel to render; nullopt: until an error target or a time limit.
+  std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
   bool reference_same_seed = false;  // what same_noise() says of the job and its reference image

@@ -142,8 +142,8 @@ class RedisJobStore final : public JobStore {
     auto owner = members_->owner_of(id);
     if (!owner) return tl::unexpected(owner.error());
     if (!*owner) return std::nullopt;
-    if ((*owner)->node ==
-        options_.node) {  // the job is being taken over by this coordinator, or being removed
+    // This node owns the job in Redis but does not have it: it is still taking the job over, or removing it.
+    if ((*owner)->node == options_.node) {
       const std::lock_guard lock(mutex_);
       const auto due = due_.find(id);
       return due != due_.end() && due->second.removed ? std::nullopt
@@ -289,8 +289,8 @@ class RedisJobStore final : public JobStore {
   std::set<JobId> lost_;                      // jobs that others own now: their updates are not stored
   Moved moved_;                               // what the next call of moved() returns
   std::map<JobId, Due> due_;
-  std::size_t sending_ =
-      0;             // number of jobs being sent to Redis: they are no longer in due_, nor in Redis yet
+  // Number of jobs being sent to Redis: they are no longer in due_, nor in Redis yet.
+  std::size_t sending_ = 0;
   JobId sent_last_;  // last due job sent; the next ones follow it in order
   std::map<std::string, std::uint64_t> counters_;
   std::map<WorkerId, std::string> quarantined_;  // all known

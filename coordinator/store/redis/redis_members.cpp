@@ -253,8 +253,8 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   if (!fields) return tl::unexpected(fields.error());
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
-  if (!job || job->job.id != id)
-    return std::nullopt;  // look_for_stranded() checks it again as this node's job
+  // The job is this node's by now; look_for_stranded() will check it again.
+  if (!job || job->job.id != id) return std::nullopt;
   const std::uint64_t fence = job->fence;
   return TakenJob{std::move(*job), fence, dead};
 }

@@ -53,8 +53,8 @@ struct TakenJob {
 
 struct LostJob {
   JobId id;
-  std::uint64_t fence =
-      0;  // fence of the new owner; if this node has a higher one, it has got the job back since
+  // Fence of the new owner; if this node has a higher one, it has got the job back since.
+  std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };
 
