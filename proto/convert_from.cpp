@@ -123,8 +123,8 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // Counts from a program that names no causes, beyond those that `named` causes explain, get the cause
-  // "unnamed".
+  // A sender that knows no causes sends only three counts. What such a count has more than `health` is added
+  // below under a cause of its own.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
   };

@@ -55,8 +55,9 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  std::uint32_t text_bytes =
-      0;                 // length of a text that follows: a failure's reason, or a unit's health if not clean
+  // Length of a text that follows: the reason of a failure, or the health of a rendered unit that is not
+  // clean.
+  std::uint32_t text_bytes = 0;
   Digest numeric_class;  // hello
   double cpu_seconds = 0, wall_seconds = 0;
 };
