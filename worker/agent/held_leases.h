@@ -19,8 +19,8 @@ class HeldLeases {
   enum class State {
     waiting,
     running,
-    handed_in,  // its result waits to be acknowledged; the unit is rendered again only if the result is
-                // rejected
+    // Its result waits to be acknowledged; the unit is rendered again only if the result is rejected.
+    handed_in,
   };
   struct Held {
     UnitKey key;
@@ -70,8 +70,9 @@ class HeldLeases {
   void drop_if(const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
-  std::map<std::uint64_t, UnitKey> queue_;  // waiting units by order
-  std::map<LeaseId, LeaseState> leases_;    // leases with units that are not finished
+  // The waiting units by Entry::order, the first to be rendered first.
+  std::map<std::uint64_t, UnitKey> queue_;
+  std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;
 };

@@ -16,7 +16,7 @@
 namespace ls::worker {
 namespace {
 
-constexpr std::size_t kAllocationChunk = 64 << 20;  // size of each allocation of the `memory` fault
+constexpr std::size_t kAllocationChunk = 64 << 20;  // bytes that the fault `memory` allocates at a time
 
 double thread_cpu_seconds() {
   timespec t{};

@@ -91,7 +91,9 @@ class Connection {
   net::awaitable<Read> read_portion(Parser& parser, std::string& into, SteadyClock::time_point began,
                                     std::uint64_t& received);
   net::awaitable<bool> send_continue(const Request& request);
-  bool charge(std::uint64_t bytes);  // counts against kMaxBuffered; false: too much at once
+  // Counts a request's body of this many bytes in Shared::buffered. False: all bodies together would exceed
+  // kMaxBuffered.
+  bool charge(std::uint64_t bytes);
 
   // event_writer.cpp
   net::awaitable<void> stream_events(const Request& request, const Response& response);
@@ -102,7 +104,9 @@ class Connection {
   net::awaitable<Read> fill();  // reads more bytes into buffer_
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
   net::awaitable<bool> write_file(std::string_view head, const FileBody& file);
-  // Enforces the minimum rate of a longer body of which `sent` bytes have been sent since `began`.
+  // Sends `head` and `body`, which is all or a slice of a response's body. Of the whole, `sent` bytes have
+  // been sent since `began`; it is increased by what is sent now. False: the client takes the bytes too
+  // slowly (see Limits::min_rate) or has gone.
   net::awaitable<bool> write_paced(std::string_view head, std::span<const std::byte> body,
                                    SteadyClock::time_point began, std::uint64_t& sent);
   net::awaitable<void> linger();
@@ -122,7 +126,8 @@ class Connection {
   std::uint64_t charged_ = 0, answer_charged_ = 0;
   std::array<char, 64> discard_{};
   beast::flat_buffer buffer_;
-  std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);  // callbacks check it first
+  // Callbacks hold a weak_ptr to this and do nothing once the connection has been destroyed.
+  std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);
 };
 
 }  // namespace ls::http

@@ -160,8 +160,8 @@ class RedisJobStore final : public JobStore {
       job.fence = one.fence;
       auto kept = keep_inherited(*local_, one.job);
       const std::lock_guard lock(mutex_);
-      if (!kept) {  // Redis says that this node owns the job, so the members' thread will try to store it
-                    // again
+      // Redis says that this node owns the job, so the members' thread will try to store it again.
+      if (!kept) {
         if (not_kept_.empty())
           log_error(fmt::format("job={}", job.id.value),
                     "cannot be taken over now, and is tried again: " + kept.error().message);
