@@ -56,7 +56,7 @@ Result<std::string> read_pem(const fs::path& file, bool secret) {
   }
 }
 
-// Written to a temporary file and renamed: readers see either the old file or the new one.
+// Writes a temporary file and renames it, so that readers see either the old file or the new one.
 Result<void> write_pem(const fs::path& file, const std::string& text, mode_t mode) {
   const std::string aside = file.string() + ".new";
   ::unlink(aside.c_str());

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kMaxBuckets = 10'000;
 constexpr std::size_t kMaxKnown = 64;
-constexpr std::size_t kGroupsOfPrefix = 4;  // 16-bit groups: an IPv6 /64
+constexpr std::size_t kGroupsOfPrefix = 4;  // number of 16-bit groups in the /64 prefix of an IPv6 address
 
 }  // namespace
 

@@ -42,7 +42,7 @@ class Utf8Names {
 
 enum class Trouble { none, stopped, unreadable, list_too_long };
 
-// Source of the archive's bytes, as libarchive's callbacks.
+// Where libarchive's callbacks get the archive's bytes from.
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;
@@ -110,7 +110,7 @@ struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
   std::unique_ptr<archive, FreeArchive> reader;
-  std::int64_t data_end = 0;  // of the last entry read, in the unpacked tar
+  std::int64_t data_end = 0;  // offset in the unpacked tar at which the data of the last entry read end
 
   Error error(std::string_view doing) const;
   std::int64_t position() const { return archive_filter_bytes(reader.get(), 0); }
@@ -150,7 +150,7 @@ Result<ArchiveReader> ArchiveReader::open(int fd, ArchiveKind kind, std::stop_to
   state->reader.reset(archive_read_new());
   archive* a = state->reader.get();
   if (!a) return fail(Errc::unavailable, "not enough memory to read an archive");
-  // A zip is read only through the list at its end: a truncated zip has none.
+  // A zip is read only through the list of entries at its end, so a zip that was cut off is an error.
   bool ready = kind == ArchiveKind::zip ? archive_read_support_format_zip_seekable(a) == ARCHIVE_OK
                                         : archive_read_support_format_tar(a) == ARCHIVE_OK &&
                                               archive_read_support_filter_gzip(a) == ARCHIVE_OK;

@@ -54,7 +54,7 @@ class DiskBlobs final : public BlobStore {
   std::filesystem::path folder_, work_;
   mutable VerifiedDigests proofs_;
   mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
-  // Held while a file is put in place or moved aside, so that a repaired one stays.
+  // Held while a file is put in its place or moved aside, so that a file just repaired is not moved aside.
   mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };
