@@ -1,6 +1,6 @@
-// Reads and writes objects in a bucket of an S3-compatible store, through libcurl, which also signs the
-// requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe:
-// each request has its own connection.
+// Reads and writes objects in a bucket of an S3-compatible store. This is the coordinator's only user of
+// libcurl, which also signs the requests (AWS Signature Version 4). Addresses are in path style:
+// ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe: each request has its own connection.
 #pragma once
 
 #include <cstdint>
