@@ -1,7 +1,7 @@
-// farm.proto to and from the plain values of common/protocol. Total in both directions: a value within the
-// limits always becomes a message that reads back equal (texts too long are cut, see below); a received
-// message becomes a value or an invalid_argument that names the field. Nothing behind this door needs to
-// distrust a length, a rectangle or a list again.
+// Converts the messages of farm.proto (the protocol between coordinator and workers) to and from the plain
+// values of common/protocol. A value within the limits always becomes a message that reads back equal, except
+// for texts that are too long, see below. A received message becomes a value, or an invalid_argument that
+// names the wrong field. Code that gets the values need not check a length, a rectangle or a list again.
 //
 // Names, tags and reasons longer than their limit are cut when sent; ids, tokens and lists are never cut.
 #pragma once
@@ -20,7 +20,8 @@ namespace pb = ::lightshaft::farm::v1;
 pb::FromWorker to_wire(const FromWorker& message);
 pb::ToWorker to_wire(const ToWorker& message);
 
-// False for a kind of message that a newer peer may send and this version passes over.
+// True if this version knows this kind of message. A newer peer may send others; the caller should ignore
+// them.
 bool known(const pb::FromWorker& message);
 bool known(const pb::ToWorker& message);
 

@@ -1,4 +1,4 @@
-// The checks that received messages go through, each naming the field that is wrong.
+// The checks of received messages. Each returns an error that names `field` if the value is wrong.
 #pragma once
 
 #include <cstdint>
@@ -13,21 +13,23 @@ namespace ls::wire {
 
 tl::unexpected<Error> wrong(const std::string& field, const std::string& what);
 
-// 1 to kIdBytes printable ASCII characters without spaces.
+// Returns the id, which must be 1 to kIdBytes printable ASCII characters without spaces.
 Result<std::string> id_from(const std::string& text, const char* field);
-// At most `limit` bytes; control characters become spaces, so that no log line or terminal is at a worker's
-// mercy.
+// Returns the text, which must have at most `limit` bytes. Control characters are replaced by spaces, so that
+// a worker cannot forge log lines or control a terminal.
 Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field);
-// Finite and not negative.
+// Returns the number of seconds, which must be finite and not negative.
 Result<double> seconds_from(double value, const char* field);
-// Non-empty, inside the largest frame, its partial within one message.
+// Returns the rectangle, which must not be empty and must lie inside the largest frame. Its partial (the
+// pixel sums of one unit) must fit into one message.
 Result<PixelRect> rect_from(const pb::Rect& rect, const char* field);
-// Even ends, not empty, within the largest index.
+// Returns the range of samples from s0 to s1, which must not be empty or exceed the largest index; s0 and s1
+// must be even.
 Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field);
 
-// A text as it may be sent: valid UTF-8 (a peer throws away a whole message with a string that is not; stray
-// bytes become
-// '?'), cut to at most `limit` bytes at the end of a character.
+// Returns the text in a form that may be sent: bytes that are not UTF-8 are replaced by '?', because a peer
+// throws away the whole message if one of its strings is not valid UTF-8. The text is cut to at most `limit`
+// bytes, between two characters.
 std::string sendable(const std::string& text, std::size_t limit);
 
 }  // namespace ls::wire

@@ -1,4 +1,4 @@
-// Messages from their wire form: everything is checked, strangers write it.
+// Converts received messages to plain values. Everything is checked, because anyone may have sent it.
 #include <fmt/format.h>
 
 #include <utility>
@@ -6,7 +6,8 @@
 #include "proto/convert.h"
 #include "proto/convert_check.h"
 
-// Unwraps a Result inside a function that returns one: on an error, returns it.
+// Defines `name` as the value of `expression`, a Result; if that is an error, the enclosing function returns
+// the error.
 #define LS_TRY(name, expression)                                   \
   auto name##_or = (expression);                                   \
   if (!name##_or) return tl::unexpected<Error>(name##_or.error()); \
@@ -122,7 +123,8 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // Of a program that knows no causes.
+  // A sender that knows no causes sends only three counts. What such a count has more than `health` is added
+  // below under a cause of its own.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
   };

@@ -1,4 +1,4 @@
-// Messages to their wire form.
+// Converts plain values to the messages that are sent.
 #include <utility>
 
 #include "common/base/overloaded.h"

@@ -24,15 +24,15 @@ double thread_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// invalid_argument is the scene's fault; anything else (memory, an unreadable file) may succeed on another
-// machine.
+// Makes a UnitFailure from an error. An invalid_argument is the scene's fault; after any other error (no
+// memory, an unreadable file) the unit may succeed on another machine.
 tl::unexpected<UnitFailure> failed(const Error& error) {
   return tl::unexpected<UnitFailure>(
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// The coordinator decides by these needs which files to send, and this worker which to leave out: both must
-// use the same rules.
+// Compares the files that this worker finds the scene to need with the needs in the job's brief. By these
+// needs the coordinator decides which files to send, so both must use the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =
@@ -97,7 +97,7 @@ class InProcessBackend final : public LocalBackend {
   }
 
   void forget(const JobId& job) override {
-    std::vector<std::shared_ptr<const render::World>> last;  // freed outside the lock
+    std::vector<std::shared_ptr<const render::World>> last;  // frees the worlds after the mutex was unlocked
     const std::lock_guard lock(mutex_);
     std::erase_if(worlds_, [&](auto& entry) {
       const bool gone = entry.first.job == job;

@@ -1,5 +1,5 @@
-// A backend that renders in this process: served by the render child, and used directly by `lightshaft
-// render`.
+// A backend that renders in this process. The render child uses it to serve the agent's requests
+// (worker/child), and `lightshaft render` uses it directly.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,8 @@
 
 namespace ls::worker {
 
-// `threads`: for building worlds; units are rendered on the caller's threads.
+// `threads` is the number of threads that build a world (a scene ready to render). Units are rendered on the
+// threads that call render().
 std::unique_ptr<LocalBackend> make_inprocess_backend(int threads);
 
 }  // namespace ls::worker

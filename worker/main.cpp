@@ -57,11 +57,12 @@ int failed(const Error& error) {
   return 1;
 }
 
-// The first SIGTERM or SIGINT drains, the second stops at once.
+// Waits for signals. The first SIGTERM or SIGINT lets the agent drain (finish its running units and end), the
+// second makes it stop now.
 void obey_signals(worker::Agent& agent, const sigset_t& signals) {
   int signal = 0;
   for (int count = 0; sigwait(&signals, &signal) == 0; ++count) {
-    if (signal == SIGUSR1) return;  // sent by ourselves when the agent has ended
+    if (signal == SIGUSR1) return;  // this process sends SIGUSR1 to itself when the agent has ended
     count == 0 ? agent.drain() : agent.stop();
   }
 }
@@ -88,7 +89,8 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
         return link->fetch_blob(wanted, sink);
       });
   if (!cache) return failed(cache.error());
-  // After the cache, because its folder, which the child may read, must exist.
+  // The cache was opened before, because its folder, which the child may read, must exist when the child
+  // starts.
   worker::ChildOptions child_options{.arguments = child_arguments(options),
                                      .slots = options.threads,
                                      .hang_limit = from_seconds(options.hang_seconds),
@@ -121,7 +123,8 @@ int main(int argc, char** argv) {
   const auto& options = std::get<ls::worker::Options>(parsed);
   log_format(options.log_format);
   if (options.render_child) return run_child(options);
-  // Blocked before any thread starts (including gRPC's), so that only obey_signals receives them.
+  // These signals are blocked before any thread starts (including gRPC's), so that only obey_signals receives
+  // them.
   sigset_t signals;
   sigemptyset(&signals);
   for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);

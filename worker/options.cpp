@@ -16,7 +16,8 @@ namespace ls::worker {
 namespace {
 
 constexpr const char* kBuild = "lightshaft-worker " LIGHTSHAFT_VERSION;
-// Default share of the machine's memory for the render child; the system and the agent need the rest.
+// The render child may use this share of the machine's memory by default; the system and the agent need the
+// rest.
 constexpr double kMemoryShare = 0.9;
 
 struct Files {
@@ -141,7 +142,7 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
 std::vector<std::string> child_arguments(const Options& o) {
   std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads),
                                         "--memory-limit", std::to_string(o.memory_limit)};
-  // the folder that the child may read
+  // The child must know the cache's folder, because its sandbox allows reading there.
   if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});
   if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");

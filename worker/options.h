@@ -16,8 +16,8 @@ struct Options {
   std::vector<std::string> coordinators;  // HOST:PORT
   int threads = 1;
   std::filesystem::path cache;
-  std::uint64_t cache_limit = 0;   // bytes; 0: none
-  std::uint64_t memory_limit = 0;  // bytes, of the render child; 0: none
+  std::uint64_t cache_limit = 0;   // most bytes in the cache; 0: no limit
+  std::uint64_t memory_limit = 0;  // most bytes of memory that the render child may use; 0: no limit
   double hang_seconds = 300;
   double build_seconds = 1800;
   std::string name;
@@ -32,11 +32,13 @@ struct Options {
   bool render_child = false;  // this process is a render child; set by workers only
 };
 
-// Returns an exit code instead if there is nothing to run (help) or the usage is wrong (2, reported on
-// stderr).
+// Parses the command line. Returns the process's exit code instead of Options if there is nothing to run
+// (after
+// --help), or if the usage is wrong (2, and the reason is on stderr).
 std::variant<Options, int> parse_options(int argc, char** argv);
 
-// Arguments that make this executable a render child for a worker with these options.
+// Returns the arguments with which a worker with these options starts its render child, which is this same
+// executable (worker/child).
 std::vector<std::string> child_arguments(const Options& options);
 
 }  // namespace ls::worker

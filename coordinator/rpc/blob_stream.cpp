@@ -59,7 +59,8 @@ void BlobStream::next() {
   StartWrite(&chunk_);
 }
 
-// Reported before Finish, so that the jobs that need the blob are paused before the worker returns its units.
+// Ends the call with an error. The coordinator is told of a missing blob before Finish, so that the jobs that
+// need the blob are paused before the worker gives its units of them back.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
     coordinator_.blob_missing(digest_, why);

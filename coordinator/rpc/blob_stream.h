@@ -1,5 +1,6 @@
-// One FetchBlob call: sends a blob in chunks, as fast as the worker takes them. Blobs are read on separate
-// threads: fetching one first may take minutes, and gRPC's few threads must listen to workers.
+// One FetchBlob call: sends a blob to a worker in chunks, as fast as the worker takes them. The blob is read
+// on separate threads (read_pool.h): the coordinator may first have to fetch it from another machine, which
+// can take minutes, and gRPC's few threads must stay free for the messages of workers.
 #pragma once
 
 #include <functional>

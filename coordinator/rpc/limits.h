@@ -7,13 +7,15 @@ namespace ls::coordinator::rpc {
 
 // Workers connected at once; the same as kMaxWorkers
 inline constexpr int kWorkStreams = 16'384;
-inline constexpr int kFetches = 512;  // blob transfers at once; a worker beyond that tries again
-// Threads that read blobs for the transfers; most wait if a blob must be fetched first
+inline constexpr int kFetches = 512;  // blob transfers in progress; further ones are refused, and tried again
+// Threads that read blobs for these transfers. They are many because most may be waiting for blobs that the
+// coordinator must first fetch from another machine
 inline constexpr int kReadThreads = 64;
-// Messages to a worker that does not read; above this it is disconnected
+// Messages that may wait for a worker that does not read them; a worker with more is disconnected
 inline constexpr std::size_t kQueuedMessages = 8192;
-inline constexpr int kUnreadBytes = 64 << 10;  // that a worker may send before they are read
-inline constexpr int kHelloSeconds = 20;       // from the opening of a stream to its hello
+// Bytes that a worker may send before the coordinator reads them.
+inline constexpr int kUnreadBytes = 64 << 10;
+inline constexpr int kHelloSeconds = 20;  // how long after opening its stream a worker must send its hello
 inline constexpr int kHandshakeMs = 10'000;
 // Keepalive, the same on both sides (worker/client/channel.cpp): a vanished peer is noticed within 30 s.
 inline constexpr int kKeepaliveMs = 20'000;

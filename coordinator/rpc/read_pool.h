@@ -1,5 +1,5 @@
-// Threads that read blobs for FetchBlob streams: a read may wait for another machine, and gRPC's few threads
-// must listen to workers.
+// Threads that read blobs for FetchBlob streams. A read may have to wait for another machine, so it must not
+// run on one of gRPC's few threads, which must stay free for the messages of workers.
 #pragma once
 
 #include <condition_variable>
@@ -22,7 +22,8 @@ class ReadPool {
     waiting_.push_back(std::move(read));
     changed_.notify_one();
   }
-  // Call when no more reads arrive; returns after those in progress.
+  // Ends the threads; call it when no more calls of run() can come. Returns when the reads in progress are
+  // done.
   void stop() {
     for (auto& thread : threads_) thread.request_stop();
     threads_.clear();

@@ -73,7 +73,7 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
     return stream;
   }
 
-  // Disconnects streams that were opened but sent no hello.
+  // Disconnects workers that opened a stream but sent no hello in time.
   void sweep(std::stop_token token) {
     std::unique_lock lock(mutex);
     while (!token.stop_requested()) {
@@ -117,7 +117,8 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
-  // Bounds the bytes received on a stream that is not read; gRPC would let them grow to megabytes per worker.
+  // Limits the bytes that gRPC receives on a stream before the coordinator reads them; by default gRPC lets
+  // them grow to megabytes per worker.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, rpc::kUnreadBytes);
   impl_->server = builder.BuildAndStart();

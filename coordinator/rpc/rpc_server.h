@@ -1,4 +1,5 @@
-// Serves the farm protocol (proto/farm.proto) on a port, in front of a Coordinator.
+// Serves the protocol between coordinator and workers (proto/farm.proto) on a port and passes what arrives to
+// a Coordinator.
 #pragma once
 
 #include <memory>
@@ -17,16 +18,17 @@ class GrpcServer {
     std::string ca;  // CA that must have signed the workers' certificates
     std::string cert, key;
   };
-  // `may_join` checks the tokens of FetchBlob (the Coordinator checks those of hellos).
+  // `may_join` checks the join token that a worker sends with a FetchBlob call; the token in a worker's hello
+  // is checked by the Coordinator. `guard` limits how many wrong tokens an address may try.
   explicit GrpcServer(Coordinator& coordinator, JoinCheck may_join = join_check({}), JoinGuard guard = {});
   ~GrpcServer();  // stops
 
-  // Listens on "host:port" and returns the port; port 0 lets the system choose. unavailable: the address is
-  // in use (also by another coordinator: ports are never shared) or not ours. Block SIGTERM before, since
-  // this starts threads. With `tls` workers must present a certificate signed by its CA.
+  // Listens on `address`, "host:port", and returns the port; with port 0 the system chooses one. With `tls`
+  // workers must present a certificate signed by Tls::ca. unavailable: the address is in use (also by another
+  // coordinator, because ports are never shared) or does not belong to this machine. Starts threads, which
+  // inherit the signal mask: block SIGTERM before the call.
   Result<int> start(const std::string& address, const std::optional<Tls>& tls = {});
-  // Ends all streams with UNAVAILABLE, so that workers reconnect to the next coordinator. Returns when none
-  // is left.
+  // Ends all streams with UNAVAILABLE, so that the workers try to reconnect. Returns when no stream is left.
   void stop();
 
  private:

@@ -74,7 +74,7 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  if (greeted_ && !wire::known(incoming_)) {  // from a newer worker; it must be able to do without
+  if (greeted_ && !wire::known(incoming_)) {  // a newer worker's message: newer workers must not depend on it
     StartRead(&incoming_);
     return;
   }
@@ -93,7 +93,8 @@ void WorkStream::OnReadDone(bool ok) {
   session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
 }
 
-// No thread blocks meanwhile. Until Finish is called the stream lives.
+// Starts to read the worker's next message; no thread waits for it. The stream cannot be deleted before
+// Finish was called, so it may be used here until then.
 void Outlet::read_on() {
   const std::lock_guard lock(mutex_);
   if (stream_ && !finished_) stream_->StartRead(&stream_->incoming_);

@@ -1,9 +1,10 @@
-// One worker's stream: passes incoming messages to its WorkerSession and outgoing ones through a bounded
-// queue.
+// One worker's gRPC stream. It passes the worker's messages to the worker's WorkerSession, and messages to
+// the worker through a queue of at most kQueuedMessages.
 //
-// Two objects: the coordinator holds the Outlet, a WorkerSink, for as long as it likes; the WorkStream is
-// gRPC's reactor and deletes itself in OnDone. The outlet's mutex guards both and is never held while the
-// coordinator is called, so the coordinator may call the sink with its own locks held.
+// A stream has two objects. The Outlet is the WorkerSink through which the coordinator sends; the coordinator
+// may keep it as long as it likes. The WorkStream is gRPC's reactor and deletes itself in OnDone. The
+// outlet's mutex guards both objects and is never held while the coordinator is called, so the coordinator
+// may call the sink with its own locks held.
 #pragma once
 
 #include <atomic>
@@ -28,7 +29,7 @@ class Outlet final : public WorkerSink {
   explicit Outlet(WorkStream* stream) : stream_(stream) {}
   void send(ToWorker message) override;
   void close() override;
-  void read_on();  // from any thread: reads the next message
+  void read_on();  // starts to read the worker's next message; may be called from any thread
 
  private:
   friend class WorkStream;
@@ -43,15 +44,16 @@ class Outlet final : public WorkerSink {
 
 class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
  public:
-  // `on_gone` notifies the server; it is the last call before the stream is deleted. `guard` must outlive
-  // this.
+  // The stream calls `on_gone` last before it deletes itself. `guard` must outlive the stream. A worker that
+  // has not sent its hello by `hello_deadline` is disconnected by the server.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
              TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
-  void refuse(const Error& error, bool retry);  // sends the error to the worker, then ends the stream
-  void end(const grpc::Status& status);         // ends the stream after the queued messages
-  void cut();                                   // ends the stream at once
+  // Sends the error to the worker, then ends the stream. `retry` tells the worker whether to try again later.
+  void refuse(const Error& error, bool retry);
+  void end(const grpc::Status& status);  // ends the stream after the queued messages
+  void cut();                            // ends the stream now, without sending the queued messages
   bool hello_overdue(TimePoint now) const { return !greeted_ && now >= hello_deadline_; }
 
   void OnReadDone(bool ok) override;

@@ -37,18 +37,19 @@ Error errno_error(std::string_view what, const std::filesystem::path& path);
 
 Result<void> make_folder(const std::filesystem::path& folder);  // and its parents; mode 0750
 Result<void> write_all(const File& file, std::span<const std::byte> bytes, const std::filesystem::path& path);
-// Exactly `length` bytes from `offset`; fewer is an error.
+// Reads exactly `length` bytes from `offset` on; if the file has fewer, that is an error.
 Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, std::size_t length,
                                        const std::filesystem::path& path);
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes);
 Result<void> sync_data(const File& file, const std::filesystem::path& path);
 Result<void> sync_folder(const std::filesystem::path& folder);
-// Temporary file, fsync, rename, fsync of the folder: after a crash the file has either the old or the new
-// content.
+// Writes a temporary file, syncs it, renames it to `path` and syncs the folder, so that after a crash the
+// file at `path` has either its old or its new content.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-// The same for content too large for memory: written piece by piece to PATH + `suffix`, and moved into place
-// by commit(). Without commit() nothing is left.
+// Does the same as write_atomically() for content too large for memory: the content is written piece by piece
+// to a file named PATH + `suffix`, which commit() renames to PATH. If the object is destroyed without a
+// commit, the temporary file is removed.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");
@@ -59,8 +60,8 @@ class AtomicFile {
   Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   Result<void> sync();
   Result<void> commit();  // including sync()
-  // Without sync: after a power failure the file may have the old content or none, after a crash of this
-  // process the new one.
+  // Like commit(), but without sync(). After a crash of this process the file has its new content; after a
+  // power failure it may have the old content or none.
   Result<void> commit_unsynced();
 
  private:
@@ -68,7 +69,7 @@ class AtomicFile {
       : path_(std::move(path)), temporary_(std::move(temporary)), file_(std::move(file)) {}
 
   std::filesystem::path path_, temporary_;
-  File file_;  // closed: moved from, or committed
+  File file_;  // without a descriptor once the object was moved from or committed
 };
 
 // Locks `folder` for this process until destroyed. failed_precondition if another process holds it.

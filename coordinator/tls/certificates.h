@@ -18,6 +18,7 @@ inline constexpr std::int64_t kDay = 86'400;
 inline constexpr std::int64_t kAuthorityDays = 3650;
 inline constexpr std::int64_t kDays = 397;  // validity of issued certificates
 
+// Makes a new certificate authority, valid for kAuthorityDays from `now` on.
 Result<Certificate> make_authority(const std::string& common_name, std::int64_t now);
 
 enum class Use { server, client };
@@ -26,10 +27,11 @@ struct Wanted {
   Use use = Use::client;
   std::vector<std::string> names;  // for a server: its host names and addresses
 };
-// invalid_argument: a name is invalid, or `authority` is not a certificate with its key.
+// Makes a key and a certificate for it, signed by `authority` and valid for kDays. invalid_argument: a name
+// is invalid, or `authority` is not a certificate with its key.
 Result<Certificate> issue(const Certificate& authority, const Wanted& wanted, std::int64_t now);
 
-// True if the authority has signed it and it is valid until the time `until`.
+// True if `cert` was signed by `authority` and is valid at least until the time `until`.
 bool is_good(const std::string& cert, const std::string& authority, std::int64_t until);
 
 }  // namespace ls::tls

@@ -1,5 +1,5 @@
-// The delivery queue of one receiver with its retry schedule: a function of the deliveries added, the
-// outcomes and the time.
+// The queue of deliveries (notifications that wait to be sent) to one receiver, and the times of its retries.
+// They depend on nothing but the deliveries added, the outcomes reported and the times passed in.
 #pragma once
 
 #include <cstddef>
@@ -12,32 +12,34 @@
 
 namespace ls::coordinator::webhooks {
 
-inline constexpr int kMaxAttempts = 20;  // then the delivery is dropped: after about an hour and a half
-inline constexpr std::size_t kMaxWaiting = 10000;  // then the oldest delivery is dropped
+// A delivery is dropped after this many failed attempts, about an hour after the first
+inline constexpr int kMaxAttempts = 20;
+inline constexpr std::size_t kMaxWaiting = 10000;  // when more deliveries wait, the oldest is dropped
 inline constexpr double kFirstRetrySeconds = 1, kMaxRetrySeconds = 300;
 
 struct Delivery {
-  std::uint64_t number = 0;  // ascending in the order of events; its name on disk
+  std::uint64_t number = 0;  // ascending in the order of events; the delivery's file is named after it
   std::string id;            // lets receivers detect repeated deliveries
   std::string event;         // "job.done"
   std::string body;          // JSON
 };
 
-// One receiver's deliveries, in order: while the first is not accepted the others wait, so that "done" never
-// arrives before "running". Not thread-safe.
+// One receiver's deliveries, in order. The others wait until the first is accepted or dropped, so that "done"
+// never arrives before "running". Not thread-safe.
 class Line {
  public:
   // Returns the delivery that was dropped because too many wait, else nullopt.
   std::optional<Delivery> add(Delivery delivery);
-  // The delivery to send now; null if there is none or its time has not come.
+  // Returns the delivery to send now; null if none waits or the time for its next attempt has not come.
   const Delivery* due(TimePoint now) const;
-  // When due() will return one; nullopt: none waits.
+  // Returns the time from which due() will return a delivery; nullopt: none waits.
   std::optional<TimePoint> next_due() const;
-  // Reports the outcome of sending due(). Returns the delivery if it is finished: accepted, or dropped.
+  // Report whether the receiver has accepted the delivery that due() returned. Both return the delivery if
+  // the line is finished with it: taken() always, failed() if it is dropped after kMaxAttempts attempts.
   std::optional<Delivery> taken();
   std::optional<Delivery> failed(TimePoint now);
   std::size_t waiting() const { return waiting_.size(); }
-  int attempts() const { return attempts_; }  // at the first delivery, so far
+  int attempts() const { return attempts_; }  // failed attempts so far to send the first delivery
 
  private:
   Delivery pop();

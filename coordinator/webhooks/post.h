@@ -1,5 +1,6 @@
-// One HTTP POST to a receiver. Does not follow redirects, ignores proxies of the environment and uses only
-// http and https: a receiver cannot redirect the coordinator anywhere.
+// Sends one HTTP POST to a receiver of notifications. It follows no redirects, ignores proxies named in the
+// environment and speaks only http and https, so that a receiver cannot make the coordinator ask other
+// addresses.
 #pragma once
 
 #include <string>
@@ -16,9 +17,10 @@ struct Post {
   std::string body;
 };
 
-// Returns the status of the answer; its body is dropped. Errors: no connection, no answer within
-// kAnswerSeconds.
 inline constexpr long kAnswerSeconds = 15;
+
+// Returns the status of the receiver's answer; the answer's body is thrown away. Error: no connection, or no
+// answer within kAnswerSeconds.
 Result<int> send(const Post& post);
 
 // invalid_argument if this is not a usable receiver URL.

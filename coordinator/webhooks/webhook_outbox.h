@@ -1,7 +1,9 @@
-// Pending notifications on disk: a coordinator that is killed sends them after its next start.
+// Keeps the notifications that receivers have not accepted yet on disk, so that a coordinator that is killed
+// sends them after its next start.
 //
-//   DIR/open/JOB               a job whose end has not been reported yet
-//   DIR/RECEIVER/NUMBER.json   a delivery that is not accepted yet; RECEIVER is named after the address
+//   DIR/open/JOB               exists while no notification of the job's end has been stored
+//   DIR/RECEIVER/NUMBER.json   a delivery (one notification to one receiver) that is not accepted yet;
+//                              RECEIVER is named after the receiver's address
 #pragma once
 
 #include <filesystem>
@@ -19,7 +21,8 @@ class Outbox {
  public:
   static Result<Outbox> open(std::filesystem::path folder, const std::vector<std::string>& urls);
 
-  // Ascending by number. Files that hold no delivery are left alone and not returned.
+  // Returns the stored deliveries to a receiver, given by its index in `urls`, ascending by number. Files
+  // that hold no delivery are neither returned nor removed.
   std::vector<Delivery> waiting(std::size_t receiver) const;
   Result<void> keep(std::size_t receiver, const Delivery& delivery);
   void forget(std::size_t receiver, const Delivery& delivery);

@@ -49,10 +49,11 @@ class Teller final : public Webhooks {
   }
 
   void start(Coordinator& coordinator) {
-    // First the stream, then the state, so that no change is missed.
+    // Subscribe to the events before the jobs' states are read, so that no change is missed.
     std::uint64_t last = coordinator.last_event_id();
     subscription_ = coordinator.subscribe(last, [this, &coordinator, last](const StreamEvent& event) mutable {
-      // Events are kept in a ring: some may have been dropped while the disk was stuck.
+      // The coordinator keeps a limited number of events. If ids are missing here, events were dropped while
+      // this callback waited for the disk; then the jobs' states are read instead.
       if (event.id != last + 1) look_again(coordinator, event.id);
       last = event.id;
       if (event.type == "job") changed(event.job, event.data, event.id);
@@ -70,7 +71,7 @@ class Teller final : public Webhooks {
   }
 
  private:
-  // Reports changes that happened while nobody listened, i.e. before or during a crash.
+  // Reports changes of jobs that happened before this start, and that a crash kept from being reported.
   void catch_up(Coordinator& coordinator) {
     for (const JobId& job : outbox_.open_jobs()) {
       const auto view = coordinator.job(job);
@@ -106,7 +107,7 @@ class Teller final : public Webhooks {
   }
 
   void changed(const std::string& job, const std::string& data, std::uint64_t event) {
-    if (frame_of(JobId{job})) return;  // reported by its sequence
+    if (frame_of(JobId{job})) return;  // a frame of a sequence: only the sequence as a whole is reported
     json view = json::parse(data, nullptr, false);
     if (!view.is_object() || !view.contains("state") || !view["state"].is_string()) return;
     const std::string state = view["state"].get<std::string>();

@@ -12,9 +12,10 @@
 //                                            UNIX = time of sending
 //   {"event": "job.done", "id": "j-1f/done/4711", "job": {as in the API}}
 //
-// A 2xx answer accepts it. After any other answer, or none within 15 s, it is sent again after 1, 2, 4 ...
-// 300 s, 20 times; later notifications wait meanwhile. If a change is undone at once, only the outcome may be
-// reported.
+// A receiver accepts a notification by a 2xx answer. After any other answer, or none within 15 s, the
+// notification is sent again, after pauses of 1, 2, 4 ... 300 s, until 20 attempts have failed; later
+// notifications to that receiver wait meanwhile. If a job's state changes twice in quick succession, possibly
+// only the second state is reported.
 #pragma once
 
 #include <filesystem>
@@ -43,7 +44,7 @@ class Webhooks {
   struct Figures {
     std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
   };
-  // Destroying it stops all sending; the coordinator must outlive it.
+  // Starts the sending threads. Destroying the returned object stops them; the coordinator must outlive it.
   static Result<std::unique_ptr<Webhooks>> start(Coordinator& coordinator, Options options);
   virtual ~Webhooks() = default;
   virtual Figures figures() const = 0;

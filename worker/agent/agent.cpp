@@ -1,4 +1,5 @@
-// The control thread: connection, messages, timers, drain.
+// The agent's control thread: it keeps the connection, handles messages and timers, and ends the work in a
+// drain.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,11 +12,11 @@
 
 namespace ls::worker {
 namespace {
-constexpr Duration kWelcomeLimit = std::chrono::seconds(30);  // from connect to Welcome
+constexpr Duration kWelcomeLimit = std::chrono::seconds(30);  // how long after connecting Welcome must arrive
 // A connection that lasted this long resets the back-off.
 constexpr Duration kGoodConnection = std::chrono::seconds(5);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
-constexpr int kProgressWhenIdle = 5;  // progress periods between reports while idle
+constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
 constexpr std::size_t kJobsRemembered = 64;
 }  // namespace
 
@@ -150,8 +151,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    if (it != jobs.end() &&
-        it->second.brief != *assign.brief) {  // another coordinator's data: same id, different job
+    // A job with a known id but another brief is another job: it comes from other data of a coordinator.
+    if (it != jobs.end() && it->second.brief != *assign.brief) {
       table.drop_job(id);
       outbox.drop_job(id);
       stop_dropped_units();
@@ -172,7 +173,7 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   }
   job->second.cancelled = false;
   table.add(assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); });
-  // Briefs are small, but a worker may run for years.
+  // Forget jobs that were not used for long: each takes little memory, but a worker may run for years.
   while (jobs.size() > kJobsRemembered) {
     auto oldest = jobs.end();
     for (auto it = jobs.begin(); it != jobs.end(); ++it)

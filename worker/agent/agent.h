@@ -1,11 +1,13 @@
-// The worker without sockets and without a renderer: takes leases from a CoordinatorLink, gets their blobs,
-// has the units rendered by a RenderBackend on its own threads, and keeps every result until it is
-// acknowledged.
+// The part of the worker that has no sockets and no renderer. It takes leases from the coordinator through a
+// CoordinatorLink; a lease is a list of units, each one tile and one range of samples, that the worker shall
+// render. It fetches the files (blobs) of their jobs, has the units rendered by a RenderBackend on its own
+// threads, and keeps every result until the coordinator has acknowledged it.
 //
-// Threads: run() is the control thread (connection, progress, timers); one loader fetches blobs and prepares
-// worlds ahead of need; each of `threads` render threads takes the next unit as soon as it has delivered the
-// last. One mutex guards the state (worker/agent/held_leases.h, result_outbox.h). No call that may block is
-// made while it is held: only forget() and rss_bytes() of the backend, and nothing of the link or the files.
+// Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
+// blobs and prepares worlds (scenes that are built and ready to render) ahead of need. Each of `threads`
+// render threads takes the next unit as soon as it has delivered the last. One mutex guards the state
+// (worker/agent/held_leases.h, result_outbox.h). While it is held no call is made that may block: of the
+// backend only forget() and rss_bytes() are called, of the link and the files nothing.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +25,11 @@ namespace ls::worker {
 struct AgentOptions {
   WorkerHello hello;  // the agent fills in threads, numeric_class and blobs_held
   int threads = 1;
-  std::size_t outbox_bytes = 64 << 20;  // of unacknowledged results; when full, rendering waits
+  std::size_t outbox_bytes = 64 << 20;  // no unit is begun while unacknowledged results have this many bytes
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_first = std::chrono::milliseconds(100);
   Duration backoff_most = std::chrono::seconds(10);
-  // pause after a full disk and the like; grows up to backoff_most
+  // Pause after a problem of this machine, such as a full disk; grows up to backoff_most
   Duration trouble_first = std::chrono::seconds(1);
   Duration drain_limit =
       std::chrono::seconds(60);    // time to deliver finished results; then run() ends with an error
@@ -41,15 +43,17 @@ class Agent {
         const Clock& clock);
   ~Agent();
 
-  // Returns when drained (success), rejected for good (the coordinator's error), when the backend is broken
-  // (its error, after finished results are delivered) or when stopped. Call once.
+  // Does the worker's work; call it once. Returns success when the agent has drained, the coordinator's error
+  // if the coordinator rejects this worker for good, the backend's error if the backend is broken (after
+  // finished results were delivered), and also after stop().
   Result<void> run();
 
-  // From any thread. drain(): finish the running units, deliver all results, return the other units. stop():
-  // end as soon as possible and deliver nothing more.
+  // Both may be called from any thread. drain() lets run() finish the running units, deliver all results and
+  // give the other units back to the coordinator. stop() lets run() end as soon as possible and deliver
+  // nothing more.
   void drain();
   void stop();
-  // Re-evaluates the timers after the injected clock was moved. For tests only.
+  // Makes run() look at its timers again, after a test has moved `clock`. For tests only.
   void wake();
 
  private:

@@ -1,5 +1,5 @@
-// The agent's state and its threads. Control: agent.cpp; loader: agent_loader.cpp; rendering:
-// agent_render.cpp.
+// The agent's state and its threads (see agent.h). agent.cpp has the control thread, agent_loader.cpp the
+// loader thread, agent_render.cpp the render threads.
 #pragma once
 
 #include <atomic>
@@ -29,17 +29,17 @@ struct Agent::Impl {
     JobBrief brief;
     enum class State { idle, loading, ready } state = State::idle;
     std::shared_ptr<const LocalJob> local;
-    std::vector<std::shared_ptr<const BlobFile>> files;  // keep the files in the cache
-    std::uint64_t last_use = 0;
+    std::vector<std::shared_ptr<const BlobFile>> files;  // holding these keeps the job's files in the cache
+    std::uint64_t last_use = 0;  // value of `uses` at the last use; orders the jobs by it
     bool cancelled = false;
-    TimePoint retry_at{};  // after an interrupted transfer or a local problem
-    std::string trouble;   // the local problem because of which loading was last given up
-    UnitTimes unreported;  // time spent loading it, until reported with a result
+    TimePoint retry_at{};  // when to load again after an interrupted transfer or a problem of this machine
+    std::string trouble;   // the problem of this machine because of which loading was last given up
+    UnitTimes unreported;  // time spent on loading the job that no result has reported to the coordinator yet
   };
   struct RenderSlot {
     std::atomic<bool> stop{false};
     std::optional<UnitKey> unit;  // the unit being rendered; guarded by mutex
-    // Used by the slot's own thread only: when its last unit ended, and of which job.
+    // Used by the slot's own thread only: the job of its last unit, and when that unit ended.
     JobId last_job;
     TimePoint last_end{};
     double last_transfer = 0;  // seconds spent packing the last result
@@ -54,7 +54,7 @@ struct Agent::Impl {
   void open_connection();
   void accept_lease(AssignLease& assign);
   void cancel(const JobId& job);
-  void stop_dropped_units();  // sets the stop flag of each running unit that is no longer in the table
+  void stop_dropped_units();  // sets the stop flag of each running unit that is no longer in `table`
   void begin_drain();
   void look_at_backend();  // starts draining if the backend is broken, to end with its error
   std::vector<FromWorker> due_messages();
@@ -72,15 +72,16 @@ struct Agent::Impl {
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
-  // problems of jobs that this machine recently could not load; call with mutex held
+  // Describes the problems because of which this machine recently could not load jobs. Call with the mutex
+  // held.
   std::string trouble() const;
 
   // Render threads.
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<HeldLeases::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                             std::shared_ptr<const LocalJob>& job);
-  // Records and returns the seconds between the slot's last unit of this job and the first sample of this
-  // one; 0 if it is the first.
+  // Records and returns how many seconds the slot idled between the end of its last unit and the first sample
+  // of the unit that it has just rendered in `wall_seconds`. 0 if the last unit was not of this job.
   double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const HeldLeases::Held& held);
@@ -98,7 +99,8 @@ struct Agent::Impl {
   // Used by the control thread only.
   std::uint64_t connection_count = 0;
   Backoff backoff;
-  TimePoint connection_timer{};  // down: when to retry; opening: when to give up
+  // While the connection is down: when to retry; while opening: when to give up.
+  TimePoint connection_timer{};
   TimePoint up_since{};
   TimePoint next_progress{};
   TimePoint drain_deadline{};
@@ -113,7 +115,7 @@ struct Agent::Impl {
   HeldLeases table;
   Outbox outbox;
   std::map<JobId, Job> jobs;
-  std::deque<FromWorker> outgoing;  // returned leases, sent when the stream is up
+  std::deque<FromWorker> outgoing;  // messages that give leases back, to be sent when the stream is up
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;
@@ -123,7 +125,8 @@ struct Agent::Impl {
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
-  std::string loading;  // name of what is being fetched or built; empty if idle
+  // Name of the file that the loader fetched last for the job that it is loading; else empty.
+  std::string loading;
 
   std::vector<std::jthread> threads;
 };

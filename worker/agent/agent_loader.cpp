@@ -1,5 +1,5 @@
-// The loader thread: prepares jobs ahead of need, first the blobs, then the world; both without holding the
-// lock.
+// The agent's loader thread. It prepares jobs ahead of need: it fetches their blobs (files), then lets the
+// backend build their worlds (scenes ready to render). It does both without holding the agent's mutex.
 #include <fmt/format.h>
 
 #include <exception>
@@ -10,15 +10,16 @@
 
 namespace ls::worker {
 namespace {
-// The world being rendered and the next one, so that threads never wait between two jobs and memory stays
-// bounded.
+// How many worlds are kept: the one being rendered and the next one, so that render threads need not wait
+// between two jobs, and memory stays bounded.
 constexpr std::size_t kWorldsKept = 2;
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem that has not recurred for this long after its retry was due is dropped from the report, as its
-// job has gone.
+// If a job's loading failed and it was not tried again for this long after the retry was due, the worker has
+// no units of the job any more, and the problem is no longer reported.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
-// A full disk is not the job's fault: no unit may be counted as failed for it.
+// True if the error is a problem of this machine, such as a full disk, for which no unit may be counted as
+// failed.
 bool of_this_machine(const Error& error) {
   return error.code == Errc::resource_exhausted || error.code == Errc::internal;
 }
@@ -111,7 +112,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   loading.clear();
   load_seconds = seconds(clock.now() - start);
   const auto it = jobs.find(id);
-  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // replaced in the meantime
+  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // the job was replaced meanwhile
   it->second.state = Job::State::ready;
   it->second.local = std::move(local);
   it->second.files = std::move(pins);
@@ -123,8 +124,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   work.notify_all();
 }
 
-// Reports one unit as failed and returns the others, so that a job that this worker cannot load costs one
-// attempt instead of hundreds.
+// Reports one unit of the job as failed and gives its other units back to the coordinator, so that a job that
+// this worker cannot load costs one failed attempt instead of hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();
@@ -151,7 +152,8 @@ void Agent::Impl::postpone(const JobId& id, const Error& why) {
   log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
 }
 
-// Returns the job's units for other workers. If they are assigned here again, they wait for the next attempt.
+// Gives the job's units back to the coordinator, so that other workers can render them. If units of the job
+// are assigned to this worker again, they wait until the next attempt to load the job.
 void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
   const std::lock_guard lock(mutex);
   loading.clear();

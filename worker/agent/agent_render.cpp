@@ -1,4 +1,4 @@
-// The render threads: each takes one unit at a time from the front of the lease table.
+// The agent's render threads: each takes one unit at a time, the first one that waits in the table of leases.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,9 +13,10 @@
 namespace ls::worker {
 namespace {
 
-constexpr std::int64_t kExrOverhead = 16 << 10;  // bytes of header and line offsets
+constexpr std::int64_t kExrOverhead = 16 << 10;  // bytes for an EXR's header and line offsets
 
-// Rejects a unit whose result would not fit into a message, before rendering it.
+// Returns a failure if the result of this unit would not fit into a message, so that the unit need not be
+// rendered.
 std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
   const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
   const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
@@ -55,7 +56,8 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   return result;
 }
 
-// A backend in this process may run out of memory: that fails the unit, not the process.
+// Lets the backend render the unit. A backend in this process may run out of memory; then the unit fails and
+// the process goes on.
 tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
                                                           const HeldLeases::Held& held) {
   UnitFailure failure;
@@ -92,7 +94,7 @@ void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   }
 }
 
-// Blocks until there is a unit to render; nullopt when the thread should end.
+// Waits until there is a unit to render and takes it; `job` becomes its job. nullopt: the thread should end.
 std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
                                                        std::shared_ptr<const LocalJob>& job) {
   std::unique_lock lock(mutex);
@@ -122,7 +124,7 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
     const std::lock_guard lock(mutex);
     slot.unit.reset();
     if (outcome) cpu_seconds += outcome->cpu_seconds;
-    // A stopped unit is no longer ours, whatever its outcome.
+    // A unit that was stopped no longer belongs to this worker, so its outcome is dropped.
     const auto lease = slot.stop ? std::nullopt : table.finish(key);
     if (lease && outcome) {
       outcome->lease = *lease;

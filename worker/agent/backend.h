@@ -1,5 +1,5 @@
-// Renders units for an agent. Implemented by the renderer in this process, the renderer in a child process,
-// and the fake.
+// The interface through which the agent has units rendered (a unit is one tile and one range of samples). It
+// is implemented by the renderer in this process, the renderer in a child process, and the fake renderer.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace ls::worker {
 
-// A job with every blob as a local file.
+// A job all of whose blobs (scene and assets) are files on this machine.
 struct LocalJob {
   JobBrief brief;
   std::filesystem::path scene;                     // file of the canonical scene
@@ -34,36 +34,38 @@ struct WorldKey {
 inline WorldKey key_of(const JobBrief& brief) { return {brief.job, brief.scene, brief.settings_digest}; }
 
 struct RenderedUnit {
-  Partial partial;
+  Partial partial;  // the unit's pixel sums
   double cpu_seconds = 0;
   double wall_seconds = 0;  // from the first sample to the last
   Health health;
 };
 
-// Blocking calls, made concurrently by the agent's render threads. `stop` asks for an early return, whose
-// result is then ignored. A UnitFailure says whether the scene is at fault.
+// All calls block, and the agent makes them from several threads concurrently. If the caller sets `stop`,
+// render() should return early; its result is then ignored. A UnitFailure says whether the scene is at fault.
 class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
-  // Builds the job's world, or returns why it cannot. Does nothing if the world is already built.
+  // Builds the job's world (its scene, ready to render), or returns why it cannot. Does nothing if the world
+  // is already built.
   virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
   virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                          const std::atomic<bool>& stop) = 0;
   virtual void forget(const JobId& job) = 0;  // frees all worlds of jobs with this id
   virtual std::uint64_t rss_bytes() const = 0;
-  // Set when the backend can no longer render anything; the worker then ends with this error. Unit failures
-  // caused by it are not the units' fault.
+  // Returns an error once the backend can no longer render anything; the worker then ends with this error,
+  // and units that failed because of it are not blamed.
   virtual std::optional<Error> broken() const { return std::nullopt; }
-  // No further calls will be made; calls that are still blocked should return soon. May be called more than
-  // once.
+  // Tells the backend that no further calls will come; calls that are still blocked should return soon. May
+  // be called more than once.
   virtual void shutdown() {}
 };
 
-// A backend that renders in this process and can report its position.
+// A backend that renders in this process and can report which sample it is rendering.
 class LocalBackend : public RenderBackend {
  public:
-  // `where` may be null. It is written with relaxed stores and may be read by another process.
+  // Like render(), and writes the sample being rendered to `where`, unless that is null. It is written with
+  // relaxed stores and may be read by another process.
   virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                                 const std::atomic<bool>& stop,
                                                                 render::Breadcrumb* where) = 0;

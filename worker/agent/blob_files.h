@@ -1,5 +1,6 @@
-// Provides the files of a job's blobs: a cache that fetches missing ones (worker/cache), or files that are
-// already local (`lightshaft render`).
+// Provides the files of a job's blobs (its scene and assets). BlobFiles is implemented by a cache that
+// fetches missing blobs from the coordinator (worker/cache), and by files that are already local (`lightshaft
+// render`).
 #pragma once
 
 #include <filesystem>
@@ -22,12 +23,14 @@ class BlobFile {
 class BlobFiles {
  public:
   virtual ~BlobFiles() = default;
-  // Blocks while it fetches. unavailable: the transfer was interrupted; retry later (received bytes are
-  // kept). resource_exhausted, internal: a problem of this machine or its coordinator (a full disk, the cache
-  // limit, a blob missing at the coordinator) that is not the job's fault and may pass. Other errors are
-  // final: not_found if the file has no source.
+  // Returns the blob's file, and blocks while it is fetched. unavailable: the transfer was interrupted; the
+  // bytes received are kept, and the caller should try again later. resource_exhausted, internal: this
+  // machine or its coordinator has a problem (a full disk, the cache limit, a blob missing at the
+  // coordinator) that is not the job's fault and may pass. Other errors are final: not_found, for example, if
+  // the blob cannot be had from anywhere.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
-  // For the hello: at most `limit` blobs, most recently used first.
+  // Returns the blobs that are here, at most `limit`, most recently used first. The worker's hello tells them
+  // to the coordinator.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;
 };
 

@@ -12,7 +12,8 @@ constexpr double kStepsPerOctave = 8;
 }  // namespace
 
 void GapMeter::add(double seconds) {
-  seconds = std::max(seconds, 0.);  // the two clocks that are subtracted may disagree a little
+  // The gap is a difference of times from two clocks and may come out slightly negative.
+  seconds = std::max(seconds, 0.);
   const double step = seconds > kFirst ? kStepsPerOctave * std::log2(seconds / kFirst) : 0;
   ++counts_[static_cast<std::size_t>(std::min(step, kSteps - 1.))];
   ++count_;

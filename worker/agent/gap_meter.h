@@ -1,6 +1,6 @@
-// Measures how long render threads idle between two units of one job: from the last sample of one to the
-// first of the next. A histogram with eight steps per octave from a microsecond on, so that quantiles are
-// accurate to 10 %.
+// Collects how long render threads idle between two units of one job, from the last sample of one unit to the
+// first sample of the next. The gaps are kept in a histogram with eight steps per octave, beginning at a
+// microsecond, so that quantiles are accurate to 10 %.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ class GapMeter {
   std::uint64_t count() const { return count_; }
   double total() const { return total_; }      // seconds
   double longest() const { return longest_; }  // seconds
-  // The quantile q in seconds; 0 without gaps.
+  // Returns the quantile q (0 to 1) of the gaps in seconds; 0 if there were none.
   double quantile(double q) const;
   std::string text() const;  // for the log
 

@@ -1,5 +1,6 @@
-// The units that this worker holds and their leases, in order of arrival. Plain data: no locks, no clock. A
-// unit is held once: a later lease that contains it takes it over.
+// The units that this worker holds, each one tile and one range of samples to render, and the leases by which
+// the coordinator assigned them, in order of arrival. It has no locks and no clock. A unit is held only once:
+// if a later lease contains it again, it belongs to that lease from then on.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ class HeldLeases {
   enum class State {
     waiting,
     running,
-    handed_in,  // its result awaits acknowledgement; rendered again only if it is rejected
+    // Its result waits to be acknowledged; the unit is rendered again only if the result is rejected.
+    handed_in,
   };
   struct Held {
     UnitKey key;
@@ -27,16 +29,19 @@ class HeldLeases {
     State state = State::waiting;
   };
 
-  // `handed_in(key)`: true if the outbox has a result of that unit.
+  // Adds the units of a lease. `handed_in(key)` must say whether the outbox has a result of that unit
+  // already.
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in);
   // Takes the first waiting unit of a job in `ready` and marks it running.
   std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
-  // Removes a finished unit. Returns the lease that it now belongs to; nullopt if it was dropped.
+  // Removes a unit that was running and has been rendered. Returns the lease to which it belongs now;
+  // nullopt: it was dropped meanwhile.
   std::optional<LeaseId> finish(const UnitKey& key);
-  // The unit's result was acknowledged, or rejected (then the unit waits again).
+  // Removes a unit whose result the coordinator has acknowledged. If the coordinator rejected the result
+  // (`refused`), the unit waits to be rendered again.
   void acknowledged(const UnitKey& key, bool refused);
 
-  // Removes units that are to be stopped, including running ones.
+  // Remove all units of a job or a lease, also those that are running.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
   // Removes the units that have not been started (only those of *job, if given). Returns the messages by
@@ -65,8 +70,9 @@ class HeldLeases {
   void drop_if(const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
-  std::map<std::uint64_t, UnitKey> queue_;  // waiting units by order
-  std::map<LeaseId, LeaseState> leases_;    // those with open units
+  // The waiting units by Entry::order, the first to be rendered first.
+  std::map<std::uint64_t, UnitKey> queue_;
+  std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;
 };

@@ -1,5 +1,6 @@
-// Events that wake the agent's control thread: messages of the current connection, its loss, or a nudge from
-// another thread. Shared with the link's observer, so that a late callback cannot reach a destroyed agent.
+// The queue of events that wake the agent's control thread: messages from the coordinator, the loss of the
+// connection, or a nudge from another thread (a call without content). The link's observer shares ownership
+// of it, so that a callback that comes late cannot reach a destroyed agent.
 #pragma once
 
 #include <condition_variable>
@@ -34,7 +35,7 @@ class Inbox {
     nudged_ = true;
     changed_.notify_one();
   }
-  // Returns all events; waits for one for at most this long.
+  // Waits for an event or a nudge, for at most this long, and returns all events that are in the queue.
   std::deque<Arrival> wait(Duration at_most) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });

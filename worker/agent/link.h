@@ -16,7 +16,7 @@ class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
   virtual void received(ToWorker message) = 0;  // called from any thread, in order
-  virtual void lost(Error why) = 0;             // once per connection; connect() may be called again
+  virtual void lost(Error why) = 0;  // called once per connection; then connect() may be called again
 };
 
 // Bytes of a blob from `offset` to its end.
@@ -30,11 +30,13 @@ struct BlobRequest {
 class CoordinatorLink {
  public:
   virtual ~CoordinatorLink() = default;
-  // Opens one stream and sends the hello. Messages, first Welcome or Refused, arrive through the observer.
+  // Opens a stream to the coordinator and sends the hello. The coordinator's messages, of which the first is
+  // Welcome or Refused, are passed to the observer.
   virtual Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) = 0;
-  virtual void send(FromWorker message) = 0;  // queued; lost if the connection ends
+  virtual void send(FromWorker message) = 0;  // queues the message; it is lost if the connection ends before
   virtual void close() = 0;
-  // The sink may return an error (disk full, wrong digest), which ends the transfer.
+  // Fetches the bytes and passes them to `sink` in order. If `sink` returns an error (disk full, wrong
+  // digest), the transfer ends.
   virtual Result<void> fetch_blob(const BlobRequest& wanted,
                                   const std::function<Result<void>(std::span<const std::byte>)>& sink) = 0;
 };

@@ -5,7 +5,8 @@
 
 namespace ls::worker {
 
-// Observer between a stream and the agent: inspects messages, and reports the stream's end once.
+// Stands between a stream and the agent's observer. It looks at the messages that it passes on, and reports
+// the end of the stream only once.
 class LinkRing::Watch final : public LinkObserver {
  public:
   Watch(std::shared_ptr<State> state, std::shared_ptr<LinkObserver> agent)

@@ -1,7 +1,7 @@
-// Several coordinators as one link, for farms that share workers between coordinators with jobs of their own.
-// The worker has a stream to one coordinator at a time, and moves to the next when that one does not welcome
-// it or has no work for a while. So workers reach a coordinator that has taken over another's jobs, and idle
-// workers find those that have work.
+// Makes several coordinators look like one link, for farms in which coordinators with jobs of their own share
+// the workers. The worker has a stream to one coordinator at a time. It moves to the next coordinator when
+// the current one does not welcome it or has had no work for it for a while. So idle workers find a
+// coordinator that has work, also one that has taken over the jobs of another.
 #pragma once
 
 #include <cstddef>
@@ -13,12 +13,14 @@
 
 namespace ls::worker {
 
-// Progress reports without a lease (one every few seconds) after which an idle worker moves on.
+// A worker moves on after this many progress reports in which it had no lease; an idle worker sends one every
+// few seconds.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {
  public:
-  // `first`: any number; decides which coordinator is tried first. Different numbers spread the workers.
+  // `first` decides which coordinator is tried first and may be any number; with a different number in each
+  // worker the workers spread over the coordinators.
   LinkRing(std::vector<std::unique_ptr<CoordinatorLink>> links, std::size_t first);
   ~LinkRing() override;
 

@@ -1,5 +1,5 @@
-// Results and failures that the coordinator has not acknowledged, oldest first. All of them are sent again
-// after a reconnect. Plain data: no locks.
+// Results and failures of units (one tile and one range of samples each) that the coordinator has not
+// acknowledged, oldest first. After a reconnect all of them are sent again. It has no locks.
 #pragma once
 
 #include <list>
@@ -13,7 +13,7 @@ class Outbox {
  public:
   void add(UnitResult result);
   void add(UnitFailure failure);
-  // Removes the oldest sent entry of this unit. False if there is none.
+  // Removes the oldest entry of this unit that was sent. False: there is none.
   bool acknowledge(const UnitKey& unit);
   void drop_job(const JobId& job);
 

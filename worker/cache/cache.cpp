@@ -17,9 +17,9 @@ namespace ls::worker {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kAttempts = 3;  // for complete transfers with a wrong digest
+constexpr int kAttempts = 3;  // how often a blob is fetched if it arrives complete but with a wrong digest
 
-// Holds a shared lock on the file during its lifetime.
+// A blob's file with a shared lock, which the object holds while it lives.
 class LockedFile final : public BlobFile {
  public:
   LockedFile(fs::path path, int fd) : path_(std::move(path)), fd_(fd) {}
@@ -33,7 +33,8 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// A blob that is missing, damaged or denied at the coordinator may become available later.
+// Turns an error of the coordinator that may pass (a blob that is missing, damaged or denied there) into one
+// of a kind that the agent tries again later.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;
@@ -76,8 +77,8 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) 
   return fail(Errc::internal, fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
 }
 
-// Null if the blob is not here, or its digest is wrong (then it is removed). An error if this machine cannot
-// check it: another copy would not help.
+// Returns the blob's file. Null: the blob is not in the cache, or its digest was wrong and the file has been
+// removed. Error: this machine cannot check the file, so fetching it again would not help.
 Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& digest) {
   const std::shared_ptr<const BlobFile> none;
   const fs::path path = blob_path(folder_, digest);
@@ -87,7 +88,7 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
   auto file = std::make_shared<const LockedFile>(path, fd);
   const Lock lock = lock_at(fd, path, LOCK_SH);
   if (lock == Lock::failed) return io_error("cannot lock", path);
-  if (lock == Lock::lost) return none;  // being evicted
+  if (lock == Lock::lost) return none;  // another process is removing the file
   if (!verified_.contains(digest)) {
     const auto found = sha256_file(path);
     if (!found) return fail(Errc::internal, found.error().message);
@@ -124,7 +125,8 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
     if (blob.bytes != 0 && size > blob.bytes)
       return fail(Errc::invalid_argument,
                   fmt::format("'{}' is longer than the {} bytes announced", blob.name, blob.bytes));
-    // The canonical scene's size is not known in advance: make room as it arrives.
+    // The size of a canonical scene (bytes == 0) is not known in advance, so room is made for it as it
+    // arrives.
     if (blob.bytes == 0)
       if (auto ok = make_room(size, partial.path()); !ok) return ok;
     return partial.append(bytes);
@@ -134,7 +136,8 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
 Result<void> BlobCache::make_room(std::uint64_t bytes, const fs::path& but) {
   if (limit_ == 0) return {};
   std::uint64_t total = bytes;
-  // Partial files first: they may be abandoned.
+  // The files of unfinished transfers are removed before blobs, because the transfers may have been
+  // abandoned.
   std::vector<StoredFile> files = stored_partials(folder_);
   std::erase_if(files, [&](const StoredFile& file) { return file.path == but; });
   for (StoredFile& blob : stored_blobs(folder_)) files.push_back(std::move(blob));

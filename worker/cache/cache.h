@@ -1,12 +1,13 @@
-// The worker's content-addressed store of blobs: DIR/ab/abcdef... by SHA-256.
+// The worker's store of blobs, the files of jobs: each is a file DIR/ab/abcdef... named after its SHA-256.
 //
-// Blobs become visible only when complete and verified. Interrupted transfers (DIR/partial/...) are resumed.
-// A file that no longer has its digest (bad disk, manipulation) is detected at its first use by this process,
-// removed and fetched again. A blob that arrives with a wrong digest is reported to the coordinator and
-// fetched again: no transfer error is ever the job's fault. Above the size limit, which includes transfers in
-// progress, the least recently used blobs are evicted, but never one in use: a BlobFile holds a shared flock
-// on its file, which also protects it from other workers that use the same folder. Only files with the
-// cache's own names in their own places are ever removed; CACHEDIR.TAG makes backups skip the folder.
+// A blob gets this name only when it is complete and verified. Transfers are written to DIR/partial/... and
+// resumed if they are interrupted. A file that no longer has its digest (bad disk, manipulation) is detected
+// at its first use by this process, removed and fetched again. A blob that arrives with a wrong digest is
+// reported to the coordinator and fetched again; no transfer error is ever counted as the job's fault. When
+// blobs and transfers in progress exceed the size limit, the least recently used blobs are removed, but never
+// one in use: a BlobFile holds a shared flock on its file, which also protects it from other workers that use
+// the same folder. Only files with the cache's own names in their own places are ever removed; CACHEDIR.TAG
+// makes backups skip the folder.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +32,8 @@ class BlobCache final : public BlobFiles {
   using Fetch =
       std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
 
-  // limit_bytes 0: no limit. Creates the folder.
+  // Creates the folder if it is missing. The cache keeps at most `limit_bytes` bytes; 0: no limit. It gets
+  // missing blobs by `fetch`.
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
                                                  Fetch fetch);
 
@@ -44,13 +46,14 @@ class BlobCache final : public BlobFiles {
   // `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
   Result<void> download(const BlobRef& blob, bool arrived_wrong);
   Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
-  // Evicts until `bytes` fit beside the file `but`, which is kept.
+  // Removes blobs and abandoned transfers, but never the file `but`, until `bytes` more bytes fit within the
+  // limit.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
   const Fetch fetch_;
-  std::mutex mutex_;           // one acquire at a time
+  std::mutex mutex_;           // held by acquire(), so that calls of it run one after the other
   std::set<Digest> verified_;  // digests verified by this process
 };
 

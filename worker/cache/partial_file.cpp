@@ -33,7 +33,8 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (fd < 0) return io_error("cannot write", path);
   PartialFile file(path, fd);
-  // Locked by another process, which may have moved it to its final place by now: do not write to it.
+  // If another process has the lock, or has moved the file to its final place by now, this one must not write
+  // to it.
   const Lock lock = lock_at(fd, path, LOCK_EX);
   if (lock == Lock::failed) return io_error("cannot lock", path);
   if (lock == Lock::lost) return open_own(path);
@@ -41,8 +42,8 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   return file;
 }
 
-// The name does not use the process id: workers in several containers may share the folder and have equal
-// ids.
+// Creates a file with a random name after `path`. The name cannot contain the process id, because workers in
+// several containers may share the folder and have equal ids.
 Result<PartialFile> PartialFile::open_own(const std::filesystem::path& path) {
   std::string name = path.string() + ".XXXXXX";
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);
@@ -105,7 +106,7 @@ Result<bool> PartialFile::finish(const Digest& expected, const std::filesystem::
     discard();
     return false;
   }
-  // The file system does not support RENAME_NOREPLACE.
+  // EINVAL: the file system does not support RENAME_NOREPLACE.
   if (errno == EINVAL && ::rename(path_.c_str(), place.c_str()) == 0) return true;
   return io_error("cannot store", place);
 }

@@ -1,6 +1,6 @@
-// A blob in transfer: bytes are appended to a separate file while their digest is computed; resumes from the
-// bytes of an earlier attempt. The file is locked, so that two workers on one folder cannot write to the same
-// one.
+// The file of a blob in transfer (a partial file): bytes are appended to it while their digest is computed. A
+// transfer continues after the bytes that an earlier attempt left in the file. The file is locked, so that
+// two workers that share a folder cannot write to the same file.
 //
 // Errors: resource_exhausted if the disk is full, internal if this machine cannot write or read for another
 // reason.
@@ -17,13 +17,14 @@
 
 namespace ls::worker {
 
-// Error for errno on `path`: resource_exhausted if the disk is full, else internal.
+// Makes an error from errno after an operation on `path` failed: resource_exhausted if the disk is full, else
+// internal.
 tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path);
 
 class PartialFile {
  public:
-  // Reads the bytes that exist already. If another process is writing the same blob, starts a new file of its
-  // own.
+  // Opens or creates the file at `path` and reads the bytes that are in it already, to compute their digest.
+  // If another process is writing that file, creates another one for this transfer.
   static Result<PartialFile> open(const std::filesystem::path& path);
   PartialFile(PartialFile&&) noexcept;
   PartialFile& operator=(PartialFile&&) = delete;
@@ -32,8 +33,9 @@ class PartialFile {
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
   Result<void> append(std::span<const std::byte> bytes);
-  // Verifies, syncs and moves the file to its final place. false: a file was already there and is kept, as it
-  // may be in use. invalid_argument: the digest differs; the file is removed.
+  // Checks the digest, syncs the file and moves it to `place`. Returns false if `place` has a file already:
+  // that one is kept, as it may be in use. invalid_argument: the digest is not `expected`; the file is
+  // removed.
   Result<bool> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();
 

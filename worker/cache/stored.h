@@ -1,5 +1,5 @@
-// Lists and removes files in a cache folder. Considers only files with the cache's own names in their own
-// places, so that other files in the folder are safe.
+// Lists and removes files in a cache folder (see cache.h). It considers only files with the cache's own names
+// in their own places, so that other files in the folder are safe.
 #pragma once
 
 #include <sys/stat.h>
@@ -25,18 +25,22 @@ struct StoredFile {
 
 std::filesystem::path blob_path(const std::filesystem::path& folder, const Digest& digest);
 
-// Least recently used first. Ignores links and other non-regular files.
+// Returns the complete blobs in the folder, the least recently used first. Ignores links and other files that
+// are not regular.
 std::vector<StoredFile> stored_blobs(const std::filesystem::path& folder);
-std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);  // in transfer, or left behind
+// Returns the files of blobs that are in transfer or whose transfer was abandoned.
+std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);
 
 // Removes the file unless another process has it locked.
 bool remove_unused(const std::filesystem::path& path);
 
-// Removes partial files that cannot be resumed: those private to a process that has ended.
+// Removes the files of transfers that nobody can resume, because they were private to a process that has
+// ended.
 void remove_orphans(const std::filesystem::path& folder);
 
-// Takes a flock without waiting. `lost`: another process has it, or the path was given to another file
-// between opening and locking. `failed`: this file system cannot lock; see errno.
+// Locks the file `fd`, which was opened at `path`, by flock(2) without waiting; `how` is LOCK_SH or LOCK_EX.
+// `lost`: another process has the lock, or another file has got this path between opening and locking.
+// `failed`: this file system cannot lock; errno says why.
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 

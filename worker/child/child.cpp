@@ -23,18 +23,19 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// A unit that survives this many deaths of the child in a row, caused by others, is no longer tried in this
-// worker. Each such death fails another unit, and after three the farm gives the worker no more units of that
-// job: an innocent unit must not reach the limit before the guilty ones do.
+// If the child dies this many times in a row while it renders a unit, each time because of another unit, this
+// worker gives the unit up. Each such death fails that other unit, and after three failures the farm gives
+// the worker no more units of that unit's job. The limit is high, so that a unit that is not at fault does
+// not reach it before the farm has stopped those that are.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
   return static_cast<std::size_t>(unit.rect.pixels()) *
          (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
 }
-// Consecutive children that may end by themselves before they are ready.
+// How many children in a row may end by themselves before they are ready; then the backend is broken.
 constexpr int kUnreadyChildren = 5;
-// from setting the stop flag to the child's reaction
+// How long after the stop flag was set the child must have answered; otherwise it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
@@ -73,7 +74,8 @@ class ChildBackend final : public RenderBackend {
   Result<void> greet(Process& process);
   tl::unexpected<Error> broken_by(std::string why);
   bool send_forgotten(Process& process);
-  // A child that has the job's world, with the job's number in it.
+  // Returns a child that has built the job's world; sets `number` to the job's number in the protocol with
+  // it.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
                                                                     std::uint64_t& number);
   tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
@@ -97,7 +99,7 @@ class ChildBackend final : public RenderBackend {
   std::optional<Error> broken_;
 };
 
-// Called with control_mutex_ held.
+// Returns the child, and starts a new one if it has ended. Call with control_mutex_ held.
 Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   {
     const std::lock_guard lock(mutex_);
@@ -113,7 +115,8 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   return process;
 }
 
-// A new child may lack resources (address space, descriptors) that are available a little later.
+// Starts a child and waits for its hello. A failed start is tried again, because resources that a new child
+// lacks (address space, descriptors) may be available a little later.
 Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   Duration pause = options_.respawn_pause;
   for (int tries = 1;; ++tries, pause *= 2) {
@@ -130,7 +133,8 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   }
 }
 
-// unavailable: it ended by itself, unlike the first one.
+// Waits for the child's hello. unavailable: the child ended by itself before it, although the first child did
+// not.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + options_.start_limit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
@@ -144,7 +148,7 @@ Result<void> ChildBackend::greet(Process& process) {
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
   if (numeric_class_ == Digest{})
-    numeric_class_ = answer->reply.numeric_class;  // the first child, started before any other thread
+    numeric_class_ = answer->reply.numeric_class;  // of the first child, before any other thread was started
   if (numeric_class_ != answer->reply.numeric_class)
     return broken_by(
         fmt::format("a new render child has the numeric class {}, not {} as this worker began with",
@@ -208,7 +212,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   return *process;
 }
 
-// False if the child is dead.
+// Tells the child which jobs' worlds to free. False: the child is dead.
 bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {

@@ -1,4 +1,5 @@
-// Serialises a LocalJob for the render child.
+// Converts a LocalJob (a job whose files are on this machine) to text and back, to send it to the render
+// child.
 #pragma once
 
 #include <string>

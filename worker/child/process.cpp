@@ -28,8 +28,9 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
               fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
 
-// The child's descriptors, in order of their number in the child, from kSharedMemoryFd on. They are first
-// moved above all those numbers, so that no dup2 overwrites another.
+// The descriptors that the child will get, in the order of their numbers in the child, from kSharedMemoryFd
+// on. In this process they get higher numbers than any number in the child, so that no dup2 into place
+// overwrites a descriptor that is still to be moved.
 class TheirEnds {
  public:
   explicit TheirEnds(int slots) : lowest_(kFirstSlotFd + slots + 1) {}
@@ -145,7 +146,9 @@ void Process::kill() {
 }
 
 Process::End Process::end() {
-  if (alive()) {  // not under the lock, which kill() needs; WNOWAIT does not reap it, so the id is not reused
+  // Wait without the lock, which kill() needs. WNOWAIT leaves the ended process unreaped, so its id is not
+  // reused.
+  if (alive()) {
     siginfo_t info{};
     while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
     }

@@ -1,4 +1,4 @@
-// One render child process, from spawn to exit.
+// One render child process (see child.h), from spawn to exit, as the agent's process sees it.
 #pragma once
 
 #include <sys/types.h>
@@ -29,12 +29,14 @@ class Process {
     Reply reply;
     std::string text;
   };
-  // Sends a request and waits for the answer, calling `watch` about every 50 ms, which may kill(). nullopt:
-  // the child died, or sent a malformed answer and was killed.
+  // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. Meanwhile
+  // it calls `watch` about every 50 ms, which may kill() the child. nullopt: the child died, or it sent a
+  // malformed answer and was killed for it.
   std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
   void kill();
-  // How the process ended. Waits for its end, which must be imminent; kill() works meanwhile.
+  // Waits for the end of the process, which must be imminent, and returns how it ended. kill() may be called
+  // meanwhile.
   struct End {
     std::optional<int> signal;
     int exit_code = 0;
@@ -50,11 +52,12 @@ class Process {
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  std::atomic<int> hung_slot{-1};      // the slot for whose lack of progress the watchdog killed it
-  std::atomic<bool> garbled{false};    // it was killed because of a malformed answer
+  std::atomic<int> hung_slot{-1};    // slot (render thread) without progress, for which the child was killed
+  std::atomic<bool> garbled{false};  // the child was killed because of a malformed answer
   std::atomic<bool> preparing{false};  // a world is being built
   std::mutex prepared_mutex;
-  std::set<std::uint64_t> prepared;  // jobs whose worlds it has; guarded by prepared_mutex
+  // Numbers of the jobs whose worlds the child has; guarded by prepared_mutex.
+  std::set<std::uint64_t> prepared;
 
  private:
   Process() = default;

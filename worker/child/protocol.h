@@ -1,5 +1,7 @@
-// Protocol between agent and render child: fixed-size frames over a socket pair per channel; sums and
-// breadcrumbs through one shared memory. Both are the same executable, so plain structs suffice.
+// The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
+// pair per channel: one channel for control and one for each slot, i.e. render thread. The pixel sums of
+// rendered units, and for each slot the sample that it is rendering, are in a memory that both share. Agent
+// and child are the same executable, so plain structs suffice.
 #pragma once
 
 #include <atomic>
@@ -25,24 +27,25 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// Size limit of a prepared job as JSON (child/job_text.h): the settings as a string; for each asset and the
-// scene's file the digest, bytes and name, then the digest again with the path. Escapes may double names and
-// paths.
+// Limit for the bytes of one asset in the text of a job (child/job_text.h): its digest, size and name, then
+// the digest again with the path. Escapes may double the bytes of names and paths.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
+// Limit for the bytes of the whole text: the settings as a JSON string, all assets and the scene's file.
 inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
 inline constexpr std::size_t kReasonBytes = 64 << 10;  // longest text of a reply
 
-// Floats of the largest partial that fits into a message: a tile of 202 x 202 pixels without AOVs.
+// Number of floats in the largest partial (the pixel sums of one unit) that fits into a message: a tile of
+// 202 x 202 pixels without AOVs.
 inline constexpr std::size_t kSlotFloats = 202 * 202 * 6;
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
 
-// Followed by `text_bytes` of text.
+// A request of the agent, followed by `text_bytes` bytes of text.
 struct Request {
   Kind kind{};
   std::uint32_t text_bytes = 0;  // prepare: the job (child/job_text.h)
-  std::uint64_t job = 0;         // number assigned by the parent
+  std::uint64_t job = 0;         // the number that the agent has given to the job
   std::uint32_t tile = 0, round = 0;
   PixelRect rect;
   SampleRange samples;
@@ -52,13 +55,15 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  std::uint32_t text_bytes = 0;  // reason of a failure; health of a rendered unit that is not clean
-  Digest numeric_class;          // hello
+  // Length of a text that follows: the reason of a failure, or the health of a rendered unit that is not
+  // clean.
+  std::uint32_t text_bytes = 0;
+  Digest numeric_class;  // hello
   double cpu_seconds = 0, wall_seconds = 0;
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
 
-// One per render thread, in the shared memory.
+// What agent and child share of one render thread; an array of these is the shared memory.
 struct Slot {
   render::Breadcrumb where;
   std::atomic<std::int32_t> tile{-1}, round{-1};
@@ -68,8 +73,8 @@ struct Slot {
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Blocking; false when the other side has closed. While waiting they call `watch`, if given, about every 50
-// ms.
+// Send or receive all bytes and block until that is done; false: the other side has closed the channel. While
+// they wait they call `watch`, if given, about every 50 ms.
 using Watch = std::function<void()>;
 bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
 bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});

@@ -24,8 +24,8 @@ namespace {
 
 // System calls.
 constexpr std::uint32_t kDeny = SECCOMP_RET_ERRNO | EPERM;
-// Numbers for x86-64, our only platform. io_uring is denied because it could open sockets without these
-// calls.
+// System calls that are always denied, by their numbers on x86-64, our only platform. io_uring is among them
+// because it could open sockets without the other calls.
 constexpr std::uint32_t kDenied[] = {
     SYS_socket,
     SYS_ptrace,
@@ -82,8 +82,8 @@ constexpr std::uint32_t kDenied[] = {
 };
 constexpr std::uint32_t kX32 = 0x40000000;  // the x32 numbers of the same calls
 
-// Calls that one argument decides: by its lower half, which is all that the kernel uses there. Each call is
-// listed once.
+// A system call that is allowed or denied depending on one of its arguments. Only the lower 32 bits of the
+// argument are compared; the kernel uses no others there. Each call is listed once.
 struct Decided {
   std::uint32_t call;
   unsigned argument;
@@ -99,8 +99,8 @@ std::vector<Decided> decided() {
           {SYS_ioctl, 1, false, {FIOSETOWN, SIOCSPGRP}}};
 }
 
-// Emits the test of one call: if the number matches, decides by the argument; otherwise continues after it,
-// with the number still loaded.
+// Appends the test of one call to the filter program. If the number of the system call matches, the test
+// decides by the argument; otherwise the program continues behind the test, with the number still loaded.
 void put(const Decided& d, std::vector<sock_filter>& program) {
   const auto n = static_cast<std::uint8_t>(d.values.size());
   program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, d.call, 0, static_cast<std::uint8_t>(n + 3)));
@@ -136,7 +136,7 @@ bool filter_calls() {
 
 // Files.
 //
-// Rights of Linux 5.13 (ABI 1); later ABIs add more.
+// Access rights that Landlock knows since Linux 5.13 (its ABI 1); later ABIs add more.
 constexpr std::uint64_t kRead = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 constexpr std::uint64_t kWrite = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR |
                                  LANDLOCK_ACCESS_FS_REMOVE_FILE | LANDLOCK_ACCESS_FS_MAKE_CHAR |
@@ -154,7 +154,7 @@ struct Descriptor {
   }
 };
 
-// A path that does not exist needs no rule.
+// Adds a rule that allows `rights` below `path`. A path that does not exist needs no rule.
 bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   const Descriptor place{::open(path.c_str(), O_PATH | O_CLOEXEC)};
   struct stat info {};
@@ -164,13 +164,14 @@ bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   return ::syscall(SYS_landlock_add_rule, rules, LANDLOCK_RULE_PATH_BENEATH, &rule, 0) == 0;
 }
 
-// landlock_ruleset_attr with the fields added since the headers that we build with.
+// The kernel's landlock_ruleset_attr, including fields that are newer than the headers that we build with.
 struct Ruleset {
   std::uint64_t files = 0;    // ABI 1
   std::uint64_t network = 0;  // ABI 4
   std::uint64_t scoped = 0;   // ABI 6
 };
-// signals, including the kernel's own by fcntl, stay within the sandbox
+// Signals of the sandboxed process, also those that the kernel sends for it (fcntl), reach only processes
+// within the sandbox
 constexpr std::uint64_t kScopeSignal = 2;
 
 bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
@@ -186,10 +187,10 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
   const auto own = std::filesystem::read_symlink("/proc/self/exe", error);
   constexpr std::uint64_t kRun = kRead | LANDLOCK_ACCESS_FS_EXECUTE;
   for (const char* folder : {"/usr", "/lib", "/lib64"}) done &= allow(rules.fd, folder, kRun);
-  // This program and the OpenVDB reader beside it; not their folder.
+  // Allow this program and the OpenVDB reader beside it, but not the folder that they are in.
   done &= allow(rules.fd, own, kRun);
   done &= allow(rules.fd, own.parent_path() / "lightshaft-vdb", kRun);
-  // Read by the loader and the thread library. Of /proc no other processes.
+  // Files that the dynamic loader and the thread library read. Of /proc other processes are not allowed.
   for (const char* path : {"/etc/ld.so.cache", "/etc/ld.so.preload", "/sys", "/proc/self", "/proc/cpuinfo",
                            "/proc/meminfo", "/proc/sys/vm", "/dev/urandom", "/dev/random"})
     done &= allow(rules.fd, path, kRead);
@@ -209,7 +210,7 @@ Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  const bool files = bound_files(readable, abi);  // first, because it makes system calls
+  const bool files = bound_files(readable, abi);  // before filter_calls(), because it makes system calls
   return {filter_calls(), files, files && abi >= 3};
 #endif
 }

@@ -13,11 +13,12 @@ struct Sandboxed {
   bool calls = false;
   // No writing; reading only the folders given and the system's libraries (Landlock).
   bool files = false;
-  bool sizes = false;  // nor truncating of readable files (Landlock of Linux 6.2)
+  bool sizes = false;  // and no truncating of files that may be read (needs the Landlock of Linux 6.2)
 };
 
-// `readable`: folders that may be read entirely. Restrictions that the kernel does not support are skipped;
-// the result says which hold. Call while single-threaded: existing threads would stay unrestricted.
+// Restricts this process from now on. `readable` lists the folders in which it may read everything.
+// Restrictions that the kernel does not support are skipped; the result says which ones hold. Call it while
+// the process has one thread, because other threads that exist already would stay unrestricted.
 Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable);
 
 }  // namespace ls::worker::child

@@ -42,7 +42,7 @@ void watch_fatal_signals() {
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
 }
 
-// A separate stack for the handler, as the thread's own may have overflowed.
+// A separate stack on which the signal handler runs, because the thread's own stack may have overflowed.
 struct AltStack {
   AltStack() : memory(kAltStackBytes) {
     stack_t stack{};
@@ -88,7 +88,8 @@ class Server {
   }
 
  private:
-  // Runs `run`; an exception becomes the reply's outcome. Returns the reply's text.
+  // Calls `run` and returns the text for the reply. If `run` throws, the exception becomes the reply's
+  // outcome.
   template <class Run>
   static std::string guarded(Reply& reply, Run run) {
     try {
@@ -168,7 +169,7 @@ class Server {
 
 void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  // otherwise it would be called "exe", as it is started as /proc/self/exe
+  // Name the process: started as /proc/self/exe, it would be called "exe".
   ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);

@@ -1,4 +1,4 @@
-// The CoordinatorLink over gRPC.
+// The worker's connection to a coordinator (CoordinatorLink) over gRPC.
 #pragma once
 
 #include <memory>
@@ -15,8 +15,9 @@ struct LinkTls {
   std::string cert, key;  // our own
 };
 
-// `address` is "host:port". `join_token` is sent with blob fetches (the hello has its own). Without `tls` the
-// connection is not encrypted. Does not connect yet.
+// Makes a link to the coordinator at `address`, "host:port", without connecting yet. `join_token` is sent
+// with requests for blobs; the token for joining is in the hello. Without `tls` the connection is not
+// encrypted.
 std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token,
                                                 const std::optional<LinkTls>& tls = {});
 

@@ -12,7 +12,7 @@ std::shared_ptr<WorkCall> WorkCall::start(pb::Farm::Stub& stub, const WorkerHell
   call->self_ = call;
   call->context_.set_wait_for_ready(false);
   stub.async()->Work(&call->context_, call.get());
-  call->AddHold();  // for writes started outside of reactions
+  call->AddHold();  // keeps the call open for writes that are started outside of the On... functions
   call->StartRead(&call->incoming_);
   call->send(hello);
   call->StartCall();
@@ -61,7 +61,8 @@ void WorkCall::OnReadDone(bool ok) {
     if (!writing_) release_hold_locked();
     return;
   }
-  if (!wire::known(incoming_)) {  // sent by a newer coordinator, which must work without our reply
+  // A kind of message that only newer versions know: a newer coordinator must not depend on our handling it.
+  if (!wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
   }

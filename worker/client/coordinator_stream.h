@@ -1,6 +1,6 @@
-// One stream to the coordinator: outgoing messages are queued (the agent's outbox bounds the queue), incoming
-// ones go to the observer. Keeps itself alive from StartCall to OnDone, so that the link may drop it at any
-// time.
+// One gRPC stream to the coordinator. Messages to the coordinator are queued, bounded by the size of the
+// agent's outbox; messages from it are passed to the observer. The object keeps itself alive from StartCall
+// to OnDone, so that the link may drop its pointer at any time.
 #pragma once
 
 #include <condition_variable>
@@ -21,8 +21,8 @@ class WorkCall final
                                          std::shared_ptr<LinkObserver> observer);
 
   void send(const FromWorker& message);
-  // Sends the queued messages, ends the stream and waits for that, for at most this long; then cancels it.
-  // Must not be called from a reaction.
+  // Sends the queued messages, ends the stream and waits until it has ended. If that takes longer than
+  // `at_most`, the stream is cancelled. Must not be called from one of the On... functions below.
   void close(Duration at_most);
 
   void OnReadDone(bool ok) override;

@@ -1,4 +1,4 @@
-// Converts a gRPC status to an Error; the inverse of the coordinator's table.
+// Converts a gRPC status to an Error: the inverse of status_code() in coordinator/rpc/grpc_status.h.
 #pragma once
 
 #include <grpcpp/support/status.h>

@@ -16,7 +16,7 @@
 namespace ls::worker {
 namespace {
 
-constexpr std::size_t kAllocationChunk = 64 << 20;  // size of each allocation of the `memory` fault
+constexpr std::size_t kAllocationChunk = 64 << 20;  // bytes that the fault `memory` allocates at a time
 
 double thread_cpu_seconds() {
   timespec t{};
@@ -95,7 +95,7 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // False if stopped meanwhile.
+  // Sleeps for `delay`. False: `stop` was set meanwhile.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
     while (!stop && std::chrono::steady_clock::now() < end)

@@ -1,6 +1,6 @@
-// The fake renderer: every unit is a pure function of its job's seed, its pixels and its samples
-// (common/image/film/fake_pixels.h). It opens no scene file. For tests of everything but rendering, and load
-// tests of a farm.
+// The fake renderer, for tests of everything but rendering, and for load tests of a farm. Its result for a
+// unit (one tile and one range of samples) is a pure function of the job's seed, the pixels and the samples
+// (common/image/film/fake_pixels.h). It opens no scene file.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,8 @@ namespace ls::worker {
 // A fault injected into chosen units, for tests.
 struct FakeFault {
   enum class Kind { none, crash, hang, memory, wrong, unhealthy } kind = Kind::none;
-  // Selects units by the job's seed, tile and round. Negative: any.
+  // The fault befalls the units with this job's seed, this tile and this round (the number of the unit's
+  // range of samples). A negative value selects any.
   std::int64_t seed = -1, tile = -1, round = -1;
 };
 // "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong, unwell; empty: none.
@@ -26,7 +27,7 @@ Result<FakeFault> parse_fake_fault(std::string_view text);
 Digest fake_numeric_class();  // SHA-256 of "fake"
 
 struct FakeOptions {
-  Duration delay{};           // sleep per unit
+  Duration delay{};           // how long the renderer sleeps for each unit
   double sample_seconds = 0;  // additional time per sample of a pixel, reported as CPU time
   FakeFault fault;
   Digest numeric_class = fake_numeric_class();  // set to another one to simulate another class of machine

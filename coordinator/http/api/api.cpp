@@ -59,7 +59,8 @@ std::string target_of(const Request& request) {
   return target;
 }
 
-// Redirects the client to the coordinator that has the job; nullopt: there is none.
+// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator cannot be found out or
+// does not answer; nullopt: no coordinator has the job.
 std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
                                      const Params& params) {
   if (params.empty() || !plausible_id(params[0])) return std::nullopt;
@@ -98,7 +99,8 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
-  // Identified callers were counted when they were identified.
+  // A request with a known caller was already counted when its caller was identified; the others are counted
+  // here, by address.
   if (request.caller.token_id.empty())
     if (auto refused = auth_.too_often(request, nullptr)) return *refused;
   return found;

@@ -20,12 +20,13 @@
 
 namespace ls::http {
 
-// Receives a streamed body. If destroyed before finish(), nothing of the body is kept, except of an upload in
-// parts.
+// Receives the body of one request in pieces, as they arrive. If the sink is destroyed before finish(), what
+// it has received is thrown away, except in an upload in parts, where a later request can continue.
 class BodySink {
  public:
   virtual ~BodySink() = default;
-  // A response: stop reading and send this answer
+  // Takes the next bytes of the body. Returns a response if the body is rejected: the caller then stops
+  // reading and sends that response.
   virtual std::optional<Response> append(std::span<const std::byte> bytes) = 0;
   virtual Response finish() = 0;
 };
@@ -36,22 +37,25 @@ class Api {
   Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits limits, StaticFiles files,
       bool secure = false);
 
-  // Returns the matching route, or the final answer: unknown address, missing or insufficient token, too many
-  // requests, body too long, a static file. Sets request.caller.
+  // Decides from the header alone what happens to the request, and sets request.caller. Returns the matching
+  // route, or a Response that the server sends without calling handle(): a static file, or an error (unknown
+  // address, missing or insufficient token, too many requests, body too long).
   std::variant<Response, Match> admit(Request& request);
-  // Most bytes that this request's body may have, with or without Content-Length.
+  // Returns how many bytes this request's body may have at most, with or without Content-Length.
   std::uint64_t body_limit(const Route& route, const Request& request) const;
-  // How this request's body is handled: the route's kind, or `archive` if it has a media type that the route
-  // unpacks.
+  // Returns how this request's body is to be read: BodyKind::archive if its media type is in Route::unpacks,
+  // else Route::body.
   BodyKind body_kind(const Route& route, const Request& request) const;
   // Runs the route's handler; never throws.
   Response handle(const Match& match, const Request& request);
-  // True if another coordinator may have the job behind this 404. Then call ask_other_coordinator(), which
-  // may block for a second: it returns a redirect to that coordinator, 503 if that does not answer, or
-  // `response` unchanged.
+  // True if `response` is a 404 for a job that another coordinator may have. The caller should then call
+  // ask_other_coordinator(), which finds the job's coordinator and may block for a second. It returns a
+  // redirect to that coordinator, 503 if that coordinator does not answer, or `response` unchanged if no
+  // coordinator has the job.
   bool may_be_another_coordinators(const Match& match, const Response& response) const;
   Response ask_other_coordinator(const Match& match, const Request& request, Response response);
-  // For streamed bodies: BodyKind::blob and archive.
+  // Returns the sink for a body that is streamed (BodyKind::blob and archive), or the response that rejects
+  // the request.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
   // Makes long work end at its next step, because the coordinator stops.
   void ask_to_stop() { stop_.request_stop(); }
@@ -62,8 +66,8 @@ class Api {
   TokenRegistry& tokens() { return tokens_; }
   Counters& counters() { return counters_; }
   const Limits& limits() const { return limits_; }
-  // Sets the source of the webhook counters in /metrics; call it before the first request. Without it there
-  // are none.
+  // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
+  // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<WebhookFigures()> figures) { webhooks_ = std::move(figures); }
   std::optional<WebhookFigures> webhooks() const {
     return webhooks_ ? std::optional(webhooks_()) : std::nullopt;
@@ -92,7 +96,8 @@ Response guarded(std::string_view what, const std::function<Response()>& work);
 // True if the id has the characters and length of ids made here; anything else is no job.
 bool plausible_id(std::string_view id);
 
-// The job in a request's address; with ?frame=N that frame of the sequence. not_found: it cannot be a job.
+// Returns the id of the job in a request's address. With ?frame=N the address names a sequence (a job with
+// several frames), and the id is that of its frame N. not_found: the text cannot be the id of a job.
 Result<JobId> job_of(const Request& request, const Params& params);
 
 }  // namespace ls::http

@@ -45,7 +45,8 @@ class StoreSink final : public BodySink {
   std::uint64_t limit_, received_ = 0;
 };
 
-// The blob exists already, undamaged: nothing is written, but a different body is still rejected.
+// Receives the body of a blob that exists already, undamaged. Writes nothing, but rejects a body that differs
+// from the blob.
 class CompareSink final : public BodySink {
  public:
   CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
@@ -75,7 +76,7 @@ void send_offset(Response& response, std::uint64_t offset, bool complete) {
   response.headers.emplace_back("Upload-Complete", complete ? "?1" : "?0");
 }
 
-// A rejection with the offset from which to continue.
+// Makes the rejection of a part; its answer tells the client the offset from which to continue.
 Response refused_part(int status, std::string_view detail, std::uint64_t offset) {
   Response response = problem(status, detail);
   send_offset(response, offset, false);
@@ -216,7 +217,7 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
     const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
     if (!digest) return problem(digest.error());
     const auto there = api.coordinator().blobs().find(*digest);
-    if (!there) return problem(there.error());  // unknown, which is not the same as missing
+    if (!there) return problem(there.error());  // the store cannot tell now whether it has the blob
     if (!*there) missing.push_back(digest->hex());
   }
   return json_response(200, write_json({{"missing", std::move(missing)}}));

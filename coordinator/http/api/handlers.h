@@ -1,5 +1,5 @@
-// One function per route: request -> response. Called on the route's executor, possibly by several threads at
-// once.
+// The functions that answer requests, one per route of the table in routes.h. Each is called on the thread
+// pool that its route names (Route::executor), possibly by several threads concurrently.
 #pragma once
 
 #include "coordinator/http/api/routes.h"

@@ -88,7 +88,7 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
          f.units_leased);
   head(out, "lightshaft_units_freed_total", "counter",
        "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
-  // All causes, even with count 0, so that rates are defined from the first event on.
+  // All causes are listed, even with count 0, so that Prometheus can compute rates from the first event on.
   for (const auto& [cause, word] : coordinator::kFreedCauses) {
     const auto count = f.units_freed.find(cause);
     fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,

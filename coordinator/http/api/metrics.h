@@ -15,7 +15,7 @@
 
 namespace ls::http {
 
-// Counters of the server loop. Thread-safe.
+// Counters that the HTTP server loop increments and /metrics shows. Thread-safe.
 class Counters {
  public:
   void answered(Method method, int status);
@@ -31,11 +31,13 @@ class Counters {
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
 
-// Counters of the notifications sent to webhooks (coordinator/webhooks)
+// Numbers of notifications to webhooks (coordinator/webhooks) since the start: accepted by a receiver,
+// attempts that failed, notifications given up; and those that wait to be sent now.
 struct WebhookFigures {
   std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
 };
 
+// Returns the text of /metrics. Without `webhooks` it has no webhook counters.
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
                          const Counters& counters, const coordinator::StoreStatus& store = {},

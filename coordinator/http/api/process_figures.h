@@ -5,7 +5,7 @@
 
 namespace ls::http {
 
-struct ProcessFigures {  // 0: unknown
+struct ProcessFigures {  // a value that could not be read is 0
   std::uint64_t resident_bytes = 0;
   std::uint64_t open_files = 0;
   std::uint64_t threads = 0;

@@ -1,5 +1,5 @@
-// The route table: every address, who may use it, how large a body may be and where the work runs.
-// openapi.json describes the same routes; a test compares the two.
+// The route table: for every address who may use it, how large its request's body may be and on which threads
+// its handler runs. openapi.json describes the same routes; a test compares the two.
 #pragma once
 
 #include <cstdint>
@@ -17,26 +17,30 @@ namespace ls::http {
 
 class Api;
 
+// Who may use a route, by the role of the caller's token (Role in message/caller.h).
 enum class Access {
-  open,    // everybody
-  token,   // any token except a worker's: submit, read, admin. A submit token sees only its own jobs
-  submit,  // submit, admin
-  see,     // read, admin: data of all users
-  admin,
+  open,   // everybody, also without a token
+  token,  // the roles submit, read and admin: any token but a worker's. A submit token sees only its own jobs
+  submit,  // the roles submit and admin
+  see,     // the roles read and admin, because the route shows data of all users
+  admin,   // the role admin
 };
 std::string_view to_string(Access access);
 bool allows(Access access, Role role);
+// On which threads a route's handler runs: the network thread or one of three thread pools, so that slow work
+// never delays quick answers.
 enum class Executor {
-  here,    // on the network thread: must not block
-  quick,   // answered from memory
-  slow,    // reads scenes, writes images
-  remote,  // asks other machines, which may not answer for a while
+  here,    // the network thread; the handler must not block
+  quick,   // the pool for handlers that answer from memory
+  slow,    // the pool for handlers that read scenes or write images
+  remote,  // the pool for handlers that ask other machines, which may not answer for a while
 };
 enum class BodyKind {
-  none,      // any body is ignored
-  buffered,  // whole, at most body_limit bytes
-  blob,      // streamed into Api::open_upload
-  archive,   // streamed, too, and unpacked at its end, which takes time. Chosen per request, never in a route
+  none,      // a body is ignored
+  buffered,  // the body is read into memory as a whole, at most Route::body_limit bytes
+  blob,      // the body is streamed into the sink that Api::open_upload returns
+  archive,   // like blob, but the sink's finish() unpacks an archive, which takes time. Chosen by
+             // Api::body_kind for single requests; no route in the table has it
 };
 
 using Params = std::vector<std::string>;  // values of the {..} in the pattern, in order

@@ -48,7 +48,8 @@ Result<Json> parse_number(std::string_view key, std::string_view text, std::stri
   return wrong(key, text, expected);
 }
 
-// The JSON value of one key of the spec; nullopt if there is no such key.
+// Parses the text of one query parameter as the JSON value of the spec's key of that name; nullopt: there is
+// no such key.
 std::optional<Result<Json>> parse_value(std::string_view key, std::string_view text) {
   if (key == "spp" || key == "seed" || key == "max_workers" || key == "max_units" || key == "memory")
     return parse_number<std::uint64_t>(key, text, "a whole number");
@@ -81,7 +82,7 @@ Result<void> add_define(Json& defines, std::string_view text) {
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
   auto whole = parse_spec_object(base);
   if (!whole) return tl::unexpected(whole.error());
-  // Report errors in `base` even if the query overrides the key.
+  // Errors in `base` are reported even if the query replaces the value of the wrong key.
   if (const auto alone = job_spec_of(*whole); !alone) return alone;
   Json spec = Json::object();
   Json defines = Json::object();

@@ -1,5 +1,5 @@
-// The dashboard's files, built into the executable. Requests match exact names only: no path ever reaches a
-// disk.
+// Serves the dashboard's files, which are built into the executable. A request finds a file only by its exact
+// name in a table in memory, so no request can read other files of the disk.
 #pragma once
 
 #include <map>
@@ -21,7 +21,8 @@ struct StaticFile {
 class StaticFiles {
  public:
   explicit StaticFiles(std::span<const StaticFile> files);
-  // "/" is index.html. nullopt if there is no such file.
+  // Returns the response with the file that the request's path names; "/" names index.html. nullopt: there is
+  // no such file.
   std::optional<Response> find(const Request& request) const;
 
  private:

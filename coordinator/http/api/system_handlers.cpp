@@ -21,7 +21,7 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // Browsers send the header when they reconnect: it is newer than the parameter in the original address.
+  // Browsers send the header Last-Event-ID when they reconnect; its id is newer than that in the address.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {

@@ -1,8 +1,8 @@
 // Authentication of requests: by a bearer token, or by a session cookie that was issued for a token.
 //
-// A session is `expiry.nonce.token-id.mac`; the key of the MAC is the admin token. It needs no memory,
-// survives a restart of the coordinator, and becomes invalid when its token is revoked. Sessions closed by
-// DELETE /session are remembered until they expire or the process ends.
+// The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
+// coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
+// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends.
 #pragma once
 
 #include <cstdint>
@@ -28,27 +28,29 @@ UnixClock system_unix_clock();
 class Auth {
  public:
   struct Options {
-    Pace requests{};      // per token, or per address without a token
-    Pace failures{};      // wrong tokens per address
-    bool secure = false;  // over TLS: restrict the cookie to TLS
+    Pace requests{};      // how many requests each token, or each address without a token, may send
+    Pace failures{};      // how many wrong tokens each address may send
+    bool secure = false;  // requests arrive over TLS: the cookie is restricted to TLS
   };
   // `tokens` must outlive this.
   Auth(const TokenRegistry& tokens, Options options, UnixClock now = system_unix_clock());
 
-  // The caller, or a 401, 403 or 429. With an unsafe method a cookie counts only if the browser says that the
-  // request comes from our own pages.
+  // Returns who sends the request, or the response 401, 403 or 429. In a request that may change something
+  // (any method but GET, HEAD and OPTIONS) a cookie counts only if the browser's headers say that the request
+  // comes from a page of this server.
   std::variant<Caller, Response> identify(const Request& request);
 
-  // 429 if this caller, or (without one) this address, sends too many requests.
+  // Counts the request and returns a 429 if its caller sends too many. Without a caller (null) the client's
+  // address is counted instead.
   std::optional<Response> too_often(const Request& request, const Caller* caller);
 
   // True if the token of this caller has not been revoked.
   bool still_valid(const Caller& caller) const;
 
-  // POST /session: the Set-Cookie value for a token, or the error.
+  // For POST /session: returns the Set-Cookie value of a new session for this token, or the error response.
   std::variant<std::string, Response> open_session(const Request& request, std::string_view token);
-  // DELETE /session: invalidates the request's session, if any, and returns the Set-Cookie value that clears
-  // it.
+  // For DELETE /session: invalidates the request's session, if it has one, and returns the Set-Cookie value
+  // that removes the cookie from the browser.
   std::string close_session(const Request& request);
 
   // True if Origin or Sec-Fetch-Site shows that another site sent this request.
@@ -64,11 +66,13 @@ class Auth {
 
   const TokenRegistry& tokens_;
   const Options options_;
-  std::string cookie_name_;  // contains part of the key's digest, since cookies are shared between ports
+  // Contains part of the digest of the session key: browsers share cookies between all ports of a host, and
+  // two coordinators on one host must not overwrite each other's.
+  std::string cookie_name_;
   UnixClock now_;
   Throttle throttle_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::int64_t, std::less<>> revoked_;  // session -> expiry
+  std::map<std::string, std::int64_t, std::less<>> revoked_;  // expiry of each closed session, by its text
 };
 
 }  // namespace ls::http

@@ -8,15 +8,15 @@ namespace {
 
 constexpr std::size_t kMaxBuckets = 10'000;
 constexpr std::size_t kMaxKnown = 64;
-constexpr std::size_t kGroupsOfPrefix = 4;  // 16-bit groups: an IPv6 /64
+constexpr std::size_t kGroupsOfPrefix = 4;  // number of 16-bit groups in the /64 prefix of an IPv6 address
 
 }  // namespace
 
 Throttle::Bucket& Throttle::fill(Buckets& buckets, std::string_view who, const Pace& pace, std::int64_t now) {
   auto found = buckets.find(who);
   if (found == buckets.end()) {
-    // A bucket that would be full by now is equivalent to a new one. If dropping those makes no room, all
-    // buckets start anew: memory stays bounded, however many clients come.
+    // Memory must stay bounded, however many clients come. Buckets that would be full by now are dropped
+    // first, since a new bucket is full, too. If that makes no room, all buckets are dropped.
     if (buckets.size() >= kMaxBuckets)
       std::erase_if(buckets, [&](const auto& b) {
         return b.second.known.empty() &&

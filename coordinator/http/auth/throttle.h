@@ -1,5 +1,6 @@
-// Rate limits: a bucket of requests per token, or per address without a token, and a bucket of wrong tokens
-// per address. Buckets fill with the seconds of the wall clock; if it jumps back, nothing is filled.
+// Rate limits by token buckets: one bucket counts the requests of each token (or of each address, for
+// requests without a token), another the wrong tokens from each address. A bucket refills by Pace::per_second
+// for every second of the wall clock; if the clock jumps back, nothing is refilled.
 #pragma once
 
 #include <cstdint>
@@ -20,23 +21,25 @@ class Throttle {
  public:
   Throttle(Pace requests, Pace failures) : requests_(requests), failures_(failures) {}
 
-  // Takes one request of this token or address. Returns the seconds to wait; 0: allowed.
+  // Counts one request of `who`, a token's id or an address, at the time `now`. Returns after how many
+  // seconds it would be allowed; 0: it is allowed.
   int request(std::string_view who, std::int64_t now);
 
-  // Checks whether a token from this address may be tried: after too many wrong ones only tokens that were
-  // right here before may, so that guessing stops without locking out legitimate users. Returns the seconds
-  // to wait; 0: allowed.
+  // Checks whether a token from this address may be tried. After too many wrong tokens from an address only
+  // tokens that were right from there before may be tried, so that guessing stops without locking out
+  // legitimate users. Returns the seconds to wait; 0: the token may be tried.
   int may_try(const std::string& address, std::string_view token_id, std::int64_t now);
   void failed(const std::string& address, std::int64_t now);
   void succeeded(const std::string& address, std::string_view token_id, std::int64_t now);
 
-  // An IPv4 address itself; the /64 of an IPv6 address, since one person has that many addresses.
+  // Returns the text under which an address is counted: an IPv4 address itself, and the /64 prefix of an IPv6
+  // address, since one person usually has a whole /64.
   static std::string group_of(const std::string& address);
 
  private:
   struct Bucket {
-    double level = 0;
-    std::int64_t at = 0;
+    double level = 0;                // requests, or wrong tokens, that are allowed now
+    std::int64_t at = 0;             // when `level` was computed: seconds since 1970
     std::vector<std::string> known;  // ids of the last kMaxKnown tokens that were right from this address
   };
   using Buckets = std::map<std::string, Bucket, std::less<>>;

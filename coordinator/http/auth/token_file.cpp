@@ -97,7 +97,7 @@ Result<std::string> read_list(const std::filesystem::path& file) {
   return text;
 }
 
-// Written to a temporary file and renamed: a crash leaves no partial file.
+// Writes a temporary file and renames it, so that a crash never leaves `file` half written.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text) {
   const std::string aside = file.string() + ".new";
   ::unlink(aside.c_str());

@@ -24,7 +24,8 @@ Result<std::string> read_list(const std::filesystem::path& file);
 // Replaces the file in one step, mode 0600: a crash leaves the old one or the new one.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text);
 
-// Detects the replacement of a file; all zero if there is none.
+// Identifies a state of a file: if two of these differ, the file was replaced or written between them. All
+// zero: there is no file.
 struct FileState {
   std::uint64_t inode = 0, size = 0;
   std::int64_t changed_ns = 0;
@@ -32,9 +33,9 @@ struct FileState {
 };
 FileState file_state(const std::filesystem::path& file);
 
-// Locks out other processes from a folder's secrets during its lifetime; blocks until it has the lock. Best
-// effort: if no lock file can be created in the folder, nothing can be written there either. An empty path
-// locks nothing.
+// Holds a lock on a folder while the object lives, so that other processes do not change the folder's secrets
+// meanwhile. The constructor blocks until it has the lock. If no lock file can be created in the folder, it
+// goes on without one: then nothing can be written there either. An empty path locks nothing.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

@@ -97,7 +97,8 @@ Result<void> TokenRegistry::read_all() const {
   return {};
 }
 
-// If the file cannot be read, everything stays as it is, and the error is logged once.
+// Rereads the file of tokens if it has changed. If it cannot be read, the known tokens stay as they are, and
+// the error is logged once.
 void TokenRegistry::look_again_locked() const {
   if (file_.empty()) return;
   const FileState now = file_state(file_);
@@ -136,7 +137,7 @@ std::optional<Caller> TokenRegistry::find(std::string_view token) const {
   const std::lock_guard lock(mutex_);
   look_again_locked();
   std::optional<Caller> found;
-  for (const Entry& e : entries_)  // all of them, so that the time does not reveal the position
+  for (const Entry& e : entries_)  // compares all, so that the time taken does not show which one matches
     if (equal_secret(digest, e.digest)) found = {e.info.role, e.info.user, e.info.id};
   return found;
 }

@@ -1,6 +1,7 @@
-// All known tokens: DATA/token (admin) and DATA/join-token in the clear, all others only as SHA-256 in
-// DATA/tokens, one per line: `ROLE USER SHA256`, with USER `-` if there is none. Several coordinators may
-// share one folder (--secrets): each reads what another has written when it next checks a token.
+// All known tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') hold their
+// tokens in the clear. Of all other tokens DATA/tokens holds only the SHA-256, one per line: `ROLE USER
+// SHA256`, with USER `-` if there is none. Several coordinators may share one folder (--secrets): each
+// rereads the file, if another one has changed it, before it checks a token.
 #pragma once
 
 #include <filesystem>
@@ -27,18 +28,19 @@ struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
   Role role = Role::read;
   std::string user;
-  bool of_file = false;  // DATA/token or DATA/join-token: revoked only by deleting the file
+  // The token is in DATA/token or DATA/join-token and is revoked only by deleting that file.
+  bool of_file = false;
 };
 
 class TokenRegistry {
  public:
-  // In memory. With an empty join token no worker can join by it.
+  // Makes a registry without files. If `join_token` is empty, no token lets a worker join.
   explicit TokenRegistry(std::string admin_token, std::string join_token = {});
   // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition: a
   // file that others may write (or, for secrets, read), or an invalid line, named with its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
-  // The caller with this token, or nullopt. Takes equally long for wrong and right tokens.
+  // Returns the caller with this token, or nullopt for a wrong token. Takes equally long for both.
   std::optional<Caller> find(std::string_view token) const;
   std::optional<Caller> by_id(std::string_view id) const;
   bool may_join(std::string_view token) const;
@@ -47,14 +49,16 @@ class TokenRegistry {
     TokenInfo info;
     std::string token;  // shown once, stored nowhere
   };
-  // invalid_argument: the user name is missing or invalid; resource_exhausted: kMaxTokens, or the disk is
-  // full.
+  // Makes a token and stores its SHA-256. invalid_argument: the user name is missing or invalid.
+  // resource_exhausted: there are kMaxTokens already, or the disk is full.
   Result<Made> add(Role role, std::string user);
-  // not_found; failed_precondition: the token is one of the two files.
+  // Makes the token with this id invalid. not_found: there is none. failed_precondition: the token is that of
+  // DATA/token or DATA/join-token.
   Result<void> revoke(std::string_view id);
   std::vector<TokenInfo> list() const;
 
-  // The key for signing sessions; changes with the admin token.
+  // Returns the key with which session cookies are signed. It is derived from the admin token, so that a new
+  // admin token ends all sessions.
   const std::string& session_key() const { return session_key_; }
 
  private:

@@ -8,10 +8,10 @@
 
 namespace ls::http {
 
-// Removes what the worker does for other users.
+// Clears the fields of `worker` that show what it does for other users' jobs.
 void hide_work(coordinator::WorkerView& worker);
 
-// The event as this caller may see it; nullopt: not at all.
+// Returns the event without what this caller may not see; nullopt: the caller may not see the event at all.
 std::optional<coordinator::StreamEvent> visible(const coordinator::StreamEvent& event, const Caller& caller);
 
 }  // namespace ls::http

@@ -22,7 +22,8 @@ namespace {
 constexpr std::size_t kReadBlock = 64u << 10;
 constexpr std::int64_t kTarBlock = 512;
 
-// libarchive converts names to the thread's locale; in "C" it would lose all but ASCII.
+// Sets a UTF-8 locale for this thread while the object lives: libarchive converts names to the thread's
+// locale, and in the locale "C" it would lose all characters but ASCII.
 class Utf8Names {
  public:
   Utf8Names() : before_(locale() ? ::uselocale(locale()) : nullptr) {}
@@ -41,11 +42,12 @@ class Utf8Names {
 
 enum class Trouble { none, stopped, unreadable, list_too_long };
 
-// Source of the archive's bytes, as libarchive's callbacks.
+// Where libarchive's callbacks get the archive's bytes from.
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;
-  // Limits a zip's list of entries, which libarchive keeps in memory and reads with the first entry.
+  // How many more bytes of a zip's list of entries may be read. libarchive reads the list together with the
+  // first entry and keeps it in memory, so its size must be limited.
   std::int64_t list_bytes_left = static_cast<std::int64_t>(kMaxArchiveList);
   bool reads_list = true;
   std::stop_token stop;
@@ -108,7 +110,7 @@ struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
   std::unique_ptr<archive, FreeArchive> reader;
-  std::int64_t data_end = 0;  // of the last entry read, in the unpacked tar
+  std::int64_t data_end = 0;  // offset in the unpacked tar at which the data of the last entry read end
 
   Error error(std::string_view doing) const;
   std::int64_t position() const { return archive_filter_bytes(reader.get(), 0); }
@@ -148,7 +150,7 @@ Result<ArchiveReader> ArchiveReader::open(int fd, ArchiveKind kind, std::stop_to
   state->reader.reset(archive_read_new());
   archive* a = state->reader.get();
   if (!a) return fail(Errc::unavailable, "not enough memory to read an archive");
-  // A zip is read only through the list at its end: a truncated zip has none.
+  // A zip is read only through the list of entries at its end, so a zip that was cut off is an error.
   bool ready = kind == ArchiveKind::zip ? archive_read_support_format_zip_seekable(a) == ARCHIVE_OK
                                         : archive_read_support_format_tar(a) == ARCHIVE_OK &&
                                               archive_read_support_filter_gzip(a) == ARCHIVE_OK;
@@ -172,7 +174,8 @@ Result<std::optional<ArchiveEntry>> ArchiveReader::next() {
   const int code = archive_read_next_header(a, &e);
   s.source.reads_list = false;
   if (code == ARCHIVE_EOF) {
-    // A tar ends with a block of zeros; without one it was cut off between two entries.
+    // A complete tar ends with a block of zeros. If nothing follows the last entry, the file was cut off
+    // between two entries.
     const std::int64_t padded = (s.data_end + kTarBlock - 1) / kTarBlock * kTarBlock;
     if (s.kind == ArchiveKind::tar && s.position() <= padded)
       return fail(Errc::invalid_argument,

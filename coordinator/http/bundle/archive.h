@@ -1,6 +1,6 @@
-// The only user of libarchive: reads a zip, or a tar (plain or gzip), as a sequence of entries whose bytes
-// stream. Knows nothing about bundles; it only guarantees that damaged archives are errors and that memory
-// stays bounded.
+// Reads a zip, or a tar (plain or gzip), entry by entry, each entry's bytes piece by piece; the only user of
+// libarchive. It knows nothing about bundles (bundle.h). It guarantees that a damaged archive is an error and
+// that memory stays bounded.
 #pragma once
 
 #include <cstddef>
@@ -28,17 +28,18 @@ struct ArchiveEntry {
 
 class ArchiveReader {
  public:
-  // Reads `fd`, a regular file, from its beginning, by offset: the caller keeps the file, and its position
-  // does not change. invalid_argument: no such archive. After a stop request any later call fails with
-  // `unavailable`.
+  // Opens the archive in `fd`, a regular file that the caller keeps open. Reads by offset (pread), so that
+  // the file's position does not change. invalid_argument: the file is not an archive of this kind. After a
+  // stop request through `stop` every later call of the reader fails with `unavailable`.
   static Result<ArchiveReader> open(int fd, ArchiveKind kind, std::stop_token stop);
   ~ArchiveReader();
   ArchiveReader(ArchiveReader&&) noexcept;
 
-  // Requires that the previous entry was read to its end. nullopt: the archive's end marker (a file that
-  // merely ends is an error).
+  // Goes on to the next entry; the previous one must have been read to its end. nullopt: the archive's end
+  // marker has been reached. A file that ends without an end marker is an error.
   Result<std::optional<ArchiveEntry>> next();
-  // Reads the entry's next bytes; 0: its end, and its checksum, if any, was right.
+  // Reads the next bytes of the current entry and returns how many. 0: the entry has ended, and its checksum,
+  // if it has one, was right.
   Result<std::size_t> read(std::span<std::byte> into);
 
  private:

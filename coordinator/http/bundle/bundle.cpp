@@ -19,13 +19,14 @@ tl::unexpected<Error> refused(const Error& error) {
   return error.code == Errc::invalid_argument ? bad_bundle(error.message) : tl::unexpected(error);
 }
 
-// An error inside an archive, with the entry in which it occurred.
+// Adds the name of the entry in which the error occurred to an error about the archive.
 tl::unexpected<Error> within(const Error& error, std::string_view name) {
   if (error.code != Errc::invalid_argument) return tl::unexpected(error);
   return bad_entry(name, error.message);
 }
 
-// The first pass: reads, counts and hashes everything; keeps only names, digests and job.json.
+// The first of two passes over the archive. Reads, counts and hashes everything, and keeps only names,
+// digests and the text of job.json.
 class Survey {
  public:
   Survey(const BundleLimits& limits, std::uint64_t archive_bytes)
@@ -115,7 +116,8 @@ class Survey {
     return {};
   }
 
-  // True at the top, or directly in the first folder that has one (which may turn out to be the top).
+  // True if this file may be the bundle's job.json: it lies at the top, or directly in one of the first
+  // folders that have a job.json (if everything lies in one folder, that folder counts as the top).
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     const std::size_t slash = name.find('/');
@@ -131,7 +133,7 @@ class Survey {
   std::vector<std::byte> buffer_ = std::vector<std::byte>(kBodyChunk);
 };
 
-// The second pass: stores the files that the blob store lacks.
+// The second pass over the archive: stores those files that the blob store lacks.
 Result<void> store(ArchiveReader& archive, const std::vector<BundleFile>& files,
                    coordinator::BlobStore& blobs) {
   std::vector<std::byte> buffer(kBodyChunk);

@@ -1,6 +1,6 @@
-// A bundle: a scene with all its files in one archive. Decides what it may contain, which file is the scene,
-// and stores the files as blobs. The whole archive is checked first, so that nothing of a rejected archive is
-// stored.
+// A bundle is a scene with all its files in one archive. read_bundle() checks what the archive contains,
+// decides which file is the scene, and stores the files as blobs. It checks the whole archive before it
+// stores the first file, so that nothing of a rejected archive is stored.
 #pragma once
 
 #include <cstdint>
@@ -23,16 +23,16 @@ struct BundleLimits {
 };
 
 struct Bundle {
-  std::string scene;  // its name in the archive, for messages
+  std::string scene;  // the scene file's name in the archive, for messages
   Digest scene_digest;
   // All other files by the names that the scene uses: relative to the scene's folder.
   std::map<std::string, Digest> assets;
   std::string spec = "{}";  // JSON: the keys of job.json except the scene
 };
 
-// The scene is the file that job.json names ({"scene": FILE, and the keys of the spec}), otherwise the only
-// .xml file at the top. If everything lies in one folder, that folder is the top. Names are normalised
-// ("./a//b" is "a/b").
+// Reads the archive of `archive_bytes` bytes in `fd`. The scene is the file that job.json names ({"scene":
+// FILE, and the keys of the spec}); without a job.json it is the only .xml file at the top. If everything
+// lies in one folder, that folder is the top. Names are normalised ("./a//b" is "a/b").
 //
 // Rejected, naming the entry: names that are absolute, lead out by "..", are not UTF-8, or have control
 // characters or backslashes; links and devices; duplicate names; encrypted entries and unusual compression;
@@ -42,8 +42,8 @@ struct Bundle {
 Result<Bundle> read_bundle(int fd, std::uint64_t archive_bytes, ArchiveKind kind, const BundleLimits& limits,
                            coordinator::BlobStore& blobs, const std::stop_token& stop);
 
-// Returns the normalised name of an entry; empty: the top folder itself. The error says what is wrong with
-// it.
+// Returns the normalised name of an entry; an empty name is the top folder itself. The error says what is
+// wrong with the name.
 Result<std::string> normal_name(std::string_view name);
 
 }  // namespace ls::http

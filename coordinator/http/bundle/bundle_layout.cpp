@@ -17,16 +17,16 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostShown = 5;  // names in a message
+constexpr std::size_t kMostShown = 5;  // most names that a message lists
 
 std::string shown(std::string_view name) {
   return fmt::format("\"{}\"", plain_text(name.substr(0, kMaxAssetName)));
 }
 
-// Files that file managers add and that no scene uses.
+// True for files that file managers add to archives and that no scene uses.
 bool is_litter(std::string_view name) { return name.starts_with("__MACOSX/") || name.starts_with('.'); }
 
-// "folder/" if all files lie in that one folder, else "".
+// Returns "FOLDER/" if all files lie in one folder FOLDER, else "".
 std::string top_of(const std::vector<BundleFile>& files) {
   std::string top;
   for (const BundleFile& file : files) {
@@ -53,7 +53,7 @@ std::string listed(const std::vector<std::string>& names) {
   return names.size() > kMostShown ? text + fmt::format(" and {} more", names.size() - kMostShown) : text;
 }
 
-// The scene's name in the archive: the only .xml at the top.
+// Returns the name in the archive of the only .xml file at the top, which is the scene.
 Result<std::string> only_scene(const std::vector<BundleFile>& files, const std::string& top) {
   std::vector<std::string> found;
   for (const BundleFile& file : files) {
@@ -98,7 +98,7 @@ Result<JobFile> read_job_file(const std::string& text) {
     out.scene = scene->get<std::string>();
     job.erase(scene);
   }
-  // The spec's keys are beside the scene or, as in a JSON request, in an object of their own.
+  // The keys of the spec are beside "scene" or, as in a JSON request, in an object "spec" of their own.
   if (const auto spec = job.find("spec"); spec != job.end()) {
     if (!spec->is_object() || job.size() != 1)
       return bad_bundle("'spec' in job.json must be an object, and the only key besides 'scene'");
@@ -108,7 +108,7 @@ Result<JobFile> read_job_file(const std::string& text) {
   return out;
 }
 
-// `name` relative to `folder` ("" or "a/b/").
+// Returns `name` relative to `folder` ("" or "a/b/"), as a scene in that folder would write it.
 std::string seen_from(std::string_view folder, std::string_view name) {
   std::size_t common = 0;
   for (std::size_t i = 0; i < std::min(folder.size(), name.size()) && folder[i] == name[i]; ++i)

@@ -1,4 +1,5 @@
-// Makes a bundle from the files of an archive; the part of bundle.h that reads no archive.
+// Makes a bundle (a scene with its files) from the list of an archive's files. This part of read_bundle()
+// reads no archive itself.
 #pragma once
 
 #include <map>
@@ -18,13 +19,15 @@ struct BundleFile {
 };
 
 struct BundleContents {
-  std::vector<BundleFile> files;                 // in the archive's order
-  std::map<std::string, std::string> job_files;  // candidates for job.json: text by name
+  std::vector<BundleFile> files;  // in the archive's order
+  // The text of every file that may turn out to be the job.json.
+  std::map<std::string, std::string> job_files;
 };
 
 Result<Bundle> sorted_out(const BundleContents& contents);
 
-// invalid_argument, "the bundle: ..."; bad_entry() also names the entry.
+// Make errors of the kind invalid_argument whose text begins with "the bundle: "; bad_entry() also names the
+// entry.
 tl::unexpected<Error> bad_bundle(std::string text);
 tl::unexpected<Error> bad_entry(std::string_view name, std::string_view what);
 

@@ -1,4 +1,4 @@
-// A request's body, buffered on disk: an unnamed file that disappears with its object or the process.
+// Buffers a request's body on disk, in an unnamed file that disappears with the Spool object or the process.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,8 @@ namespace ls::http {
 
 class Spool {
  public:
-  // In `folder`, which is created if missing; empty: the system's folder for temporary files.
+  // Creates the file in `folder`, which is created if it is missing. An empty path means the system's folder
+  // for temporary files.
   static Result<Spool> open(const std::filesystem::path& folder);
   ~Spool();
   Spool(Spool&& other) noexcept;

@@ -5,7 +5,7 @@
 namespace ls::http {
 namespace {
 
-// Larger than any file, yet sums stay far below 2^64.
+// Numbers above this are rejected. It is larger than any file, yet sums of two such numbers stay below 2^64.
 constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
 
 std::optional<std::uint64_t> number(std::string_view text) {

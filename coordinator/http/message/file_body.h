@@ -1,4 +1,5 @@
-// A body in a file: sent slice by slice, so that a slow reader does not keep it in memory.
+// The body of a response that lies in a file. It is sent slice by slice, so that it does not fill memory
+// while a slow client reads it.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +13,9 @@
 namespace ls::http {
 
 struct FileBody {
-  std::shared_ptr<const int> fd;  // closed with the last copy; stays readable even if the file is removed
-  std::uint64_t size = 0;         // bytes
+  // Closed with the last copy of the FileBody; readable even after the file's removal.
+  std::shared_ptr<const int> fd;
+  std::uint64_t size = 0;  // bytes
 };
 
 // not_found: there is no such file.

@@ -10,10 +10,10 @@
 
 namespace ls::http {
 
-// The body as an object with no keys except `known`; the error says what is wrong.
+// Parses the body as a JSON object that may have only the keys in `known`; the error says what is wrong.
 Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known);
 
-// A SHA-256 in hexadecimal (either case); `what` names it in the error.
+// Parses a SHA-256 in hexadecimal digits (either case); `what` names the value in the error.
 Result<Digest> read_digest(std::string_view text, std::string_view what);
 Result<Digest> read_digest(const nlohmann::json& value, std::string_view what);
 

@@ -31,19 +31,19 @@ inline constexpr std::size_t kMaxBundleNames = 16u << 20;    // bytes of all nam
 inline constexpr std::size_t kMaxBundleJobJson = 1u << 20;   // job.json
 inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;  // a zip's directory, which is read as a whole
 inline constexpr std::uint64_t kMaxBundleRatio = 200;        // unpacked bytes per byte of the archive...
-// ...in addition to these bytes: empty grids compress well
+// ...and this many unpacked bytes more, because a small archive of empty grids may compress even better
 inline constexpr std::uint64_t kBundleSlack = 64u << 20;
 
 // Buffers
 inline constexpr std::size_t kReadBuffer = 64u << 10;   // per connection
 inline constexpr std::size_t kBodyChunk = 256u << 10;   // written to the disk at once
-inline constexpr std::size_t kWriteSlice = 256u << 10;  // between two checks of the clock
-// Request bodies in memory, over all connections
+inline constexpr std::size_t kWriteSlice = 256u << 10;  // written to a client between two checks of the clock
+// Bytes of request bodies that all connections together may hold in memory
 inline constexpr std::uint64_t kMaxBuffered = 256u << 20;
-// Bodies of answers in memory, over all connections. A larger answer is sent when no other is; bodies in
-// files do not count.
+// Bytes of answers that all connections together may hold in memory, not counting bodies in files. A single
+// answer larger than this is sent while no other answer is counted.
 inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
-inline constexpr std::uint64_t kSmallAnswer = 64u << 10;  // never rejected and not counted
+inline constexpr std::uint64_t kSmallAnswer = 64u << 10;  // an answer up to this size is not counted
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;  // read and discarded after an early rejection
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
@@ -56,8 +56,9 @@ struct Limits {
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
-  std::size_t event_streams = 128;  // part of `connections`; the others stay free for requests
-  std::size_t event_queue = 4096;   // events waiting for one reader
+  // How many of `connections` may be event streams; the rest is for requests.
+  std::size_t event_streams = 128;
+  std::size_t event_queue = 4096;  // events waiting for one reader
   std::size_t event_queue_bytes = 4u << 20;
   double header_seconds = 10;  // from the first byte of a request to the end of its header
   double idle_seconds = 60;    // of a kept connection between two requests
@@ -71,7 +72,7 @@ struct Limits {
   // Requests per token, or per address without a token; 0: no limit. The burst is twice as large
   double requests_per_second = 500;
   double wrong_tokens_per_minute = 20;  // per address, with a burst of the same size; then 429; 0: no limit
-  double stop_seconds = 5;              // for open requests when the coordinator stops
+  double stop_seconds = 5;              // how long a stopping coordinator waits for open requests
   int quick_threads = 2;                // for answers from memory
   int remote_threads = 8;               // for requests to other machines: blob stores, other coordinators
   int user_priority = 0;                // highest priority of jobs with a submit token

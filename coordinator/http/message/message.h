@@ -37,10 +37,11 @@ struct Request {
   std::optional<std::string_view> parameter(std::string_view name) const;  // the first of this name
 };
 
-// Set in a response that continues as Server-Sent Events.
+// What a stream of Server-Sent Events shall contain. A Response with an EventStream is followed by the
+// events.
 struct EventStream {
-  std::optional<std::uint64_t> after_id;  // nullopt: from now on
-  std::string job;                        // empty: all jobs
+  std::optional<std::uint64_t> after_id;  // only events with higher ids; nullopt: only those from now on
+  std::string job;                        // only events of this job; empty: of all jobs
   Caller reader;                          // restricts the events to what the reader may see
 };
 
@@ -48,7 +49,7 @@ struct Response {
   int status = 200;
   std::string content_type;  // empty: no body
   Fields headers;
-  // A span refers to static data
+  // The body; a span refers to static data
   std::variant<std::string, std::vector<std::byte>, std::span<const std::byte>, FileBody> body;
   std::optional<EventStream> events;
 

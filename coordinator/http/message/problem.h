@@ -16,9 +16,10 @@ int status_of(Errc code);
 // {type, title, status, detail}; `detail` says what happened, where, and what to do.
 Response problem(int status, std::string_view detail);
 Response problem(const Error& error);
-// 429 with Retry-After.
+// Returns a 429 that asks the client, by Retry-After, to wait for `wait_seconds`.
 Response too_many(int wait_seconds, std::string_view detail);
-// For a rejected scene, with diagnostics: [{severity, file, line, column, text, source_line, length}].
+// Returns the problem of a rejected scene. It has one more member, diagnostics: [{severity, file, line,
+// column, text, source_line, length}].
 Response problem(const Error& error, std::span<const Diagnostic> diagnostics);
 
 }  // namespace ls::http

@@ -43,7 +43,7 @@ net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const
   auto end = [sink = std::move(sink), whole]() mutable {
     std::optional<Response> answer;
     if (whole) answer = sink->finish();
-    sink.reset();  // here, on the pool: it may remove a large file
+    sink.reset();  // here, on a thread of the pool, because it may remove a large file, which takes time
     return answer;
   };
   const bool unpacks = whole && shared_.api.body_kind(*match.route, request) == BodyKind::archive;
@@ -59,7 +59,8 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
   while (!parser.is_done()) {
     const Read read = co_await read_portion(parser, chunk, began, received);
     if (read != Read::ok) {
-      // An upload in parts keeps what has arrived, even if connections never last for a whole chunk.
+      // The rest of the body will not arrive. What has arrived still goes to the sink, so that an upload in
+      // parts makes progress even if no connection lasts for a whole chunk.
       disarm();
       auto keep = [&sink, &chunk] {
         return chunk.empty() ? std::nullopt : sink.append(std::as_bytes(std::span(chunk)));
@@ -73,7 +74,7 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
     auto append = [&sink, &chunk] { return sink.append(std::as_bytes(std::span(chunk))); };
     auto refused = co_await run_on(shared_.slow, shared_.io, std::move(append));
     if (refused) co_return Body{Read::ok, std::move(refused)};
-    began += SteadyClock::now() - paused;  // the client is not charged for our disk's time
+    began += SteadyClock::now() - paused;  // the time spent on our disk does not count as the client's
     chunk.clear();
   }
   co_return Body{};

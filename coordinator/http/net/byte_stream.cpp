@@ -122,8 +122,8 @@ void Stream::close() {
 Stream::Awaitable<void> Stream::send_goodbye() {
   Code ec;
   if (through_tls_) {
-    // Do not wait for the client's close_notify: the end of the socket is as good. Later bytes are read as
-    // plain bytes.
+    // Do not wait for the client's close_notify (TLS's own end of the stream): the end of the socket shows
+    // the same. Bytes that still arrive are read without TLS and thrown away.
     SSL* raw = tls_->stream.native_handle();
     SSL_set_shutdown(raw, SSL_get_shutdown(raw) | SSL_RECEIVED_SHUTDOWN);
     co_await tls_->stream.async_shutdown(net::redirect_error(net::use_awaitable, ec));

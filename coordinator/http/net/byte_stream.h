@@ -1,5 +1,5 @@
-// A client's socket, plain or with TLS: the only user of libssl in the HTTP server. Without TLS no libssl
-// code runs. Includes Boost.
+// Reads and writes a client's socket, plain or with TLS; the only user of libssl in the HTTP server. Without
+// TLS no libssl code runs. Includes Boost.
 #pragma once
 
 #include <array>
@@ -25,8 +25,9 @@ class Stream {
   ~Stream();
 
   enum class Opened { ready, plain_text, failed };
-  // Does the TLS handshake; returns at once without TLS. plain_text: the client speaks no TLS; further writes
-  // are sent in plain text, so that it can be told. Ends early when cancelled.
+  // Does the TLS handshake; without TLS it has nothing to do and returns `ready`. plain_text: the client
+  // speaks no TLS; further writes are sent in plain text, so that an error can be reported to the client.
+  // After cancel() it ends early.
   Awaitable<Opened> open();
 
   Awaitable<std::size_t> read_some(boost::asio::mutable_buffer into, Code& ec);

@@ -55,7 +55,7 @@ net::awaitable<void> Connection::serve() {
   }
 }
 
-// A handshake has the time limit of a header; a slow client delays only itself.
+// Does the TLS handshake, which may take as long as a request's header; a slow client delays only itself.
 net::awaitable<bool> Connection::open() {
   arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));
   const Stream::Opened opened = co_await stream_.open();
@@ -146,7 +146,8 @@ net::awaitable<Response> Connection::handle_on_executor(const Match& match, cons
   co_return co_await run_on(shared_.remote, shared_.io, std::move(ask));
 }
 
-// An answer larger than the limit is sent when no other is in memory.
+// Counts the answer, unless it is small. An answer larger than kMaxAnswers is let through while no other
+// answer is counted.
 bool Connection::charge_answer(std::uint64_t bytes) {
   shared_.answers -= std::exchange(answer_charged_, 0);
   if (bytes <= kSmallAnswer) return true;
@@ -159,7 +160,7 @@ net::awaitable<Connection::Read> Connection::read_header(Parser& parser) {
   if (buffer_.size() == 0) {
     idle_ = true;
     arm(SteadyClock::now() + steady_seconds(limits_.idle_seconds));
-    if (co_await fill() != Read::ok) co_return Read::closed;  // no request, so no answer
+    if (co_await fill() != Read::ok) co_return Read::closed;  // no request has begun, so nothing is answered
     idle_ = false;
   }
   arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));

@@ -1,5 +1,5 @@
-// One client's connection, from accept to close, as a coroutine on the network thread. Includes Boost: only
-// the files of the server loop may include this.
+// One client's connection, from accept to close, served by a coroutine on the network thread (the one thread
+// that waits for all sockets). Includes Boost: only the files of the server loop may include this header.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ inline SteadyClock::duration steady_seconds(double seconds) {
 
 class Connection;
 
-// State shared by all connections. Except for the pools it is used by the network thread only.
+// State that all connections share. Only the network thread uses it, except for the thread pools.
 struct Shared {
   net::io_context& io;
   net::thread_pool& quick;
@@ -57,24 +57,29 @@ class Connection {
   net::awaitable<void> serve();
 
   bool idle() const { return idle_; }
-  void wind_down();  // for a stopping server: closes now if no request is in progress, else after its answer
-  void cut();        // closes now
+  // For a stopping server: closes the connection now if no request is in progress, else after the answer to
+  // that request.
+  void wind_down();
+  void cut();  // closes now
 
  private:
   enum class Read { ok, closed, too_slow, malformed, header_too_large };
-  // The result of reading a body. With an answer the body was rejected, and part of it may still arrive.
+  // The result of reading a body. If `answer` is set, the body was rejected with it, and the client may still
+  // be sending the rest.
   struct Body {
     Read read = Read::ok;
     std::optional<Response> answer;
   };
 
   // connection.cpp
-  net::awaitable<bool> open();       // false: close
-  net::awaitable<bool> serve_one();  // false: close
+  net::awaitable<bool> open();       // false: the caller closes the connection
+  net::awaitable<bool> serve_one();  // false: the caller closes the connection
   net::awaitable<Read> read_header(Parser& parser);
   net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
   net::awaitable<Response> handle_on_executor(const Match& match, const Request& request);
-  bool charge_answer(std::uint64_t bytes);  // counts against kMaxAnswers; false: too much at once
+  // Counts an answer of this many bytes in Shared::answers. False: all answers together would exceed
+  // kMaxAnswers.
+  bool charge_answer(std::uint64_t bytes);
   net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
   net::awaitable<void> answer_unread(const Response& response);
   net::awaitable<void> answer_failed_read(Read read);
@@ -86,7 +91,9 @@ class Connection {
   net::awaitable<Read> read_portion(Parser& parser, std::string& into, SteadyClock::time_point began,
                                     std::uint64_t& received);
   net::awaitable<bool> send_continue(const Request& request);
-  bool charge(std::uint64_t bytes);  // counts against kMaxBuffered; false: too much at once
+  // Counts a request's body of this many bytes in Shared::buffered. False: all bodies together would exceed
+  // kMaxBuffered.
+  bool charge(std::uint64_t bytes);
 
   // event_writer.cpp
   net::awaitable<void> stream_events(const Request& request, const Response& response);
@@ -97,7 +104,9 @@ class Connection {
   net::awaitable<Read> fill();  // reads more bytes into buffer_
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
   net::awaitable<bool> write_file(std::string_view head, const FileBody& file);
-  // Enforces the minimum rate of a longer body of which `sent` bytes have been sent since `began`.
+  // Sends `head` and `body`, which is all or a slice of a response's body. Of the whole, `sent` bytes have
+  // been sent since `began`; it is increased by what is sent now. False: the client takes the bytes too
+  // slowly (see Limits::min_rate) or has gone.
   net::awaitable<bool> write_paced(std::string_view head, std::span<const std::byte> body,
                                    SteadyClock::time_point began, std::uint64_t& sent);
   net::awaitable<void> linger();
@@ -117,7 +126,8 @@ class Connection {
   std::uint64_t charged_ = 0, answer_charged_ = 0;
   std::array<char, 64> discard_{};
   beast::flat_buffer buffer_;
-  std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);  // callbacks check it first
+  // Callbacks hold a weak_ptr to this and do nothing once the connection has been destroyed.
+  std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);
 };
 
 }  // namespace ls::http

@@ -47,7 +47,8 @@ void EventQueue::push(const coordinator::StreamEvent& event, const coordinator::
     text_ += text;
     ++events_;
   }
-  if (first) wake_();  // only then: the reader checks again after it has taken all
+  // Only the first event wakes the reader: one that is awake looks for more events before it waits again.
+  if (first) wake_();
 }
 
 std::string EventQueue::take() {

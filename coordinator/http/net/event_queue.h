@@ -1,5 +1,5 @@
-// Queue between the coordinator, which publishes events on any thread and must never block, and one reader's
-// connection.
+// The queue of events for one reader of an event stream. The coordinator pushes events on any thread and must
+// never block; the reader's connection takes their text and sends it.
 #pragma once
 
 #include <cstddef>
@@ -22,21 +22,23 @@ class EventQueue {
     std::size_t events = 0;
     std::size_t bytes = 0;
   };
-  // `job`: only events of this job and those of no single job; empty: all. `after_id`: the last id that the
-  // reader knows; if the first event pushed does not have the next id, the reader has missed some and gets a
-  // `reset` first.
+  // If `job` is set, the reader gets only the events of this job (and of its frames) and those that belong to
+  // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader knows:
+  // if the first event pushed does not have the next id, the reader has missed events and gets a `reset`
+  // first. `wake` is called when the queue is no longer empty.
   EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake);
 
-  // Called on any thread, in the order of ids. Never blocks; an event that does not fit ends the queue: see
-  // overflowed().
+  // Adds an event; may be called on any thread, in the order of the events' ids. It never blocks. An event
+  // that exceeds the bounds is dropped, and overflowed() is true from then on.
   void push(const coordinator::StreamEvent& event) { push(event, &event); }
-  // `shown`: the event as the reader may see it; null: not at all.
+  // Adds `shown` in place of `event`: what the reader may see of it. Null: the reader may not see the event
+  // at all.
   void push(const coordinator::StreamEvent& event, const coordinator::StreamEvent* shown);
 
-  // Takes the waiting text for the wire; empty if there is none.
+  // Removes the text of all waiting events from the queue and returns it, to be sent; empty if there is none.
   std::string take();
-  // True if the reader was too slow: after the last take() the connection ends. The reader reconnects with
-  // the last id it saw.
+  // True if the reader was too slow and an event had to be dropped. The connection then sends what take()
+  // returns and ends, and the reader connects again with the id of the last event that it got.
   bool overflowed() const;
   // No wake() is called after this returns.
   void close();
@@ -45,7 +47,8 @@ class EventQueue {
   const Bounds bounds_;
   const std::string job_;
   mutable std::mutex mutex_;
-  std::optional<std::uint64_t> expected_;  // the next id; nullopt after the first event
+  // Id that the first event should have; nullopt after the first event.
+  std::optional<std::uint64_t> expected_;
   std::function<void()> wake_;
   std::string text_;
   std::size_t events_ = 0;

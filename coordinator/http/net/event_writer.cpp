@@ -31,7 +31,7 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  bool reset = false;  // the reader's id was never published here: it is from another data folder
+  bool reset = false;  // this coordinator never published the reader's id; it comes from another data folder
 };
 
 }  // namespace
@@ -87,7 +87,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
   co_await write_events(*queue, wanted.reader);
   queue->close();
   auto unsubscribe = [handle = std::move(subscription)]() mutable {
-    handle.reset();  // on the pool: it may wait for a callback in progress
+    handle.reset();  // on a thread of the pool, because it may wait for a callback in progress
     return true;
   };
   co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
@@ -112,7 +112,8 @@ net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& r
   }
 }
 
-// Readers send nothing more: whatever arrives, most likely the close, ends the stream.
+// Watches for the end of an event stream's client. The client has nothing more to send after its request, so
+// whatever arrives (most likely the end of the connection) ends the stream.
 void Connection::watch_reader() {
   stream_.read_in_background(net::buffer(discard_), [this, alive = std::weak_ptr(alive_)] {
     if (alive.expired()) return;

@@ -38,7 +38,8 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
   field("Date", http_date(unix_seconds));
   if (!response.content_type.empty()) field("Content-Type", response.content_type);
   const bool bodyless = response.status == 204 || response.status == 304;
-  // For HEAD, the length is that of GET; a route with its own HEAD has no length to report.
+  // The answer to HEAD has the length of the answer to GET. If a route answers HEAD by itself, without a
+  // content type, there is no length to report.
   const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
   if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
   for (const auto& [name, value] : response.headers) field(name, value);

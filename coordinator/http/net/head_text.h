@@ -1,4 +1,4 @@
-// Serialises the header of a response.
+// Writes the header of a response as text.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,8 @@ struct HeadOptions {
   Method method = Method::get;
 };
 
-// Returns status line, fields and the empty line. Adds Date, length, and the security headers of every
-// response.
+// Returns the status line, the header fields and the empty line behind them. The fields are those of
+// `response`, and Date (from `unix_seconds`), the length, and the security headers of every response.
 std::string head_text(const Response& response, const HeadOptions& options, std::int64_t unix_seconds);
 
 }  // namespace ls::http

@@ -50,7 +50,8 @@ Result<Address> parse_address(const std::string& text) {
 }  // namespace
 
 struct Server::State {
-  // The order matters: what a coroutine's frame uses must outlive the io_context that destroys the frame.
+  // The order of these members matters: destroying the io_context destroys the frames of coroutines, so all
+  // that these frames use must come before it.
   std::unique_ptr<net::thread_pool> quick, slow, bundles, remote;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};

@@ -14,15 +14,17 @@ class TlsIdentity;  // tls_identity.h
 
 class Server {
  public:
-  // Binds and listens on "host:port" (port 0: any; "[::1]:8080" for IPv6). A port in use is an error: ports
-  // are never shared. Connections wait until start().
+  // Listens on `address`, "host:port" ("[::1]:8080" for IPv6); with port 0 the system chooses the port. A
+  // port in use is an error, because ports are never shared. Clients that connect wait until start().
   static Result<std::unique_ptr<Server>> listen(const std::string& address);
   ~Server();  // stops
 
   int port() const;  // valid until stop()
-  // `api` must outlive stop(). With `tls`, plain text is rejected.
+  // Starts to serve requests by calls of `api`, which must exist until stop() has returned. With `tls`
+  // clients must use TLS; others get an error.
   void start(Api& api, std::shared_ptr<const TlsIdentity> tls = nullptr);
-  // Stops listening, ends event streams, gives open requests Limits::stop_seconds, then closes them.
+  // Stops listening, ends event streams, waits up to Limits::stop_seconds for open requests and then closes
+  // their connections.
   void stop();
 
  private:

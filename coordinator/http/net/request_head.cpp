@@ -22,7 +22,8 @@ std::string lower_case(std::string_view text) {
   return out;
 }
 
-// With two of these, two readers could interpret a request differently.
+// Headers that a request may have only once: if there were two, a proxy could use one and this server the
+// other.
 constexpr std::string_view kOnce[] = {"host",           "authorization",     "content-type",
                                       "content-length", "transfer-encoding", "origin",
                                       "expect",         "content-range"};

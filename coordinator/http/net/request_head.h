@@ -1,6 +1,6 @@
-// Parses a connection's bytes with Beast and converts the result to our own types: the part of reading a
-// request that needs no socket. Includes Boost: only the files of the server loop (and their fuzzer) may
-// include this.
+// Parses the bytes of a request with Boost.Beast and converts the result to our own types. This part of
+// reading a request needs no socket. Includes Boost: only the files of the server loop (and their fuzzer) may
+// include this header.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
@@ -22,11 +22,12 @@ using Parser = beast::http::request_parser<beast::http::buffer_body>;
 void prepare(Parser& parser, const Limits& limits);
 
 enum class Parsed { more, done, malformed, too_large };
-// Parses what the buffer holds of the header. `more`: the header has not ended; all bytes were consumed, or
-// are too few to be parsed.
+// Parses the part of the header that the buffer holds. `more`: the header has not ended; the buffer's bytes
+// were consumed, or are too few to be parsed and stay in the buffer.
 Parsed take_header(Parser& parser, beast::flat_buffer& buffer);
 
-// The parsed header as our own type, without the body; or the answer to an invalid one.
+// Converts the parsed header to a Request without a body. Returns a response instead if the header is
+// invalid.
 std::variant<Response, Request> to_request(const Parser& parser);
 
 struct Portion {

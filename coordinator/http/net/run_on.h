@@ -1,4 +1,5 @@
-// Runs blocking work on a pool; the coroutine resumes on the network thread with the result.
+// Runs blocking work on a thread pool. The coroutine that awaits run_on() resumes on the network thread with
+// the result.
 #pragma once
 
 #include <boost/asio/async_result.hpp>
@@ -12,8 +13,8 @@
 
 namespace ls::http {
 
-// `work` must not throw and must return a movable value. The io_context's work guard must keep it running
-// meanwhile.
+// `work` must not throw and must return a movable value. A work guard must keep `io` running until `work` has
+// returned.
 template <class Work>
 boost::asio::awaitable<std::invoke_result_t<Work&>> run_on(boost::asio::thread_pool& pool,
                                                            boost::asio::io_context& io, Work work) {

@@ -8,8 +8,9 @@ namespace ls::http {
 
 using boost::system::error_code;
 
-// A single read cannot have a deadline: when it passes, all pending operations on the socket are cancelled.
-// The socket stays open, so that a request that was too slow still gets an answer.
+// Sets the deadline of the operations that follow. Asio gives single reads no deadline; so when it passes,
+// all pending operations on the socket are cancelled. The socket stays open, so that a client whose request
+// was too slow still gets an answer.
 void Connection::arm(SteadyClock::time_point deadline) {
   timed_out_ = false;
   deadline_ = deadline;
@@ -89,8 +90,8 @@ net::awaitable<bool> Connection::write_file(std::string_view head, const FileBod
   co_return true;
 }
 
-// Closing while the client still sends would reset the connection and lose the answer, so read on for a
-// while.
+// Ends the answer, then reads on for a while and throws away what arrives. Closing the connection while the
+// client still sends would reset it, and the client would lose the answer.
 net::awaitable<void> Connection::linger() {
   arm(SteadyClock::now() + steady_seconds(limits_.linger_seconds));
   co_await stream_.send_goodbye();

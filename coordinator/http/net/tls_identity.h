@@ -11,8 +11,8 @@ namespace ls::http {
 // Certificate and key of the server; read once.
 class TlsIdentity {
  public:
-  // PEM texts: the certificate with its chain up to the CA, and its key. invalid_argument: they are
-  // malformed, or do not belong together.
+  // `cert` is the server's certificate with its chain up to the CA, `key` its private key, both in PEM.
+  // invalid_argument: one is malformed, or they do not belong together.
   static Result<std::shared_ptr<const TlsIdentity>> make(const std::string& cert, const std::string& key);
   ~TlsIdentity();
 

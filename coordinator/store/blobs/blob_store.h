@@ -13,19 +13,21 @@
 
 namespace ls::coordinator {
 
-// Bytes by digest. put() verifies them; a blob is visible only when complete. Damaged blobs are never read:
-// see prove().
+// Stores blobs (files as plain bytes) under their SHA-256 digests. put() and Upload::finish() verify the
+// digest, and a blob can be seen only when it is complete. A damaged blob is never read: see prove().
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
-  // As has(), but with an error if the store cannot tell at the moment.
+  // Like has(), but returns an error if the store cannot tell now whether it has the blob.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
-  // Error if the storage does not answer. Asks once; may take seconds.
+  // Returns an error if the storage (a disk or another machine) does not answer. Asks it once, which may take
+  // seconds.
   virtual Result<void> answers() const { return {}; }
-  // Verifies that the blob exists and its bytes have its digest: reads it once per process, and after its
-  // file has changed or, if a reader has found it wrong, with `again`. not_found; failed_precondition: it was
-  // damaged; it has been moved aside and counts as missing.
+  // Verifies that the blob exists and that its bytes have its digest. The blob is read for this only once per
+  // process, and again if its file has changed since or if `again` is set (for callers that know of a reader
+  // who received wrong bytes). not_found: there is no such blob. failed_precondition: the blob was damaged;
+  // it has been moved aside and counts as missing.
   virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
     return has(digest) ? Result<void>()
                        : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
@@ -34,8 +36,8 @@ class BlobStore {
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
   virtual Result<void> put(const Digest& digest, std::span<const std::byte> bytes) = 0;
-  // Streaming upload: append in order; finish() verifies the digest. An abandoned upload leaves nothing
-  // behind.
+  // Receives a blob piece by piece, in order; finish() verifies the digest. If the Upload is destroyed before
+  // finish(), nothing of the blob is kept, unless it came from resume_upload().
   class Upload {
    public:
     virtual ~Upload() = default;
@@ -46,18 +48,19 @@ class BlobStore {
 
   // Uploads in parts
 
-  // Number of bytes kept of an incomplete blob.
+  // Returns how many bytes of an incomplete blob the store has.
   virtual std::uint64_t received(const Digest&) const { return 0; }
-  // Continues behind the bytes received; failed_precondition: `offset` is not received(). Appended bytes are
-  // kept if the upload is destroyed before finish(), even over restarts. From now on an earlier upload in
-  // parts of the same blob is rejected: its connection has broken, but that has not been noticed yet.
+  // Continues an incomplete blob after its first `offset` bytes, which must be received();
+  // failed_precondition: they are not. Appended bytes are kept if the Upload is destroyed before finish(),
+  // even over restarts. From now on bytes from an earlier Upload of the same blob are rejected: the client
+  // has begun anew, so the earlier connection must have broken, even if that has not been noticed yet.
   virtual Result<std::unique_ptr<Upload>> resume_upload(const Digest&, std::uint64_t) {
     return fail(Errc::unavailable, "this store takes no uploads in parts");
   }
 
   // Collection of unused blobs
 
-  // Lists all blobs, or (true) all incomplete ones.
+  // Returns the digests of all blobs or, if the argument is true, of all incomplete ones.
   virtual Result<std::vector<Digest>> list(bool) const { return std::vector<Digest>{}; }
   virtual Result<void> remove(const Digest&) { return {}; }
   virtual void remove_unfinished(const Digest&) {}

@@ -62,7 +62,7 @@ Result<CollectedBlobs::Swept> CollectedBlobs::sweep(const std::set<Digest>& need
   for (const Digest& digest : idle_for_long(*blobs, needed)) {
     {
       const std::unique_lock nobody(using_, std::try_to_lock);
-      if (!nobody) break;  // continued by the next sweep
+      if (!nobody) break;  // a submission is in progress; the next sweep removes the rest
       const std::lock_guard lock(mutex_);
       if (idle_.erase(digest) == 0) continue;  // it was requested just now
       going_.insert(digest);

@@ -96,7 +96,8 @@ std::filesystem::path DiskBlobs::path(const Digest& digest) const {
 
 bool DiskBlobs::has(const Digest& digest) const { return ::access(path(digest).c_str(), R_OK) == 0; }
 
-// If the disk cannot be read now (EIO, ESTALE, EACCES), it is unknown whether the blob exists.
+// Returns an error if the disk cannot be read now (EIO, ESTALE, EACCES), because then it is unknown whether
+// the blob exists.
 Result<bool> DiskBlobs::find(const Digest& digest) const {
   if (has(digest)) return true;
   if (errno == ENOENT || errno == ENOTDIR) return false;
@@ -143,7 +144,8 @@ Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
   if (!known) return tl::unexpected(known.error());
   if (!again && proofs_.proven(digest, *known)) return {};
   const std::lock_guard lock(proving_);
-  // The stamp from before reading: a file that changes meanwhile is read again.
+  // The stamp is taken before the file is read: if the file changes meanwhile, its stamp no longer matches,
+  // and the file is read again at the next request.
   const auto seen = look_at(digest);
   if (!seen) return tl::unexpected(seen.error());
   if (!again && proofs_.proven(digest, *seen)) return {};

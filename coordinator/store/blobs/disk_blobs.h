@@ -1,7 +1,7 @@
-// Blobs as files: DIR/ab/<64 hex digits>, written under WORK/tmp, or in parts under WORK/unfinished, and
-// renamed when digest and bytes are verified and synced. A file that no longer matches its digest is detected
-// when it is read, and moved aside to <64 hex digits>.damaged until the right bytes arrive: it counts as
-// missing.
+// Keeps each blob as a file DIR/ab/<64 hex digits>. The file is written under WORK/tmp, or for uploads in
+// parts under WORK/unfinished, and renamed when its digest is verified and its bytes are synced. A file that
+// no longer matches its digest is detected when it is read. It is then moved aside to <64 hex
+// digits>.damaged, and the blob counts as missing until the right bytes arrive.
 #pragma once
 
 #include <filesystem>
@@ -16,8 +16,9 @@ namespace ls::coordinator {
 
 class DiskBlobs final : public BlobStore {
  public:
-  // Creates the folder and removes abandoned uploads of earlier processes from WORK/tmp. If several processes
-  // share the folder, each has its own work folder in it.
+  // Creates `folder` (DIR above) and removes uploads that earlier processes left in WORK/tmp. If several
+  // processes share the folder, each needs a `work` folder (WORK) of its own on the same file system; by
+  // default it is `folder` itself.
   static Result<std::unique_ptr<DiskBlobs>> open(const std::filesystem::path& folder) {
     return open(folder, folder);
   }
@@ -44,15 +45,17 @@ class DiskBlobs final : public BlobStore {
   DiskBlobs(std::filesystem::path folder, std::filesystem::path work)
       : folder_(std::move(folder)), work_(std::move(work)) {}
   Result<FileStamp> look_at(const Digest& digest) const;
-  // Moves aside a file that had this stamp when it was read. Always an error: what is wrong, and what to do.
+  // Moves the blob's file aside, if it still has the stamp `seen` that it had when it was read; `got` is the
+  // digest of the bytes read. Always returns an error, which says what is wrong and what to do.
   tl::unexpected<Error> set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const;
   // Moves a verified and synced file to its place.
   Result<void> place(const Digest& digest, const std::filesystem::path& from);
 
   std::filesystem::path folder_, work_;
   mutable VerifiedDigests proofs_;
-  mutable std::mutex proving_;  // one file at a time: a second request for the same file waits for the result
-  mutable std::mutex placing_;  // so that a file just repaired is not moved aside
+  mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
+  // Held while a file is put in its place or moved aside, so that a file just repaired is not moved aside.
+  mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };
 

@@ -1,5 +1,5 @@
-// Least-recently-used list of the local copies of a remote store's blobs: decides which give way to newer
-// ones. Thread-safe; removes nothing itself.
+// Remembers the local copies of a remote store's blobs and when each was used last, and decides which copies
+// must be removed to make room for newer ones. It removes nothing itself. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,11 @@ namespace ls::coordinator {
 
 class LocalCopies {
  public:
-  explicit LocalCopies(std::uint64_t most) : most_(most) {}  // bytes; 0: no limit
+  // All copies together may have at most `most` bytes; 0: no limit.
+  explicit LocalCopies(std::uint64_t most) : most_(most) {}
 
-  // Records that the copy, of this size, has just been read or written. Returns the copies to remove; never
-  // this one.
+  // Records that the copy of this blob, of this many bytes, has just been read or written. Returns the copies
+  // that the caller must remove to stay within the limit; this copy is never among them.
   std::vector<Digest> used(const Digest& digest, std::uint64_t bytes);
   void gone(const Digest& digest);
   std::uint64_t bytes() const;

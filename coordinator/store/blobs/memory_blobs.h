@@ -1,5 +1,5 @@
-// Blobs of one process: bytes in memory, or references to files that stay where they are (`lightshaft
-// render`).
+// The blobs of a process that stores nothing (`lightshaft render`): each is in memory, or is a file that
+// stays where it is.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,8 @@ namespace ls::coordinator {
 
 class MemoryBlobs : public BlobStore {
  public:
-  // Makes `digest` refer to this file. The caller has computed the digest; the file must not change.
+  // Makes the file at `path` the blob with this digest. The caller has computed the digest of the file, which
+  // must not change afterwards.
   Result<void> adopt(const Digest& digest, std::filesystem::path path);
   std::optional<std::filesystem::path> adopted(const Digest& digest) const;
 

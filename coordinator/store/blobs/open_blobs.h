@@ -9,13 +9,15 @@
 
 namespace ls::coordinator {
 
-// Opens the store that `where` names. Empty: the folder `data`/blobs. An s3:// address: that bucket, with
-// `data`/blobs for blobs that are being uploaded or downloaded (s3_blobs.h). Otherwise: a folder, which
-// several coordinators may share; `node` is the name of this one among them.
+// Opens the blob store that `where` names. If `where` is empty, blobs are kept in the folder `data`/blobs. If
+// it is an s3:// address, they are kept in that bucket, and `data`/blobs holds those that are being uploaded
+// or downloaded (s3_blobs.h). Any other `where` names a folder that several coordinators may share; `node` is
+// this coordinator's name among them.
 Result<std::shared_ptr<BlobStore>> open_blobs(const std::string& where, const std::filesystem::path& data,
                                               const std::string& node);
 
-// The random name in DATA/node-id, created at the first start.
+// Returns this coordinator's permanent name: a random text in DATA/node-id (DATA is `data`), created at the
+// first start.
 Result<std::string> node_id(const std::filesystem::path& data);
 
 }  // namespace ls::coordinator

@@ -31,7 +31,7 @@ tl::unexpected<Error> wrong(std::string_view url, std::string_view why) {
               fmt::format("--blobs '{}' {}; use s3://BUCKET/PREFIX?endpoint=URL&region=NAME", url, why));
 }
 
-// A number of MiB within these bounds, in bytes.
+// Parses a number of MiB from `least` to `most` and returns it in bytes.
 std::optional<std::uint64_t> mebibytes(std::string_view text, std::uint64_t least, std::uint64_t most) {
   std::uint64_t value = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);

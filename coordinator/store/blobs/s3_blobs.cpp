@@ -93,7 +93,8 @@ Result<std::uint64_t> S3Blobs::size(const Digest& digest) const {
 
 Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t offset,
                                              std::uint64_t length) const {
-  // The copy may have been removed for others between fetch and read, or set aside as damaged.
+  // Fetching is tried again, because between fetch and read the local copy may have been removed to make room
+  // for others, or moved aside as damaged.
   for (int tries = 1;; ++tries) {
     if (!local_->has(digest))
       if (auto fetched = fetch(digest); !fetched) return tl::unexpected(fetched.error());
@@ -107,7 +108,7 @@ Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t
 void S3Blobs::note_copy(const Digest& digest) const {
   {
     const std::lock_guard lock(mutex_);
-    if (!there_.contains(digest)) return;  // this is the only copy
+    if (!there_.contains(digest)) return;  // the S3 store may lack this blob, so it must not be removed here
   }
   const auto bytes = local_->size(digest);
   if (!bytes) return;
@@ -124,7 +125,7 @@ Result<void> S3Blobs::fetch(const Digest& digest) const {
   }
   const auto flight = coming_[digest] = std::make_shared<Flight>();
   lock.unlock();
-  // It may have been fetched since the caller's check.
+  // Another thread may have fetched the blob since the caller found no copy.
   auto outcome = local_->has(digest) ? Result<void>() : fetch_now(digest);
   lock.lock();
   coming_.erase(digest);
@@ -159,7 +160,8 @@ void S3Blobs::note_lost(const Digest& digest) const {
   there_.erase(digest);
 }
 
-// The object is left in place: an operator may examine it, or replace it with the right one.
+// Remembers that the object in the S3 store is damaged. The object stays there, so that an operator can
+// examine it or replace it with the right one.
 Error S3Blobs::note_damaged(const Digest& digest, const Error& why) const {
   const auto object = link_.look_at(key_of(digest));
   const std::lock_guard lock(mutex_);

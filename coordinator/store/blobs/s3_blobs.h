@@ -1,7 +1,8 @@
-// Blobs in an S3-compatible store, so that they outlive this machine and other machines can read them:
-// PREFIX/ab/<64 hex digits>. A local folder holds uploads until they are complete and verified, and keeps
-// copies of blobs read (up to S3Address::copies_bytes): each object is fetched once, and its digest is
-// checked. A blob exists when the store has it, undamaged.
+// Keeps blobs as objects PREFIX/ab/<64 hex digits> in an S3-compatible store, so that they outlive this
+// machine and other machines can read them. A local folder holds uploads until they are complete and
+// verified. It also keeps copies of the blobs that were read, up to S3Address::copies_bytes, so that an
+// object is fetched only if there is no copy of it; its digest is checked then. A blob exists if the S3 store
+// has it undamaged.
 #pragma once
 
 #include <condition_variable>
@@ -19,14 +20,15 @@ namespace ls::coordinator {
 
 class S3Blobs final : public BlobStore {
  public:
-  // Lists the store first, so that wrong keys, bucket or address are reported at the start.
+  // Lists the objects of the store first, so that a wrong key, bucket or address is reported when the
+  // coordinator starts. `folder` is the local folder.
   static Result<std::unique_ptr<S3Blobs>> open(const S3Options& options, std::filesystem::path folder);
 
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
   Result<void> answers() const override { return link_.answers(); }
-  // Verifies the local copy, which is fetched again if it is damaged; a blob without a copy is verified when
-  // fetched.
+  // Verifies the local copy; a damaged copy is moved aside. Without a good copy it only checks that the S3
+  // store has the blob, because its bytes are verified when they are fetched.
   Result<void> prove(const Digest& digest, bool again = false) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
@@ -43,15 +45,16 @@ class S3Blobs final : public BlobStore {
   class Passed;
   S3Blobs(const S3Options& options, std::unique_ptr<DiskBlobs> local)
       : link_(options), local_(std::move(local)), copies_(options.address.copies_bytes) {}
-  Result<void> send(const Digest& digest);  // from the folder to the store
-  // From the store to the folder. Requests for a blob that is being fetched wait for that fetch.
+  Result<void> send(const Digest& digest);  // copies the blob from the local folder to the S3 store
+  // Copies the blob from the S3 store to the local folder. If it is being fetched already, waits for that
+  // fetch.
   Result<void> fetch(const Digest& digest) const;
   Result<void> fetch_now(const Digest& digest) const;
   void note(const Digest& digest) const;
   void note_lost(const Digest& digest) const;
   Error note_damaged(const Digest& digest, const Error& why) const;
-  // Records the use of a copy and may remove others. A local blob that is not in the store is no copy, and
-  // stays.
+  // Records that the local copy of a blob was used, and removes other copies if there are too many. A local
+  // blob that the S3 store lacks is not a copy and is never removed.
   void note_copy(const Digest& digest) const;
 
   S3Link link_;
@@ -59,7 +62,8 @@ class S3Blobs final : public BlobStore {
   mutable LocalCopies copies_;
   mutable std::mutex mutex_;
   mutable std::set<Digest> there_;  // known to be in the store
-  // Damaged in the store, with the object's ETag: the blob counts as missing until that changes.
+  // Blobs whose object in the S3 store is damaged, with the ETag of that object: such a blob counts as
+  // missing until the ETag changes.
   mutable std::map<Digest, std::string> damaged_;
   struct Flight {
     std::condition_variable landed;

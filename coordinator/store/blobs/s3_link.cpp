@@ -16,11 +16,11 @@ namespace ls::coordinator {
 namespace {
 
 constexpr long kConnectSeconds = 10;
-constexpr long kStallSeconds = 30;              // without receiving a byte
-constexpr long kAnswerSeconds = 5;              // for answers(): a store that is slower counts as unavailable
-constexpr std::size_t kMaxText = 8u << 20;      // of an answer that is not an object: a list or an error
-constexpr std::size_t kShownText = 300;         // of such an answer, in a message
-constexpr std::size_t kMaxListed = 10'000'000;  // keys
+constexpr long kStallSeconds = 30;          // a transfer without a byte for this long is ended
+constexpr long kAnswerSeconds = 5;          // a store that answers() later than this counts as unavailable
+constexpr std::size_t kMaxText = 8u << 20;  // most bytes of an answer that is a list or an error
+constexpr std::size_t kShownText = 300;     // most bytes of such an answer in a message
+constexpr std::size_t kMaxListed = 10'000'000;  // most keys in a list
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -33,7 +33,7 @@ struct Cleanup {
 };
 using Headers = std::unique_ptr<curl_slist, FreeList>;
 
-// A number of bytes of a file, from its current position.
+// The bytes of a file that a request still has to send, from the file's current position on.
 struct Source {
   std::FILE* file;
   std::uint64_t left;
@@ -214,7 +214,7 @@ Error S3Link::error_of(const Request& request, const Answer& answer) const {
   return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, answered};
 }
 
-// Asks for an object that does not exist: 404 is an answer.
+// Asks for an object that does not exist: the answer 404 shows that the store answers.
 Result<void> S3Link::answers() const {
   const Request request{.method = "HEAD", .key = "answers", .most_seconds = kAnswerSeconds};
   const auto answer = ask_once(request);

@@ -1,6 +1,6 @@
-// Objects in a bucket of an S3-compatible store; the coordinator's only user of libcurl, which signs the
-// requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe:
-// each request has its own connection.
+// Reads and writes objects in a bucket of an S3-compatible store. This is the coordinator's only user of
+// libcurl, which also signs the requests (AWS Signature Version 4). Addresses are in path style:
+// ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe: each request has its own connection.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,7 @@ Result<S3Keys> s3_keys_from_environment();
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  int attempts = 6;  // for failures that may pass: no answer, 429, 5xx
+  int attempts = 6;  // how often a request is tried if it fails in a way that may pass: no answer, 429, 5xx
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
 
@@ -48,7 +48,7 @@ class S3Link {
  public:
   explicit S3Link(S3Options options);
 
-  // Error if the store does not answer a single request within seconds.
+  // Sends one small request. Error: the store has not answered it within a few seconds.
   Result<void> answers() const;
   struct Object {
     std::uint64_t bytes = 0;
@@ -56,10 +56,13 @@ class S3Link {
   };
   Result<Object> look_at(const std::string& key) const;  // not_found
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  // Reads the whole object, in order. `restart` is called if the bytes come from the start again.
+  // Reads the whole object and passes its bytes to `sink`, in order. If an attempt fails, the next one reads
+  // the object from its start; `restart` is called before every attempt and must discard what `sink` has
+  // received.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
-  // Sends a file, whose digest the store checks: in one request or, if it is large, in parts (s3_parts.cpp).
+  // Sends a file of `bytes` bytes, whose digest the store checks: in one request or, if the file is larger
+  // than S3Address::part_bytes, in parts (s3_parts.cpp).
   Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                    const Digest& digest) const;
   Result<void> remove(const std::string& key) const;  // succeeds for a missing object

@@ -75,14 +75,16 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   end.payload = sha256(end.body).hex();
   const auto answer = ask(end);
   if (!answer) return tl::unexpected(answer.error());
-  // The answer begins before the store is done: a 200 may contain an error.
+  // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
+  // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
-  // A retry after a lost answer: the upload was completed before, so its parts are no longer known.
+  // If the answer to an earlier attempt was lost, the upload is complete and the store no longer knows its
+  // parts: then the object exists.
   if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));
 }
 
-// Otherwise the store keeps the parts, invisible but charged for.
+// Lets the store remove the parts sent so far. Otherwise it would keep them, invisible but charged for.
 void S3Link::give_up_parts(const std::string& key, const std::string& upload) const {
   const Request request{.method = "DELETE", .key = key, .query = "uploadId=" + query_value(upload)};
   const auto answer = ask(request);

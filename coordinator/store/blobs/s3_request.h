@@ -15,7 +15,7 @@ struct S3Link::Request {
   std::uint64_t offset = 0, bytes = 0;
   std::string body = {};           // for POST
   std::string payload = kNoBytes;  // SHA-256 of the payload
-  long most_seconds = 0;           // for the whole request; 0: as long as bytes arrive
+  long most_seconds = 0;           // limit for the whole request; 0: it may last as long as bytes arrive
   const Sink* sink = nullptr;
   const std::function<Result<void>()>* restart = nullptr;
 };
@@ -23,12 +23,12 @@ struct S3Link::Answer {
   int status = 0;  // 0: no answer
   std::uint64_t length = 0;
   std::string etag;
-  std::string text;              // bytes not passed to a sink; without an answer: the reason
+  std::string text;  // the body, if it was not passed to a sink; without an answer, the reason for that
   std::optional<Error> refused;  // the sink's error
 };
 
-// The text of the first element of this name from *at on; sets *at behind it (npos: not found). Understands
-// just enough XML for S3's answers.
+// Returns the text of the first XML element with this name from position *at on, and sets *at to the position
+// behind that element (npos: there is none). Understands just enough XML for the answers of S3.
 std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
 // Escapes the text as a value in a query.
 std::string query_value(std::string_view text);

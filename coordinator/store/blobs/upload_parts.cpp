@@ -15,7 +15,8 @@
 
 namespace ls::coordinator {
 
-// The current writer of a file. A later writer has a higher turn.
+// Who may write to an incomplete blob's file: the Part with the latest `turn`, a number that increases with
+// each resume().
 struct UploadParts::Slot {
   std::mutex mutex;  // guards every change of the file
   std::uint64_t turn = 0;
@@ -50,7 +51,7 @@ class UploadParts::Part final : public BlobStore::Upload {
     return {};
   }
 
-  // Hashing a large file takes time: other writers are rejected meanwhile.
+  // Hashing a large file takes time. Others who want to write to it are rejected meanwhile.
   Result<void> finish() override {
     {
       const std::lock_guard lock(slot_->mutex);

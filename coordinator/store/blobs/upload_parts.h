@@ -1,5 +1,5 @@
-// Blobs that arrive in parts: files FOLDER/<64 hex digits> that grow, over broken connections and restarts,
-// until they are complete. Thread-safe.
+// Receives blobs in parts. Each is a file FOLDER/<64 hex digits> that grows, over broken connections and
+// restarts of the coordinator, until the blob is complete. Thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -21,10 +21,11 @@ class UploadParts {
   ~UploadParts();
 
   std::uint64_t received(const Digest& digest) const;
-  // As BlobStore::resume_upload(). Above limits::kMaxUnfinishedUploads the one that has not grown for the
-  // longest time is removed.
+  // Does what BlobStore::resume_upload() says. If there are limits::kMaxUnfinishedUploads incomplete blobs
+  // already, first removes the one that has not grown for the longest time.
   Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
-  void remove(const Digest& digest);  // an upload in progress continues, and is rejected at its next bytes
+  // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected.
+  void remove(const Digest& digest);
   Result<std::vector<Digest>> list() const;
 
  private:

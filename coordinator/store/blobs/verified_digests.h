@@ -1,5 +1,5 @@
-// Files that this process has read whole and found to match their digest, with their stamps: a file whose
-// stamp has changed must be read again. Thread-safe.
+// Remembers which files this process has read as a whole and found to match their digests, with each file's
+// stamp at that time. A file whose stamp has changed since must be read again. Thread-safe.
 #pragma once
 
 #include <sys/stat.h>
@@ -15,14 +15,15 @@
 
 namespace ls::coordinator {
 
-// Identifies a file's state. Any write changes ctime, which programs cannot set.
+// Identifies a state of a file: any write changes the time of the last change (ctime, here `seconds` and
+// `nanoseconds`), which programs cannot set.
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t seconds = 0, nanoseconds = 0;
   bool operator==(const FileStamp&) const = default;
 };
 
-// nullopt: see errno.
+// Returns the file's present stamp; nullopt: it cannot be read, and errno says why.
 inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) return std::nullopt;
@@ -32,6 +33,7 @@ inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
 
 class VerifiedDigests {
  public:
+  // True if the file of this blob was found right when it had this stamp.
   bool proven(const Digest& digest, const FileStamp& stamp) const {
     const std::lock_guard lock(mutex_);
     const auto found = stamps_.find(digest);

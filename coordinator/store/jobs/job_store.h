@@ -1,6 +1,6 @@
-// Stores everything about jobs except their pixels. Two basic implementations: SQLite, and memory
-// (`lightshaft render`). Thread-safe. With SQLite, what a put or add has stored survives kill -9 and power
-// loss.
+// Stores everything about jobs except their pixels, which are in the partial log (store/log). There are two
+// basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, what a put
+// or add has stored survives kill -9 and power loss.
 #pragma once
 
 #include <cstdint>
@@ -23,14 +23,14 @@
 
 namespace ls::coordinator {
 
-// State of the mirror (Redis) of a job store
+// The state of a job store's mirror, a Redis to which every change is copied
 struct StoreStatus {
-  std::string mirror;        // its address; empty: no mirror
-  std::string trouble;       // why it cannot be updated now; empty: it can
+  std::string mirror;        // address of the mirror; empty: there is none
+  std::string trouble;       // why the mirror cannot be updated now; empty: it can
   std::uint64_t behind = 0;  // number of jobs not completely mirrored
 };
 
-// The coordinator that has a job, if several share a store
+// Where the coordinator is that has a job, if several coordinators share a store
 struct JobLocation {
   std::string http;    // http://HOST:PORT; empty: unknown
   bool alive = false;  // false: the job will be taken over, or has ended there
@@ -39,15 +39,16 @@ struct JobLocation {
 // Checks the value of --store: sqlite, or a redis:// address.
 Result<void> check_store(const std::string& store);
 
-// Totals of a job; written when it ends, so that a restart need not read its partials.
+// Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
+// the job ends, so that a restart need not read its partials (the encoded pixel sums of its units).
 struct JobTotals {
-  double render_seconds = 0;  // first ray to last fold
-  double core_seconds = 0;
+  double render_seconds = 0;  // from the first ray until the last unit's sums were added to the image
+  double core_seconds = 0;    // CPU time that workers spent on rendering
   double load_seconds = 0;
   std::uint64_t peak_rss_bytes = 0;
   double spp_done = 0;
-  std::uint64_t units = 0;          // done
-  std::uint64_t units_planned = 0;  // 0: the same as `units`
+  std::uint64_t units = 0;          // units done
+  std::uint64_t units_planned = 0;  // units that the job was to have; 0: the same as `units`
   Health health;
   TimeSplit time;                         // without `render`, which is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
@@ -64,11 +65,12 @@ struct StoredJob {
   double submitted_unix = 0;
   Digest scene;  // digest of its blob
   RenderSettings settings;
-  JobSpec spec;                      // as requested; spp as last extended
-  std::optional<std::uint64_t> spp;  // resolved; nullopt: until target or time
+  JobSpec spec;  // as requested; spp as last extended
+  // Samples per pixel to render; nullopt: until an error target or a time limit.
+  std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
-  bool reference_same_seed = false;  // same_noise() of its reference
+  bool reference_same_seed = false;  // what same_noise() says of the job and its reference image
   std::vector<std::string> features_used, features_left_out;
   std::string needs;  // canonical JSON (common/scene/analysis/needs.h); empty in records of earlier versions
   std::string analysis;  // JSON: the renderer's features with reasons, and what was pruned; for the report
@@ -107,9 +109,10 @@ class JobStore {
  public:
   virtual ~JobStore() = default;
   virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
-  // All or none.
+  // Inserts or replaces all of these jobs or, on an error, none.
   virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
-  // In order of first put. A damaged record is returned with `damaged` set and does not affect others.
+  // Returns all jobs, in the order in which they were first put. A job whose record is damaged is returned
+  // with `damaged` set; the other jobs are not affected.
   virtual Result<std::vector<StoredJob>> jobs() const = 0;
   // Removes the job with its points and log; succeeds if the job is unknown.
   virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
@@ -122,15 +125,17 @@ class JobStore {
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
   virtual Result<void> remove_points(const JobId& job) = 0;  // including their reference errors
 
-  // Drops the oldest lines beyond kLogLinesKept.
+  // Adds a line to the job's log and drops the oldest lines, so that kLogLinesKept are left.
   virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
-  // Kept for good, even after the jobs that revealed it are removed; a known worker keeps its first evidence.
+  // Stores that a worker is quarantined. That is kept for good, even after the jobs are removed in which the
+  // worker was found out. If the worker is quarantined already, its first evidence stays.
   virtual Result<void> quarantine(const QuarantinedWorker& worker) = 0;
   virtual Result<std::vector<QuarantinedWorker>> quarantined() const = 0;
 
-  // Durably adds `amount` to a named counter and returns its previous value. For ids that must never repeat.
+  // Durably adds `amount` to a named counter and returns the counter's value before. Serves to make ids that
+  // must never repeat.
   virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
 
   virtual StoreStatus status() const { return {}; }

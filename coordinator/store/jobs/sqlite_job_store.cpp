@@ -41,7 +41,7 @@ Error db_error(sqlite3* db, std::string_view what) {
   return {Errc::unavailable, fmt::format("cannot {}: {}", what, sqlite3_errmsg(db))};
 }
 
-// One statement; parameters are bound in order.
+// One SQL statement. Each call of bind() sets the next parameter.
 class Statement {
  public:
   Statement(sqlite3* db, const char* sql) : db_(db) {
@@ -67,7 +67,7 @@ class Statement {
     sqlite3_bind_int64(statement_.get(), ++bound_, value);
     return *this;
   }
-  // True: a row is available; false: done.
+  // Runs the statement up to its next row. True: there is a row; false: there are no more rows.
   Result<bool> step(std::string_view what) {
     const int code = statement_ ? sqlite3_step(statement_.get()) : SQLITE_ERROR;
     if (code == SQLITE_ROW) return true;
@@ -310,7 +310,8 @@ class SqliteJobStore final : public JobStore {
   std::uint64_t log_lines_ = 0;
 };
 
-// Adds columns to a database of an earlier version, which can still read it afterwards.
+// Adds the columns that a database of an earlier version lacks. The earlier version can still read it
+// afterwards.
 Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
   for (const auto& [table, column] :
        {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"), std::pair("truths", "mse_stderr"),

@@ -1,6 +1,7 @@
-// The open audits of one job, FOLDER/audits: one line each, "TILE ROUND", or "TILE ROUND WORKER DIGEST" if
-// another worker's result differs and a third has to decide. Rewritten with every change, without sync: a
-// power failure may lose some audits, but no result.
+// The file FOLDER/audits, which lists the open audits of one job. An audit lets another worker render a unit
+// (one tile in one round of samples) again, to compare the results. Each audit has one line: "TILE ROUND", or
+// "TILE ROUND WORKER DIGEST" if that other worker's result differed and a third worker has to decide. The
+// file is rewritten with every change, without sync: a power failure may lose some audits, but no result.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,5 @@
-// Binary header of a record in the partial log.
+// The binary header of a record in the partial log (partial_log.h), which holds one partial: the encoded
+// pixel sums of one unit, that is of one tile and one range of samples.
 #pragma once
 
 #include <array>
@@ -12,7 +13,7 @@
 namespace ls::coordinator {
 
 inline constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
-// "LSP1": has three counters instead of a text
+// "LSP1": records of an earlier version, with three counters in place of the health text
 inline constexpr std::uint32_t kOldPartialMagic = 0x3150534c;
 
 // Little endian, like every supported machine.
@@ -38,10 +39,12 @@ RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr,
                std::span<const std::byte> health);
 PartialRecord unpack(const RawHeader& raw, Health health);
 
-// The headers of a full segment, concatenated and closed by a SHA-256, so that a restart need not search 64
-// MiB for them. If the file is lost, it does.
+// Makes the content of a full segment's index file: the headers of all its records, one after the other, and
+// their SHA-256. With it a restart need not search the 64 MiB of the segment for headers; if the index is
+// lost, it does.
 std::vector<std::byte> pack_index(std::span<const RawHeader> headers);
-// nullopt: damaged, or of a segment of another size.
+// Returns the headers in an index file; nullopt: the file is damaged, or belongs to a segment of another size
+// than `segment_bytes`.
 std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
                                                    std::uint64_t segment_bytes);
 

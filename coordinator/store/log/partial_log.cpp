@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::uint64_t kHealthBytes = 64 << 10;
 
-// The header at `offset` if a whole record fits there into a file of `size` bytes.
+// Returns the header at `offset`; nullopt if there is no valid one, or its record is not completely within
+// the file's `size` bytes.
 std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
                                    const std::filesystem::path& path) {
   if (size - offset < sizeof(RawHeader)) return std::nullopt;
@@ -38,7 +39,7 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   return raw;
 }
 
-// nullopt: damaged.
+// Returns the unit's health from the record at `offset`; nullopt: its text is damaged.
 std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                 const std::filesystem::path& path) {
   Health health;
@@ -69,7 +70,7 @@ std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
-  // Exists, perhaps as something else
+  // If `folder` exists, make_folder() checks that it is a folder
   if (std::error_code error; std::filesystem::exists(folder, error) || error)
     if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
@@ -82,7 +83,7 @@ Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folde
   return log;
 }
 
-// Reads the whole segment from its index. False: there is no valid index.
+// Reads the headers of the segment's records from its index file. False: there is no valid index.
 bool PartialLog::scan_index(std::uint32_t segment, const File& file, std::uint64_t size) {
   const auto bytes = read_file(index_path(segment), limits::kMaxSegmentBytes);
   const auto headers = bytes ? unpack_index(*bytes, size) : std::nullopt;
@@ -187,8 +188,8 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
   if (written) written = write_all(current_, exr, path);
   if (written && !health.empty()) written = write_all(current_, health, path);
   if (!written) {
-    // A partial record must not precede the next one; if it cannot be cut off, the next record opens a new
-    // segment.
+    // The next record must not follow an incomplete one. If the incomplete record cannot be cut off, the next
+    // record opens a new segment.
     if (::ftruncate(current_.fd(), static_cast<off_t>(size_)) != 0) size_ = limits::kMaxSegmentBytes;
     return tl::unexpected(written.error());
   }
@@ -205,8 +206,8 @@ Result<void> PartialLog::sync() {
   return done;
 }
 
-// After a failed sync the system may have dropped unwritten data and still report success the next time: this
-// segment is not trusted again, and the next record opens another one.
+// Syncs the current segment. After a failed sync the system may have dropped data and still report success at
+// the next sync; so nothing more is written to this segment, and the next record opens another one.
 Result<void> PartialLog::flush() {
   if (!std::exchange(unsynced_, false)) return {};
   auto done = sync_data(current_, segment_path(segment_));

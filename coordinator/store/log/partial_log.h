@@ -1,9 +1,11 @@
-// Accepted partials of one job: append-only files FOLDER/partials-NNN.seg. A record is a header of fixed size
-// with a checksum, the EXR bytes, and the unit's health as text if it is not clean. Records written before
-// sync() returned survive kill -9 and power loss; a torn record behind them is detected at open() and cut
-// off. Beside each full segment lies an index of its headers, partials-NNN.idx.
+// The accepted partials of one job, in append-only files FOLDER/partials-NNN.seg, called segments. A partial
+// is the pixel sums, encoded as EXR, of one unit (one tile and one range of samples). Each has a record: a
+// header of fixed size with a checksum, the EXR bytes, and the unit's health (counts of bad samples) as text
+// unless it is clean. Records written before sync() returned survive kill -9 and power loss; a torn record
+// behind them is detected at open() and cut off. Beside each full segment lies an index of its headers,
+// partials-NNN.idx.
 //
-// append() and sync() from one thread; read() from any.
+// One thread may call append() and sync(); any thread may call read().
 #pragma once
 
 #include <cstdint>
@@ -49,9 +51,10 @@ class PartialLog {
     Place place;
   };
 
-  // Scans the segments in order. Headers are checked in all of them, EXR bytes only in the last segment,
-  // where a tail may be torn: full segments were synced before the next one began. If there is none, the
-  // first append() creates the folder and the first segment: a waiting job costs no file.
+  // Reads the records of all segments in `folder`, in order. It checks the headers in all segments, but the
+  // EXR bytes only in the last one: every other segment was synced before the next one began, so only the
+  // last may end in a torn record. If there is no segment, the first append() creates the folder and one, so
+  // that a waiting job has no files.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // records found by open()
@@ -60,7 +63,8 @@ class PartialLog {
 
   // After an error the file is unchanged.
   Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
-  // Error: nothing appended since the last sync is durable; it may be appended again.
+  // Makes the records appended so far durable. Error: no record appended since the last successful sync() is
+  // durable; the caller may append them again.
   Result<void> sync();
   Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
 

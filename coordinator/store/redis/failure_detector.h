@@ -1,6 +1,6 @@
-// Failure detector: a coordinator is dead after `looks` consecutive polls without a sign of life. Polls are
-// counted, not seconds, and after a pause of our own, or of Redis, counting begins again: so our own pauses
-// do not count against others.
+// Decides which coordinators count as dead: those that showed no sign of life in `looks` consecutive polls.
+// It counts polls, not seconds, and begins to count again after this process or Redis was stopped for a
+// while, so that such a pause does not count against the others.
 #pragma once
 
 #include <map>
@@ -28,12 +28,12 @@ class FailureDetector {
     absent_ = std::move(now);
     return gone;
   }
-  // Discards the counts: earlier polls no longer apply.
+  // Forgets all earlier polls.
   void begin_again() { absent_.clear(); }
 
  private:
   int looks_;
-  std::map<std::string, int> absent_;  // polls without a sign of life
+  std::map<std::string, int> absent_;  // consecutive polls without a sign of life, per coordinator
 };
 
 }  // namespace ls::coordinator

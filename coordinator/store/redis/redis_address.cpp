@@ -7,7 +7,7 @@
 namespace ls::coordinator {
 namespace {
 
-// The whole text as a number from lo to hi.
+// Returns the number if the whole text is a number from `lo` to `hi`.
 std::optional<int> whole_number(std::string_view text, int lo, int hi) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

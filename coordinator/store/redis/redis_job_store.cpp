@@ -9,7 +9,8 @@
 namespace ls::coordinator {
 namespace {
 
-// A coordinator without --shared would take all jobs of the others for its own.
+// Returns an error if other coordinators share this Redis: without --shared this coordinator would take all
+// of their jobs for its own.
 Result<void> refuse_shared(RedisLink& link) {
   auto nodes = link.run({"HKEYS", "lightshaft:nodes"});
   if (!nodes) return tl::unexpected(nodes.error());
@@ -26,8 +27,8 @@ Result<void> refuse_shared(RedisLink& link) {
   return {};
 }
 
-// The first heartbeat comes first, so that from then on nobody takes this node's jobs; then it checks what it
-// still owns.
+// Opens the store of a coordinator that shares its Redis. It first sends a heartbeat, so that from then on
+// nobody takes over its jobs, and then finds out which jobs it still owns.
 Result<std::unique_ptr<JobStore>> open_shared(std::unique_ptr<JobStore> local, RedisStoreOptions options) {
   const auto box = std::make_shared<RedisJobStore*>(nullptr);  // set before the members' thread starts
   auto members = std::make_unique<RedisMembers>(

@@ -1,6 +1,7 @@
-// Jobs in Redis, without waiting for it: every change goes to a durable local store first (SQLite), and from
-// there to Redis on a separate thread. So no decision of the farm waits for Redis; while Redis is unavailable
-// it only falls behind, and what it has lost (its last second, a failover) is written again.
+// A job store whose jobs are also in Redis. Every change goes to a durable local store first (SQLite), and a
+// separate thread copies it from there to Redis. So no decision of the farm waits for Redis. While Redis is
+// unavailable its data only fall behind, and what Redis has lost (its last second, or writes before a
+// failover) is written again.
 //
 // Each record has a revision that increases with every change. At open() both sides are compared, and the
 // higher revision wins: a machine that lost its disk gets its jobs back from Redis, and a Redis that lost its
@@ -21,15 +22,16 @@ struct RedisStoreOptions {
   RedisAddress address;
   RedisLink::Timeouts timeouts;
   Duration first_retry = std::chrono::milliseconds(100), longest_retry = std::chrono::seconds(2);
-  // Interval of checks, without changes, that Redis is available and has its data
+  // While there are no changes to send, how often to check that Redis answers and still has its data
   Duration check_every = std::chrono::seconds(1);
-  // If set, other coordinators share this Redis (redis_members.h); the name of this one among them.
+  // This coordinator's name among several that share the Redis (redis_members.h); empty: no other one does.
   std::string node;
 };
 
-// If Redis does not answer now: unavailable if `local` has no job (those in Redis would be missed) or others
-// share Redis (this coordinator may no longer own what `local` has); otherwise the store opens, and Redis is
-// updated when it answers.
+// Opens a store that keeps its jobs in `local` and copies them to Redis. If Redis does not answer, the store
+// opens nevertheless and updates Redis later, with two exceptions, which are the error `unavailable`: `local`
+// has no job (then jobs in Redis would be overlooked), or other coordinators share the Redis (then this one
+// may no longer own the jobs in `local`).
 Result<std::unique_ptr<JobStore>> open_redis_job_store(std::unique_ptr<JobStore> local,
                                                        RedisStoreOptions options);
 

@@ -1,5 +1,5 @@
-// The implementation of redis_job_store.h: redis_job_store.cpp has what the service's threads use,
-// redis_job_store_send.cpp the thread that updates Redis.
+// The class behind redis_job_store.h. redis_job_store.cpp opens it, redis_job_store_send.cpp has the thread
+// that updates Redis, this header what the coordinator's other threads call.
 #pragma once
 
 #include <fmt/format.h>
@@ -60,7 +60,8 @@ class RedisJobStore final : public JobStore {
 
   Result<void> remove_jobs(std::span<const JobId> jobs) override {
     const std::lock_guard lock(mutex_);
-    // The mark first: Redis may have the job until it answers again, and must not restore it here.
+    // The jobs are marked as removed before anything else: Redis still has them until it can be updated, and
+    // they must not be copied back from there.
     for (const JobId& job : jobs)
       if (revisions_.contains(job))
         if (auto marked = local_->reserve(removal_mark(job), 1); !marked)
@@ -141,7 +142,8 @@ class RedisJobStore final : public JobStore {
     auto owner = members_->owner_of(id);
     if (!owner) return tl::unexpected(owner.error());
     if (!*owner) return std::nullopt;
-    if ((*owner)->node == options_.node) {  // on its way here, or being removed
+    // This node owns the job in Redis but does not have it: it is still taking the job over, or removing it.
+    if ((*owner)->node == options_.node) {
       const std::lock_guard lock(mutex_);
       const auto due = due_.find(id);
       return due != due_.end() && due->second.removed ? std::nullopt
@@ -158,7 +160,8 @@ class RedisJobStore final : public JobStore {
       job.fence = one.fence;
       auto kept = keep_inherited(*local_, one.job);
       const std::lock_guard lock(mutex_);
-      if (!kept) {  // Redis says that we own it: the members' thread will try again
+      // Redis says that this node owns the job, so the members' thread will try to store it again.
+      if (!kept) {
         if (not_kept_.empty())
           log_error(fmt::format("job={}", job.id.value),
                     "cannot be taken over now, and is tried again: " + kept.error().message);
@@ -177,7 +180,8 @@ class RedisJobStore final : public JobStore {
     for (const QuarantinedWorker& worker : workers) {
       const std::lock_guard lock(mutex_);
       if (quarantined_.contains(worker.worker)) continue;
-      // If it cannot be stored it is applied anyway, and requested again after a restart.
+      // A quarantine that cannot be stored here is applied anyway; after a restart it is read from Redis
+      // again.
       if (auto kept = local_->quarantine(worker); !kept) {
         log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
       }
@@ -186,7 +190,7 @@ class RedisJobStore final : public JobStore {
     }
   }
 
-  // `ids`: jobs that this node owns according to Redis. Returns those that it does not have.
+  // Gets the jobs that this node owns according to Redis and returns those of them that it does not have.
   std::vector<JobId> unknown(std::vector<JobId> ids) {
     const std::lock_guard lock(mutex_);
     std::erase_if(ids, [&](const JobId& id) {
@@ -215,7 +219,7 @@ class RedisJobStore final : public JobStore {
   }
 
  private:
-  // What Redis lacks of one job
+  // Which changes of one job have not been sent to Redis yet
   struct Due {
     std::optional<std::string> record;
     std::string state;           // of the record
@@ -233,7 +237,8 @@ class RedisJobStore final : public JobStore {
   bool shared() const { return !options_.node.empty(); }
   std::uint64_t first_fence() const { return shared() ? 1 : 0; }
 
-  // Stores nothing more of the job, and lets the service drop it.
+  // Forgets a job that another coordinator owns now: its later updates are ignored, and moved() reports it,
+  // so that the coordinator drops it.
   void lose_locked(const JobId& job) {
     if (!revisions_.contains(job)) return;
     revisions_.erase(job);
@@ -247,8 +252,9 @@ class RedisJobStore final : public JobStore {
                 "another coordinator has it, and its record stays here: " + gone.error().message);
   }
 
-  // Late updates of a job that another coordinator owns are ignored: they must not be here when it comes
-  // back.
+  // Stores an update by keep() and marks by edit() what of the job must be sent to Redis. Updates of a job
+  // that another coordinator owns now are ignored: if the job comes back, they must not be in the local
+  // store.
   template <class Keep, class Edit>
   Result<void> note(const JobId& job, Keep keep, Edit edit) {
     const std::lock_guard lock(mutex_);
@@ -279,19 +285,20 @@ class RedisJobStore final : public JobStore {
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::map<JobId, std::uint64_t> revisions_;  // of every job
-  std::map<JobId, std::uint64_t> fences_;     // of every job; 0: never shared
-  std::set<JobId> lost_;                      // now owned by others: updates by the service are not stored
-  Moved moved_;                               // changes that the service has not fetched yet
+  std::map<JobId, std::uint64_t> fences_;     // of every job (see redis_members.h); 0: never shared
+  std::set<JobId> lost_;                      // jobs that others own now: their updates are not stored
+  Moved moved_;                               // what the next call of moved() returns
   std::map<JobId, Due> due_;
-  std::size_t sending_ = 0;  // jobs being sent to Redis: no longer in due_, not in Redis yet
-  JobId sent_last_;          // last due job sent; the next ones follow it in order
+  // Number of jobs being sent to Redis: they are no longer in due_, nor in Redis yet.
+  std::size_t sending_ = 0;
+  JobId sent_last_;  // last due job sent; the next ones follow it in order
   std::map<std::string, std::uint64_t> counters_;
   std::map<WorkerId, std::string> quarantined_;  // all known
   std::set<WorkerId> quarantined_due_;
   std::string not_kept_;             // why a job taken over could not be stored here yet
   std::unique_ptr<RedisLink> link_;  // this and memory_ are used by the sending thread only
-  std::string memory_;               // empty: unknown
-  bool all_due_ = true;
+  std::string memory_;               // the word of lightshaft:memory when last read; empty: unknown
+  bool all_due_ = true;              // it must still be found out which jobs Redis lacks
   std::string trouble_;
   std::unique_ptr<RedisMembers> members_;
   std::jthread sender_;  // last member: this and the members' thread end before what they use

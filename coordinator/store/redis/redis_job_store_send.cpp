@@ -8,7 +8,7 @@
 
 namespace ls::coordinator {
 namespace {
-// Jobs sent at once: a few MB at most.
+// How many jobs are sent in one batch, which then has a few MB at most.
 constexpr std::size_t kJobsAtOnce = 64;
 }  // namespace
 
@@ -34,8 +34,8 @@ void RedisJobStore::send_loop(const std::stop_token& token) {
   send_the_rest();
 }
 
-// At shutdown; what remains unsent is on the disk. Tried twice: on a connection that broke unnoticed the
-// first attempt fails.
+// At shutdown, sends what Redis still lacks. It tries twice, because the first attempt fails if the
+// connection broke unnoticed. What remains unsent is on the disk.
 void RedisJobStore::send_the_rest() {
   int failed = 0;
   for (bool more = true; more && failed < 2;) {
@@ -65,14 +65,15 @@ Result<void> RedisJobStore::send_once() {
   }
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
-  // Before the jobs: a coordinator that takes them over must know
+  // Quarantined workers are sent before the jobs, because a coordinator that takes the jobs over must know of
+  // them
   if (auto sent = send_quarantined(); !sent) return sent;
   if (auto sent = send_counters(); !sent) return sent;
   return send_jobs();
 }
 
-// A random word that lives in Redis as long as its other data: if it has changed, Redis has lost its data, or
-// it is another Redis.
+// Reads a random word that stays in Redis as long as the other data there. If the word has changed, Redis has
+// lost its data or is another Redis; then all jobs are compared with it again.
 Result<void> RedisJobStore::check_memory() {
   auto word = link_->run({"GET", kRedisMemory});
   if (!word) return tl::unexpected(word.error());
@@ -89,7 +90,7 @@ Result<void> RedisJobStore::check_memory() {
   return {};
 }
 
-// Then every job that Redis lacks, or has in a lower revision, is due completely.
+// Finds out which jobs Redis lacks or has in a lower revision, and marks them to be sent completely.
 Result<void> RedisJobStore::note_all_behind() {
   std::vector<std::pair<JobId, std::uint64_t>> known;
   {
@@ -209,7 +210,7 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   {
     const std::lock_guard lock(mutex_);
     const auto known = revisions_.find(id);
-    if (known == revisions_.end()) return {};  // removed after it was taken; its removal is due
+    if (known == revisions_.end()) return {};  // the job was removed meanwhile; its removal will be sent
     if (!due.record) update.revision = known->second;
     if (const auto fence = fences_.find(id); fence != fences_.end()) update.fence = fence->second;
   }
@@ -220,7 +221,7 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   return {put_command(update)};
 }
 
-// Makes the jobs that were not sent due again.
+// Marks again the changes that could not be sent as to be sent.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
   const std::lock_guard lock(mutex_);
   sending_ = 0;

@@ -28,7 +28,8 @@ struct RedisAddress {
 };
 Result<RedisAddress> parse_redis_url(std::string_view url);
 
-// A status or text is in `text`; an error answered by Redis becomes a Result's error, never a reply.
+// A reply of Redis. A status or a text is in `text`, an integer in `number`, an array in `items`. If Redis
+// replies with an error, the Result has that error and there is no RedisReply.
 struct RedisReply {
   bool nil = false;
   std::int64_t number = 0;
@@ -46,13 +47,14 @@ class RedisLink {
   static Result<std::unique_ptr<RedisLink>> connect(const RedisAddress& address, Timeouts timeouts);
   ~RedisLink();
 
-  using Command = std::vector<std::string>;  // words of arbitrary bytes
+  using Command = std::vector<std::string>;  // the command's name and its arguments, which may have any bytes
   Result<RedisReply> run(const Command& command);
-  // Sends all commands at once; answers in order. A command's error is in its answer; an error of the
-  // connection fails the whole call, and it is unknown what Redis has carried out.
+  // Sends all commands without waiting between them and returns their replies in the same order. An error
+  // that Redis replies to one command is in that command's Result. An error of the connection fails the whole
+  // call, and then it is unknown which commands Redis has carried out.
   Result<std::vector<Result<RedisReply>>> run_all(std::span<const Command> commands);
 
-  bool broken() const { return broken_; }  // after a connection error: connect again
+  bool broken() const { return broken_; }  // true after a connection error: make a new RedisLink
 
  private:
   struct Close {

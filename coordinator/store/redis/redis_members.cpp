@@ -13,8 +13,8 @@ namespace {
 
 constexpr const char* kHeirMilliseconds = "15000";  // longer than taking a batch of jobs takes
 
-// ARGV: node, addresses, lease in ms, start, number of lost jobs handled. -> {lost jobs, node, alive, node,
-// alive, ...}
+// Sends a node's heartbeat. ARGV: node, addresses, lease in ms, start, number of lost jobs handled. Returns
+// {lost jobs, node, alive, node, alive, ...}.
 constexpr const char* kBeat = R"(
 redis.call('SET', 'lightshaft:alive:' .. ARGV[1], ARGV[2], 'PX', ARGV[3])
 redis.call('HSET', 'lightshaft:nodes', ARGV[1], ARGV[2])
@@ -30,8 +30,8 @@ end
 return answer
 )";
 
-// ARGV: job, dead node, node, sequence or ''. Returns nothing if the dead node is alive again or no longer
-// has the job.
+// Takes over a job. ARGV: job, dead node, node that takes it, sequence or ''. Returns nothing if the dead
+// node is alive again or no longer has the job.
 constexpr const char* kTake = R"(
 local key = 'lightshaft:job:' .. ARGV[1]
 if redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[2]) == 1 then return {} end
@@ -47,8 +47,8 @@ if ARGV[4] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[4], ARGV[3
 return redis.call('HGETALL', key)
 )";
 
-// ARGV: dead node. A node without jobs is no longer polled; its list of lost jobs is kept for a week, should
-// it ask.
+// Ends the polling of a dead node that has no jobs left. ARGV: dead node. Its list of lost jobs is kept for a
+// week, in case the node comes back and reads it.
 constexpr const char* kSettle = R"(
 if redis.call('SCARD', 'lightshaft:owned:' .. ARGV[1]) == 0 and redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[1]) == 0 then
   redis.call('HDEL', 'lightshaft:nodes', ARGV[1])
@@ -57,7 +57,7 @@ end
 return redis.call('DEL', 'lightshaft:heir:' .. ARGV[1])
 )";
 
-// ARGV: least
+// Returns a number above ARGV[1] that no other coordinator gets.
 constexpr const char* kStart = R"(
 local last = tonumber(redis.call('HGET', 'lightshaft:counters', 'shared-starts') or '0')
 local start = string.format('%.0f', math.max(last, tonumber(ARGV[1])) + 1)
@@ -65,7 +65,8 @@ redis.call('HSET', 'lightshaft:counters', 'shared-starts', start)
 return start
 )";
 
-// The jobs of a sequence must stay together.
+// Returns the job that decides who takes `job` over: for a frame its sequence, because all frames of a
+// sequence must belong to one coordinator; else the job itself.
 JobId group_of(const JobId& job) {
   const auto frame = frame_of(job);
   return frame ? frame->sequence : job;
@@ -80,8 +81,8 @@ Result<RedisLink*> RedisMembers::link() {
   if (!link_ || link_->broken()) {
     link_.reset();
     absence_.begin_again();
-    own_unclear_ = true;    // it is unknown what Redis carried out last
-    quarantined_seen_ = 0;  // it may be another Redis
+    own_unclear_ = true;    // it is unknown which of the last commands Redis has carried out
+    quarantined_seen_ = 0;  // the new connection may lead to another Redis
     auto fresh = RedisLink::connect(options_.address, options_.timeouts);
     if (!fresh) return tl::unexpected(fresh.error());
     link_ = std::move(*fresh);
@@ -162,7 +163,8 @@ Result<void> RedisMembers::look_for_quarantined() {
   return {};
 }
 
-// Repeated at every heartbeat until the store has all of them: nobody else takes the jobs of a living node.
+// Finds jobs that this node owns in Redis but does not have, and takes them over. This is repeated at every
+// heartbeat until the node has all of them, because nobody else takes the jobs of a living node.
 Result<void> RedisMembers::look_for_stranded() {
   if (!own_unclear_ || !callbacks_.unknown) return {};
   auto owned = link_->run({"SMEMBERS", "lightshaft:owned:" + options_.node});
@@ -251,7 +253,8 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   if (!fields) return tl::unexpected(fields.error());
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
-  if (!job || job->job.id != id) return std::nullopt;  // checked again as a job of this node
+  // The job is this node's by now; look_for_stranded() will check it again.
+  if (!job || job->job.id != id) return std::nullopt;
   const std::uint64_t fence = job->fence;
   return TakenJob{std::move(*job), fence, dead};
 }
@@ -262,7 +265,7 @@ Result<void> RedisMembers::take_from(const std::string& dead) {
   if (!first) return tl::unexpected(first.error());
   if (first->nil) {
     const auto heir = link_->run({"GET", heir_key});
-    if (!heir || heir->text != options_.node) return {};  // another node does it
+    if (!heir || heir->text != options_.node) return {};  // another node is taking over these jobs
   }
   auto unfinished = left_unfinished(dead);
   if (!unfinished) return tl::unexpected(unfinished.error());

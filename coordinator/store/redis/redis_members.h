@@ -1,16 +1,18 @@
-// The coordinators that share a Redis. Each renews a heartbeat every second, and owns whole jobs: a job's
-// hash names its owner and a fence, a number that increases with every owner. A coordinator without a
-// heartbeat for `lease` is dead to the others after `looks` polls; the first of them to notice takes over its
+// The coordinators that share a Redis, also called nodes. Each node renews a heartbeat in Redis every second.
+// Each job belongs to one node: the job's hash in Redis names this owner and a fence, a number that increases
+// with every new owner. A heartbeat expires after MemberOptions::lease; a node without one in
+// MemberOptions::looks consecutive polls counts as dead. The first node to notice takes over the dead node's
 // unfinished jobs one by one, each in one atomic step of Redis that also raises the fence. From then on Redis
-// rejects writes of the old owner (redis_records.h); if that wakes up, it finds the jobs on its list of lost
-// jobs and drops them.
+// rejects writes of the old owner (redis_records.h). If the old owner was only asleep, it finds the jobs on
+// its list of lost jobs and drops them.
 //
 // All expiry times are Redis's own (PX), so the clocks of the machines need not agree.
 //
 // Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash, the same for good),
-// lightshaft:barred (hash: worker -> evidence), lightshaft:owned:NODE (set of jobs), lightshaft:lost:NODE
-// (list of jobs), lightshaft:heir:NODE (who takes its jobs), lightshaft:sequences (hash: sequence -> owner),
-// and `owner`, `from` (the previous owner), `fence` and `state` in lightshaft:job:ID.
+// lightshaft:barred (hash: quarantined worker -> evidence), lightshaft:owned:NODE (set of the node's jobs),
+// lightshaft:lost:NODE (list of jobs that others took from it), lightshaft:heir:NODE (the node that is taking
+// over its jobs), lightshaft:sequences (hash: sequence, i.e. a job with several frames -> owner), and
+// `owner`, `from` (the previous owner), `fence` and `state` in lightshaft:job:ID.
 #pragma once
 
 #include <functional>
@@ -31,12 +33,12 @@ struct MemberOptions {
   RedisAddress address;
   std::string node;  // this coordinator's permanent name
   RedisLink::Timeouts timeouts{std::chrono::milliseconds(500), std::chrono::seconds(1)};
-  Duration beat = std::chrono::seconds(1);
-  Duration lease = std::chrono::seconds(4);
-  int looks = 2;
+  Duration beat = std::chrono::seconds(1);   // between two heartbeats, and two polls of the others
+  Duration lease = std::chrono::seconds(4);  // how long a heartbeat is valid
+  int looks = 2;                             // polls without a heartbeat after which a node counts as dead
 };
 
-// A coordinator's own description
+// How a coordinator describes itself to the others
 struct Member {
   std::string node;
   std::string http, grpc;  // http://HOST:PORT and HOST:PORT; empty: not known yet
@@ -46,12 +48,13 @@ struct Member {
 struct TakenJob {
   RedisJob job;
   std::uint64_t fence = 0;
-  std::string from;  // the node that had it
+  std::string from;  // the node that owned the job before
 };
 
 struct LostJob {
   JobId id;
-  std::uint64_t fence = 0;  // of the next owner: a node with a higher fence has got the job back since
+  // Fence of the new owner; if this node has a higher one, it has got the job back since.
+  std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };
 
@@ -60,10 +63,11 @@ class RedisMembers {
   struct Callbacks {  // called on the members' thread; the same loss may be reported twice
     std::function<void(std::vector<TakenJob>)> taken;
     std::function<void(const std::vector<LostJob>&)> lost;
-    // All workers that any coordinator has quarantined, whenever there are more. Called before `taken`.
+    // Called with all workers that any coordinator has quarantined, whenever their number has grown, and
+    // before `taken`.
     std::function<void(const std::vector<QuarantinedWorker>&)> quarantined = {};
-    // Returns which of these jobs, which this node owns according to Redis, it does not have. If not set,
-    // this is not checked.
+    // Gets the jobs that this node owns according to Redis, and must return those of them that this node does
+    // not have. If this is not set, that is not checked.
     std::function<std::vector<JobId>(std::vector<JobId>)> unknown = {};
   };
   RedisMembers(MemberOptions options, Callbacks callbacks);
@@ -71,15 +75,17 @@ class RedisMembers {
   // Sends the first heartbeat, so that from now on nobody takes this node's jobs.
   Result<void> join();
   void announce(const std::string& http, const std::string& grpc);
-  // A number above `least` that no other coordinator on this Redis has.
+  // Returns a number above `least` that no other coordinator on this Redis gets.
   Result<std::uint64_t> unique_start(std::uint64_t least);
-  // The owner of a job or sequence; nullopt: nobody. Waits for Redis, at most a second.
+  // Returns the coordinator that owns a job or sequence; nullopt: nobody owns it. Waits for Redis, but at
+  // most a second.
   Result<std::optional<Member>> owner_of(const JobId& id);
 
-  // Sends a heartbeat, drops lost jobs, polls the others, and takes over the jobs of dead ones; also jobs
-  // taken before whose answer from Redis was lost, or that could not be stored then.
+  // Sends a heartbeat, drops lost jobs, polls the other coordinators, and takes over the jobs of dead ones.
+  // Also takes over jobs that became this node's in an earlier call but did not arrive, because the answer of
+  // Redis was lost or they could not be stored.
   Result<void> beat();
-  // A job that this node owns and cannot read; empty: none.
+  // Says which job this node owns in Redis but cannot read there; empty: there is none.
   std::string stranded() const;
   // Starts the thread that calls beat() regularly.
   void start();
@@ -102,11 +108,11 @@ class RedisMembers {
   std::string http_, grpc_, stranded_;
   std::unique_ptr<RedisLink> link_;  // this and the following members are used by the heartbeat thread only
   FailureDetector absence_;
-  std::set<std::string> settled_;      // dead nodes that left nothing to take
+  std::set<std::string> settled_;      // dead nodes that have no jobs left to take over
   std::size_t lost_taken_ = 0;         // entries of the list of lost jobs handled so far
   std::int64_t quarantined_seen_ = 0;  // number reported so far
   bool own_unclear_ = true;            // this node may own jobs that it does not know of
-  std::set<JobId> unreadable_;         // reported already
+  std::set<JobId> unreadable_;         // unreadable jobs that were reported already
   std::uint64_t start_ = 0;
   std::string trouble_;
 

@@ -11,8 +11,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Counts that Redis may have lost with its last writes: ids stay unique as long as there are far fewer than a
-// million reservations per second.
+// Added to counters read from Redis, because Redis may have lost its last writes to them. Ids stay unique as
+// long as there are far fewer than a million reservations per second.
 constexpr std::uint64_t kCountsLost = 1'000'000;
 
 // Runs several commands in batches; an error of any of them fails the call.
@@ -58,8 +58,8 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   return {};
 }
 
-// Returns those of `ids` of which Redis has a higher revision than `here` (id, revision), without those
-// removed here.
+// Returns those jobs of `ids` of which Redis has a higher revision than `here` (revisions by id), without the
+// jobs that were removed here.
 Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
                                      const std::map<JobId, std::uint64_t>& here,
                                      const std::vector<JobId>& ids, const std::string& node) {

@@ -1,4 +1,4 @@
-// At the start of a coordinator: reconciles Redis with the local store.
+// Copies jobs from Redis to a coordinator's local store, when the coordinator starts or takes over a job.
 #pragma once
 
 #include <set>
@@ -14,20 +14,22 @@ namespace ls::coordinator {
 // Name of the counter in the local store that marks a job as removed.
 std::string removal_mark(const JobId& job);
 
-// Copies jobs, points, logs and counters into `local` if Redis has a higher revision, or a job that `local`
-// never had. Unreadable records are reported and left where they are.
+// Copies from Redis to `local` the jobs, with their points (of the convergence curve) and logs, of which
+// Redis has a higher revision than `known`, the jobs of `local`, or which `local` never had; also the
+// counters. Unreadable records are reported and left where they are.
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known);
 
-// The same if several coordinators share the Redis: copies what `node` still owns, and removes jobs from
-// `local` that another one has taken over.
+// Does the same if several coordinators share the Redis: copies the jobs that `node` still owns, and removes
+// from `local` those that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
 // Stores a job, its points and its log in `local`; if `local` has more points or log lines, they stay.
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job);
-// The same for a job that another coordinator had until now: replaces everything that `local` has of it.
+// Does the same for a job that another coordinator owned until now: replaces everything that `local` has of
+// the job.
 Result<void> keep_inherited(JobStore& local, const RedisJob& job);
 
-// Returns those of `known` (id, revision) that Redis lacks or has in a lower revision.
+// Returns those jobs of `known` (pairs of id and revision) that Redis lacks or has in a lower revision.
 Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known);
 
 }  // namespace ls::coordinator

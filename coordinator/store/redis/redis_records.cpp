@@ -14,10 +14,11 @@ namespace {
 
 using nlohmann::json;
 
-// One atomic step: nobody else can write between reading the revision and writing.
+// Writes a job's changes if they are newer than what Redis has, in one atomic step: nobody else can write
+// between reading the revision and writing.
 //  ARGV: revision, id, fence, node, sequence or '', fields ...
-// A higher fence is a later owner's. Under a lower fence Redis has lost data, or an earlier owner wrote, and
-// the revision there does not count.
+// If Redis has a higher fence than this, a later owner has written the job. If it has a lower one, Redis has
+// lost data or an earlier owner wrote the job, and the revision in Redis does not count.
 constexpr const char* kPut = R"(
 local fence = tonumber(redis.call('HGET', KEYS[1], 'fence') or '0')
 local mine = tonumber(ARGV[3])
@@ -37,7 +38,7 @@ end
 return 1
 )";
 
-// ARGV: id, node, sequence or ''.
+// Removes a job. ARGV: id, node, sequence or ''.
 constexpr const char* kRemove = R"(
 local owner = redis.call('HGET', KEYS[1], 'owner')
 redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])

@@ -1,4 +1,5 @@
-// Records in Redis: encodes commands and decodes replies. No connection: texts in, texts out.
+// Encodes the commands that write jobs to Redis, and decodes the replies. It has no connection and works on
+// texts only.
 #pragma once
 
 #include <map>
@@ -16,26 +17,29 @@ inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: 
 inline constexpr std::size_t kAskedAtOnce = 256;  // commands sent without waiting for an answer
 std::string redis_job_key(const JobId& id);
 std::uint64_t counter_of(const std::string& text);  // 0: not a number
-// An id becomes the name of a folder: anything else under our keys in Redis is no job.
+// True if the text has the form of a job's id. Ids become names of folders, so other texts that are found in
+// Redis must not be taken for ids.
 bool is_job_id(std::string_view id);
 std::vector<QuarantinedWorker> quarantined_workers(const RedisReply& fields);  // from the reply to HGETALL
 
 // Changes of one job for Redis; fields that are not set stay as they are.
 struct RedisUpdate {
   JobId id;
-  std::uint64_t revision = 0;  // of the record; without one: the latest known
+  std::uint64_t revision = 0;  // revision of `record`; if that is not set, the latest known revision
   std::optional<std::string> record, points, log;
-  // If several coordinators share the Redis: the writer and its fence. Then the state is sent with the
-  // record.
+  // Set if several coordinators share the Redis: the coordinator that writes, its fence (redis_members.h),
+  // and the job's state, which is then stored beside the record.
   std::string node;
   std::uint64_t fence = 0;
   std::string state;
 };
 enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
-// Changes nothing and answers later_revision if Redis has a higher revision of the job, or lost if another
-// coordinator owns it by now, with a higher fence.
+// Makes the command that writes `update`. Redis answers it with a PutAnswer. It changes nothing and answers
+// later_revision if Redis has a higher revision of the job, or lost if another coordinator owns the job by
+// now, with a higher fence.
 RedisLink::Command put_command(const RedisUpdate& update);
-// With a `node` (shared Redis): removes nothing of a job that another node owns.
+// Makes the commands that remove a job. With a `node` (if coordinators share the Redis) they remove nothing
+// of a job that another node owns.
 std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
 
 std::string points_json(const std::vector<ConvergencePoint>& points);
@@ -45,8 +49,8 @@ struct RedisJob {
   StoredJob job;
   std::vector<ConvergencePoint> points;
   std::vector<LogLine> log;
-  std::string owner, from;  // the owning node and the previous one; empty: unknown
-  std::uint64_t fence = 0;  // of the owner
+  std::string owner, from;  // the node that owns the job, and the one that did before; empty: unknown
+  std::uint64_t fence = 0;  // the owner's fence
 };
 // Decodes the reply to HGETALL.
 Result<RedisJob> parse_redis_job(const RedisReply& fields);
