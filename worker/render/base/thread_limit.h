@@ -6,7 +6,8 @@
 
 namespace ls::render {
 
-// Active while the returned object lives; of several limits the tightest applies.
+// Limits those libraries to `threads` threads in this process for as long as the returned object lives. If
+// several such objects live, the lowest limit applies.
 std::shared_ptr<void> limit_threads(int threads);
 
 }  // namespace ls::render

@@ -1,5 +1,6 @@
-// Work counters, for the tests and benchmarks that show that a scene pays nothing for features it does not
-// use. Only in builds with LIGHTSHAFT_COUNT; in all others LS_COUNT expands to nothing.
+// Work counters: how often each thread did each kind of work. Tests and benchmarks use them to show that a
+// scene pays nothing for features it does not use. They exist only in builds with LIGHTSHAFT_COUNT; in all
+// others LS_COUNT expands to a statement without effect.
 #pragma once
 
 #include <cstdint>

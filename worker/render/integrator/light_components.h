@@ -8,7 +8,8 @@
 
 namespace ls::render {
 
-// Classified by the path's first scattering, counted from the camera, and whether it is the only one.
+// A component is defined by the first scattering of the path, counted from the camera, and by whether that is
+// the only one.
 enum class LightPart : std::uint8_t {
   unscattered,    // directly visible: lights, environment, medium emission
   surface_once,   // one scattering, at a surface

@@ -11,7 +11,7 @@ namespace ls::render {
 // 1e-4. 0 below 200 K and for NaN; proportional to the temperature above 1e6 K (Rayleigh-Jeans).
 C3 black_body_radiance(float kelvin);
 
-// black_body_radiance() is 0 below this [K].
+// The temperature [K] below which black_body_radiance() is 0.
 inline constexpr float kColdest = 200;
 
 }  // namespace ls::render

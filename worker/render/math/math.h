@@ -1,5 +1,5 @@
-// Vectors, frames and formulas shared by all parts of the renderer. All in float32 with few branches, unless
-// noted otherwise.
+// Vectors, frames and formulas shared by all parts of the renderer. They compute in float32, with few
+// branches, unless noted otherwise.
 #pragma once
 
 #include <Imath/ImathVec.h>
@@ -92,10 +92,10 @@ inline V2 unit_circle(float u) {
   return turn & 2 ? V2(-c, -s) : V2(c, s);
 }
 
-// Sample transformations, u in [0, 1)^2.
+// The functions below transform uniform random numbers u in [0, 1)^2 into samples.
 //
-// Uniform on the unit disk, continuous and of low distortion (Shirley and Chiu 1997); the centre maps to the
-// origin.
+// A point uniform on the unit disk. The map is continuous and of low distortion (Shirley and Chiu 1997); the
+// centre of the square maps to the origin.
 inline V2 concentric_disk(const V2& u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
   if (x == 0 && y == 0) return {0, 0};
@@ -103,7 +103,7 @@ inline V2 concentric_disk(const V2& u) {
   const SinCos a = sin_cos_eighth(kPi / 4 * (wide ? y / x : x / y));
   return wide ? V2(x * a.cos, x * a.sin) : V2(y * a.sin, y * a.cos);
 }
-// Cosine-distributed about +z: density cos / pi.
+// A direction distributed as the cosine to +z: its density is cos / pi per steradian.
 inline V3 cosine_hemisphere(const V2& u) {
   const V2 d = concentric_disk(u);
   return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};

@@ -10,7 +10,8 @@
 
 namespace ls::render {
 
-// What a group of numbers is used for. A new purpose gets a new value: the values determine the image's bits.
+// What a group of random numbers is used for. The values determine the bits of the image, so existing values
+// must not change: a new purpose gets a new value.
 enum class Purpose : std::uint32_t {
   camera,
   hero,
@@ -39,7 +40,8 @@ struct Group {
 
 class SampleStream {
  public:
-  // Vertices that get low-discrepancy points; later ones, which gain nothing from them, get hashed numbers.
+  // The number of vertices of a path whose numbers are low-discrepancy points. Later vertices, which gain
+  // nothing from such points, get hashed numbers.
   static constexpr int kSobolVertices = 6;
 
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
@@ -53,7 +55,7 @@ class SampleStream {
                         kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
     return hashed(slot(vertex, purpose));
   }
-  // A stream of as many numbers as a tracker needs.
+  // A stream of unbounded length, for a tracker, which does not know in advance how many numbers it needs.
   RandomStream stream(int vertex, Purpose purpose) const {
     return RandomStream(combine(sample_, slot(vertex, purpose)));
   }

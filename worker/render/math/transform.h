@@ -1,4 +1,5 @@
-// Affine maps in double, for scene transforms before rounding to float32.
+// Affine maps in double. The scene's transforms are applied by them, before coordinates are rounded to
+// float32.
 #pragma once
 
 #include <array>
@@ -41,7 +42,7 @@ struct Affine {
   // True if both the map and its inverse are finite. A subnormal determinant has no finite inverse; an
   // overflowing one no finite map.
   bool invertible() const { return finite() && std::isnormal(determinant()) && inverse().finite(); }
-  // Requires an invertible map.
+  // The inverse map. This map must be invertible.
   Affine inverse() const {
     const double d = 1 / determinant();
     Affine r;

@@ -1,5 +1,6 @@
-// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. It is shared with the child process
-// that reads them, and includes that process's reply, which the kernel does not count.
+// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. The child process that reads the
+// files may use no more than what this process has left of it. The child's reply, a mapped file, counts
+// towards the limit too, although the kernel does not count it.
 #pragma once
 
 #include <sys/resource.h>
@@ -25,8 +26,8 @@ inline std::uint64_t data_left() {
   return limit.rlim_cur - std::min<std::uint64_t>(bytes, limit.rlim_cur);
 }
 
-// Lowers the limit by this many bytes during its lifetime, for a mapped file, which the kernel does not
-// count.
+// An object of this class lowers the limit by `bytes` as long as it lives. This accounts for a mapped file of
+// that size, which the kernel does not count.
 class DataTaken {
  public:
   DataTaken() = default;

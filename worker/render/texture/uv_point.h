@@ -15,11 +15,12 @@ struct FacePoint {
 
 struct UvPoint {
   V2 uv;
-  // dp/du and dp/dv in scene units, in the local shading frame. Set only where something on the surface needs
-  // them (SurfaceInfo::wants_slopes).
+  // The derivatives dp/du and dp/dv of the position p, in scene units, in the local shading frame. They are
+  // set only where something on the surface needs them (SurfaceInfo::wants_slopes).
   V3 du{1, 0, 0}, dv{0, 1, 0};
 
-  // Set for surfaces with attributes (SurfaceInfo::wants_attributes), else null; must outlive this.
+  // The point on a triangle, for surfaces whose textures read mesh attributes
+  // (SurfaceInfo::wants_attributes); else null. It must outlive this object.
   const FacePoint* face = nullptr;
 
   UvPoint(float u, float v) : uv(u, v) {}
