@@ -1,5 +1,6 @@
-// Kinds that scatter to both sides of the surface, let light pass, or consist of other materials. The latter
-// recurse, at most scene::kMaxBsdfNesting deep (checked by build()).
+// The material kinds that scatter to both sides of the surface, let light pass, or consist of other
+// materials. For the last of these the functions call each other recursively, at most scene::kMaxBsdfNesting
+// deep (checked by build()).
 #include "worker/render/base/work_counters.h"
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/principled.h"
@@ -11,8 +12,8 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Reflectance of a sheet, with all reflections between its two sides: R + T R T + T R^3 T + ... = 2 R / (1 +
-// R).
+// The reflectance of a thin sheet of a dielectric, with all reflections between its two sides, where R is the
+// reflectance and T the transmittance of one side: R + T R T + T R^3 T + ... = 2 R / (1 + R).
 float sheet_reflectance(float cos, float ior) {
   const double r = fresnel_dielectric(std::abs(cos), ior).reflectance;
   return static_cast<float>(2 * r / (1 + r));
@@ -29,15 +30,17 @@ V3 mapped_normal(const Material& m, const Lookup& look, const UvPoint& at) {
   if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are degenerate here
   return n.z < 0 ? -n : n;         // (u, v) may have either handedness
 }
-// The frame for the nested material: s as near to the surface's as the normal allows. A normal that faces
-// away from the viewer is rotated by half a turn about the surface's (Schuessler et al. 2017).
+// The frame in which the nested material is evaluated, in the surface's own frame. Its s is as near to the
+// surface's as the mapped normal allows. A mapped normal that faces away from the viewer is rotated by half a
+// turn about the surface's normal (Schuessler et al. 2017).
 Frame mapped_frame(const Material& m, const Lookup& look, const UvPoint& at, const V3& wo) {
   V3 n = mapped_normal(m, look, at);
   if (m.flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
   const float l2 = dot(n, n);
   return l2 > 0 && std::isfinite(l2) ? Frame::from_tangent(n * (1 / std::sqrt(l2)), V3(1, 0, 0)) : Frame();
 }
-// Shadowing factor for light from wi, by facets with the map's slope (Estevez, Lecocq, Stein 2019).
+// The shadowing factor for light from wi, by facets that have the slope of the map's normal n (Estevez,
+// Lecocq, Stein 2019).
 float mapped_shadow(const Material& m, const V3& n, const V3& wi) {
   if (!m.shadows) return 1;
   const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
@@ -50,8 +53,8 @@ V3 to_side(const V3& w, bool outside) { return {w.x, w.y, outside ? w.z : -w.z};
 
 }  // namespace
 
-// A blend seen from wo. `share`: weight of each part in the mixture; `chance`: probability of sampling it
-// (null parts are never sampled).
+// A blend of two materials seen from wo. `share` is the weight of each of them in the mixture, and `chance`
+// the probability of sampling it (a null material is never sampled).
 struct BsdfTable::Mixture {
   float share[2], chance[2];
 };

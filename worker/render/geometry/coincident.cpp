@@ -10,7 +10,7 @@
 namespace ls::render {
 namespace {
 
-// Limit of compared pairs of shapes or flat pieces: about half a second.
+// The largest number of pairs of shapes or flat pieces that are compared; that takes about half a second.
 constexpr std::uint64_t kMaxPairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk
@@ -74,7 +74,7 @@ class Finder {
     return {d.center - d.u - d.v, d.center + d.u + d.v, d.center + (d.u - d.v) * side};
   }
 
-  // Stops when there are too many pairs to compare.
+  // Searches for coincident surfaces and marks them. It stops when there are too many pairs to compare.
   void search() {
     const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
     const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
@@ -167,7 +167,7 @@ class Finder {
     }
   }
 
-  // A mesh may contain a triangle twice: cells of one file that share a wall.
+  // Marks a mesh that contains a triangle twice, as cells of one file do that share a wall.
   void twice_in_itself(const SurfaceBox& n) {
     std::vector<std::array<double, 9>> keys;
     const Parts& mine = shapes_[n.surface];

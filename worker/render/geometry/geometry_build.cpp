@@ -37,7 +37,7 @@ bool mirrored_inwards(const Shape& shape, float orientation) {
   return mesh && orientation > 0;  // relative to the winding, which mirroring reverses
 }
 
-// Maps a box to unit size about a centre; the scale is a power of two.
+// A space: p' = (p - center) * scale maps a box to unit size about a centre. The scale is a power of two.
 struct Space {
   V3d center{0, 0, 0};
   double scale = 1;
@@ -58,7 +58,8 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
-// Float32 leaves few bits for the shape of a mesh that lies far from the origin.
+// How many of the bits of a float32 are left for the shape of a mesh with the bounds b in a space with this
+// origin: few if the mesh lies far from it.
 double bits_left(const Bounds& b, const V3d& origin) {
   const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
   const double size = std::max(half.x, std::max(half.y, half.z)),
@@ -86,7 +87,8 @@ Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   return unit_space(wide);
 }
 
-// The area-weighted normals of a closed mesh add up to zero.
+// True if the mesh is a sheet, that is, not closed: the area-weighted normals of a closed mesh add up to
+// zero.
 bool is_sheet(const LocalMesh& mesh) {
   V3d sum(0);
   double area = 0;
@@ -153,7 +155,8 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     add_channel(g.attributes, a, surface, a.name.starts_with("face_") ? first_triangle : base, kept);
 }
 
-// Precomputes for the triangles from `first` on what completing a hit would otherwise compute each time.
+// Precomputes SurfaceInfo::reach and edge for the triangles from `first` on, which completing a hit would
+// otherwise compute each time.
 void note_reach(const Geometry& g, std::uint32_t first, SurfaceInfo& info) {
   float least = std::numeric_limits<float>::infinity(), most = 0;
   for (std::uint32_t i = first; i < g.triangle_count(); ++i) {
@@ -227,7 +230,7 @@ struct Parts {
   std::vector<Bounds> meshes;  // of the world's own triangle meshes
 };
 
-// Vertices have 32-bit indices, in the BVH too.
+// The largest number of vertices: their indices have 32 bits, in the BVH too.
 constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
 
 Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
@@ -265,7 +268,7 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   return parts;
 }
 
-// Appends the shapes of one space, opaque ones first. `shapes`: their indices, in order.
+// Appends to g the shapes of one space, opaque ones first. `shapes` holds their indices in order.
 PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, const Parts& parts,
                         const Space& space) {
   PrimitiveSet set;

@@ -86,8 +86,8 @@ Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
   return r;
 }
 
-// The start of the angle follows from the direction as written in the scene (Mitsuba: the frame of Duff et
-// al. 2017).
+// Places a cylinder. Where its azimuth starts follows from the direction of its axis as written in the scene,
+// by the frame of Duff et al. 2017, as in Mitsuba.
 Result<Cylinder> place_cylinder(const CylinderShape& s, const Affine& m) {
   const V3d p0(s.p0[0], s.p0[1], s.p0[2]), d = V3d(s.p1[0], s.p1[1], s.p1[2]) - p0, n = d.normalized();
   const double sign = std::copysign(1., n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;

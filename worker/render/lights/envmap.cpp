@@ -15,10 +15,11 @@ namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
 constexpr double kWords = 0x1p32;
-// As for samples (render_tile.cpp): larger values cannot be summed.
+// The largest radiance of a texel, the same as that of a sample (render_tile.cpp): larger values cannot be
+// summed.
 constexpr float kLargestTexel = 0x1p96f;
 constexpr float kBelowOne = 0x1.fffffep-1f;
-// Tolerance for matrices written with six digits.
+// The tolerance for a to_world that is not exactly a rotation because it was written with six digits.
 constexpr double kSlack = 1e-4;
 
 // The orthogonal matrix nearest to a multiple of m, by Newton's iteration X <- (X + X^-T) / 2 for the polar
@@ -40,14 +41,15 @@ std::optional<Affine> rotation_of(const Transform& t) {
   return x;
 }
 
-// First of the 2^32 words of share i, given the cumulative sums `before`. Shares that begin beyond the last
-// word are empty.
+// The first of the 2^32 random words that choose share i. `before` holds the cumulative sums of the shares.
+// Shares that begin beyond the last word are empty.
 std::uint64_t first_word(const std::vector<double>& before, std::size_t i) {
   return static_cast<std::uint64_t>(std::llround(before[i] / before.back() * kWords));
 }
 
-// x in (0, 1) with density proportional to a (1 - x) + b x, from u in (0, 1); stable if a = b or one is 0.
-// Never 1, where the density may be 0, or, at a pole, the azimuth undefined.
+// Samples x in (0, 1) with density proportional to a (1 - x) + b x, from the random number u in (0, 1). It is
+// stable if a = b or one of them is 0. The result is never 1, where the density may be 0, or, at a pole, the
+// azimuth undefined.
 float sample_linear(float a, float b, float u) {
   const float sum = a + b;
   if (!(sum > 0)) return u;
@@ -127,7 +129,8 @@ void EnvironmentMap::build_table() {
   }
 }
 
-// The sum over a row's cells of the mean luminance of their corners. `before` receives the partial sums.
+// Returns the sum, over the cells of a row, of the mean luminance of their corners. `before` receives the
+// cumulative sums.
 double EnvironmentMap::build_row(std::uint32_t row, std::vector<double>& before) {
   for (std::uint32_t i = 0; i < texels_.width; ++i) {
     const Corners c = corners(i, row);
@@ -177,7 +180,7 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
   const float l00 = luminance(c00), l10 = luminance(c10), l01 = luminance(c01), l11 = luminance(c11);
   const float mean = .25f * (l00 + l10 + l01 + l11);
   if (j >= used_rows_ || !(mean > 0)) return light;
-  // The cosine in double: next to a pole a whole row spans less than float32 resolves near 1.
+  // The cosine is computed in double: next to a pole a whole row spans less than float32 resolves near 1.
   const double dx = d.x, dy = d.y, dz = d.z, z = dy / std::sqrt(dx * dx + dy * dy + dz * dz);
   const auto t = static_cast<float>(std::clamp((row.top - z) / row.height, 0., 1.));
   light.pdf = row.density * cell_share(j, cell) * (lerp(lerp(l00, l10, x), lerp(l01, l11, x), t) / mean);

@@ -8,7 +8,7 @@
 namespace ls::render {
 namespace {
 
-// cos(max(0, a - b)) and cos(a + b), for angles from 0 to pi.
+// The cosines cos(max(0, a - b)), here, and cos(min(pi, a + b)), below, for angles a and b from 0 to pi.
 float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
   return cos_a > cos_b ? 1 : cos_a * cos_b + sin_a * sin_b;
 }
@@ -19,9 +19,9 @@ float sine(float cosine) { return safe_sqrt((1 - cosine) * (1 + cosine)); }
 
 }  // namespace
 
-// Splits the lights of a node in two, by bins along each axis, minimising the sum over both halves of
-// intensity * surface area of the box * (2 - R), where R is 1 for lights that all face the same way and 0 for
-// lights that face everywhere.
+// Builds the tree. It splits the lights of a node in two, by bins along each axis, and minimises the sum over
+// both halves of intensity * surface area of the box * (2 - R), where R is 1 for lights that all face the
+// same way and 0 for lights that face everywhere.
 class LightTree::Builder {
  public:
   Builder(const std::vector<LightBounds>& lights, LightTree& tree) : lights_(lights), tree_(tree) {}
@@ -114,7 +114,8 @@ class LightTree::Builder {
     return n;
   }
 
-  // Returns the first light of the right half; each half has at least one.
+  // Returns the position, in the order of lights, of the first one of the right half; each half has at least
+  // one.
   std::uint32_t split(const Job& job) {
     const std::uint32_t half = job.begin + (job.end - job.begin) / 2;
     if (job.depth >= kDeepest) return half;

@@ -8,10 +8,11 @@
 namespace ls::render {
 namespace {
 
-// The directions from x to the sphere's emitting side, as 1 - cos of their half angle, without cancellation
-// (docs/measurements/stability.md N26). 2: all directions, for an inner side seen from inside; 0: none, where
-// the emitting side faces away. Points on the surface itself, accurate to a few ulps of their coordinates,
-// count as being on the emitting side: sampling and density must agree on them.
+// The cone of directions from x to the sphere's emitting side, as 1 - cos of its half angle, without
+// cancellation (docs/measurements/stability.md N26). The value 2 means all directions, for an inner side seen
+// from inside; 0 means none, where the emitting side faces away. Points on the surface itself, accurate to a
+// few ulps of their coordinates, count as being on the emitting side: sampling and density must agree on
+// them.
 float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
   const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20 * reach);
@@ -64,7 +65,8 @@ Lights::Point Lights::cylinder_point(const Light& l, V2 u) const {
   return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * l.sign, {u.y, u.x}, {}};
 }
 
-// The first number chooses the triangle and is then rescaled for reuse.
+// Samples a point on a mesh. numbers.x chooses the triangle and is then rescaled to be used again for the
+// point.
 Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) const {
   const double target = (numbers.x + .5) * 0x1p-32 * l.cdf.back();
   const auto it = std::upper_bound(l.cdf.begin(), l.cdf.end() - 1, target);
@@ -140,8 +142,8 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   return s;
 }
 
-// Evaluated in the sampled direction itself, as for paths that leave the scene, so that both use the same
-// density.
+// Samples the environment map. Its radiance and density are evaluated in the sampled direction itself, as for
+// paths that leave the scene, so that both use the same density.
 std::optional<LightSample> Lights::sample_map(const LightNumbers& numbers) const {
   const V3 direction = map_->sample(numbers.x, numbers.y);
   const EnvironmentMap::Light light = map_->at(direction);

@@ -12,7 +12,8 @@ namespace ls::render {
 namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
-// Degrees. Directions in float32 are accurate to 4e-6 degrees; a smaller disk becomes a point.
+// The smallest sun [degrees]. Directions in float32 are accurate to 4e-6 degrees; a disk smaller than
+// kSmallestSun becomes a point.
 constexpr double kSmallestSun = 1e-3;
 
 }  // namespace
@@ -238,8 +239,8 @@ double Lights::power(const Light& l, float radius) const {
   return luminance(textures_->mean(l.radiance)) * beam_flux(l) * l.area;
 }
 
-// Half by power, half uniform: no light's probability is below 1/2n. Probabilities are exact shares of the
-// 2^32 random words.
+// The probability of each of the n lights is half its share of the power plus half of 1/n, so none is below
+// 1/(2n). Probabilities are exact shares of the 2^32 random words.
 void Lights::set_probabilities(float radius) {
   std::vector<double> p;
   double sum = 0;

@@ -57,8 +57,8 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
   use_cells(wanted_cell_size(density_to_sigma));
 }
 
-// Surrounds the grid by one layer of nodes from the opposite end, so that interpolation needs no test for the
-// end and macro cells bound these values too. Index coordinates grow by one.
+// Surrounds the grid by one layer of nodes copied from the opposite end, so that interpolation needs no test
+// for the end, and macro cells bound the values interpolated there too. All index coordinates grow by one.
 void Grid::repeat_ends() {
   const std::array<int, 3> n = size_;
   const std::vector<float> inner = std::move(values_);
@@ -116,8 +116,9 @@ Grid Grid::mean(const Grid& a, const Grid& b, const Grid& c) {
 }
 
 int Grid::wanted_cell_size(double density_to_sigma) const {
-  // Target: majorant x cell diagonal of about 1.44 (Fong et al. 2017, section 3.3), between 4 and 16 voxels:
-  // smaller cells cost more steps than the null collisions they save, larger ones bound too loosely.
+  // The target is that majorant times cell diagonal is about 1.44 (Fong et al. 2017, section 3.3), with cells
+  // of 4 to 16 voxels a side. Smaller cells cost more steps than the null collisions they save; larger ones
+  // bound the density too loosely.
   const Affine inverse = exact_.inverse();
   const double voxel = inverse.vector({1, 1, 1}).length();
   const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
@@ -137,8 +138,8 @@ void Grid::use_cells(int cell_size) {
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
-  // All nodes that interpolation inside the cell can touch: one more on each side than the cell covers,
-  // because the traversal's positions are rounded.
+  // [a, b] are all the nodes that interpolation inside the cell can touch: one more on each side than the
+  // cell covers, because the traversal's positions are rounded.
   int a[3], b[3];
   const int c[3] = {x, y, z};
   for (int k = 0; k < 3; ++k) {
@@ -221,7 +222,8 @@ double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) co
   const V3d oi = exact_.point(o), di = exact_.vector(d);
   const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
   if (!(part.t0 < part.t1)) return 0;
-  // All crossings of these planes, in order; between two the field is one polynomial.
+  // `cuts` holds all crossings of the planes that separate the field's patches, in order; between two of them
+  // the field is one polynomial.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {

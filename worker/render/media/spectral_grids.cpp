@@ -7,7 +7,7 @@ namespace {
 
 const Grid& grid_of(const Medium& m, int c) { return *m.by_channel[static_cast<std::size_t>(c)]; }
 
-// The channels' macro cells at a walk's position.
+// The macro cells of the three channels' grids at the current position of the walk w.
 struct Cells {
   Cells(const Medium& m, const CellWalk& w) {
     const std::size_t k = w.number(grid_of(m, 0));
@@ -18,13 +18,15 @@ struct Cells {
   const MacroCell* of[3];
 };
 
-// One flight. Uses logarithms of densities, as they exceed the range of float32.
+// The state of one flight. It keeps the logarithms of the channels' densities, because the densities exceed
+// the range of float32.
 class ChannelFlight {
  public:
   ChannelFlight(const Medium& m, int hero, const V3& o, const V3& d) : m_(m), hero_(hero), o_(o), d_(d) {}
 
   void pass(int c, double depth) { log_[c] -= depth; }
-  // Accounts for null collisions. `product`: of (majorant - density), relative to the hero's.
+  // Accounts for null collisions. `product` is, for each channel, the product over these collisions of
+  // (majorant - density), relative to that of the hero.
   void add_nulls(const double (&product)[3]) {
     // log 0: such a flight is impossible in that channel
     for (int c = 0; c < 3; ++c) log_[c] += std::log(product[c]);
@@ -129,8 +131,8 @@ Flight passed_channels(const Medium& m, int hero, const V3& o, const V3& d, floa
   return flight.through(t);
 }
 
-// One collision process for all channels, at the rate of the largest residual; otherwise as
-// transmittance_grid.
+// One collision process serves all channels, at the rate of the largest residual. Otherwise this is the same
+// as transmittance_grid (medium.h).
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1,
                           RandomStream stream) {
   const float s = m.sigma_t.x;

@@ -101,7 +101,8 @@ class Tree {
     out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
 
-  // Finds the box of the active voxels, enlarged by one voxel, and its transform.
+  // Finds the box of the active voxels, enlarged by one voxel on each side, and the transform from its nodes
+  // to the scene.
   void place() {
     std::uint64_t count = 1;
     for (int k = 0; k < 3; ++k) {
@@ -152,7 +153,8 @@ class Tree {
     return v;
   }
 
-  // Voxel n of a leaf. Quantised leaves store codes of 1 to 16 bits, with the leaf's minimum and step.
+  // The value of voxel number n of the leaf at the offset `leaf`. Quantised leaves store codes of 1 to 16
+  // bits, with the leaf's minimum and step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
     if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
@@ -194,7 +196,8 @@ class Tree {
     return base + static_cast<std::uint64_t>(offset);
   }
 
-  // An upper node (32^3 children of 128^3 voxels) or a lower one (16^3 of 8^3).
+  // Reads an upper node (32^3 children of 128^3 voxels each) or a lower one (16^3 children of 8^3 voxels
+  // each).
   void inner(std::uint64_t node, const Coord& origin, int side) {
     const bool upper = side == kUpperSide;
     const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;

@@ -33,7 +33,8 @@ std::string names_of(const openvdb::io::File& file) {
   return names.empty() ? "none" : names;
 }
 
-// The grid of this name; with an empty name the only grid, or "density".
+// The name of the grid to read: `wanted` or, if that is empty, the only grid, or "density" if there are
+// several.
 std::string choose(const openvdb::io::File& file, const std::string& wanted) {
   std::vector<std::string> names;
   for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());

@@ -10,7 +10,7 @@ std::string counted(std::uint64_t n, std::string_view what) {
   return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
 }
 
-// "12 triangles, 2 spheres"
+// The numbers of primitives by kind, as in "12 triangles, 2 spheres".
 std::string primitives(const Geometry& g) {
   std::string text;
   const auto add = [&](std::uint64_t n, std::string_view what) {
