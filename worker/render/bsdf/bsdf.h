@@ -45,7 +45,7 @@ struct BsdfSample {
 
 struct NullTransmission {
   C3 transmission{0, 0, 0};  // share of light that passes straight through
-  // The probability with which a path should pass straight through. It is below 1 wherever the surface can
+  // The probability with which a path is to pass straight through. It is below 1 wherever the surface can
   // also scatter otherwise.
   float probability = 0;
 };
@@ -63,16 +63,16 @@ class BsdfTable {
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;
-  // Samples wi for the given wo. u_lobe chooses the lobe and u the direction in it; all are in [0, 1).
-  // Returns nullopt if the light is absorbed, or if the sampled direction is on the wrong side of the
-  // surface.
+  // Samples wi for the given wo. u_lobe, in [0, 1), chooses the lobe and u, in [0, 1)^2, the direction within
+  // the lobe. Returns nullopt if the light is absorbed, or if the sampled direction is on the wrong side of
+  // the surface.
   std::optional<BsdfSample> sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe, V2 u) const;
 
   // The null transmission at `uv` for light that travels along the direction w, which may cross the surface
   // from either side.
   NullTransmission null_transmission(BsdfIndex i, const UvPoint& uv, const V3& w) const;
 
-  bool is_null(BsdfIndex i) const;                // index-matched boundary: light passes unchanged
+  bool is_null(BsdfIndex i) const;                // an index-matched boundary: light passes unchanged
   bool has_null_transmission(BsdfIndex i) const;  // part of the light passes straight through, part does not
   bool has_smooth(BsdfIndex i) const;             // has a lobe that is not a delta: use next-event estimation
   bool reads_uv(BsdfIndex i) const;               // some parameter is a texture

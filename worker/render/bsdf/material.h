@@ -55,11 +55,11 @@ struct BsdfTable::Material {
   Slot second_slot;  // specular_transmittance; diffuse reflectance of diffuse and plastics
   Slot alpha_u, alpha_v;
   C3 eta{0, 0, 0}, k{1, 1, 1};  // conductors
-  float ior = 1;                // inside over outside
+  float ior = 1;                // index of refraction inside over outside
   float specular_weight = 1;    // plastics: probability of sampling the coat, before Fresnel; bump_map: scale
   RoughPlasticTable coat;       // for smooth plastic only its internal reflectance is set
   const MicrofacetEnergy* energy = nullptr;  // rough kinds with multiple_scattering
-  C3 mean_fresnel{1, 1, 1};                  // of a conductor with multiple_scattering
+  C3 mean_fresnel{1, 1, 1};                  // conductor with multiple_scattering
 };
 
 }  // namespace ls::render

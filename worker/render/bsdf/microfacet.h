@@ -1,7 +1,7 @@
 // Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba.
 // All directions are unit vectors in the local frame, above the surface (z > 0). The functions return G1 /
-// cos and densities over D, so that nothing is divided by a cosine. ax and ay are the roughnesses (alpha)
-// along x and y.
+// cos and densities over D, so that callers need not divide by a cosine. ax and ay are the roughnesses
+// (alpha) along x and y.
 //
 // Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because the dialect
 // defines the material by it; in the sampling *density* it is the exact one, so that the density is exact.

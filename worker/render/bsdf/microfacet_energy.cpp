@@ -17,7 +17,7 @@ constexpr int kOctaves = 16, kDeepest = 12;
 
 const Quadrature& quadrature(double eta) {
   static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
-  return eta >= 1 ? kSmooth : kKinked;  // below 1, total reflection has a kink
+  return eta >= 1 ? kSmooth : kKinked;  // for eta below 1 the integrand has a kink, at total reflection
 }
 
 // The masking of the viewer as the BSDF's value has it, divided by the masking in the density of visible

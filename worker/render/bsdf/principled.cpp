@@ -110,7 +110,7 @@ BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
   const float F = s.fresnel(cos_d), D = s.facets.D(h);
   BsdfEval e;
   e.pdf = s.chance_facets * s.reflecting(F) * .25f * D * s.facets.visible_over_D(s.wo);
-  if (F > 0)  // as in Mitsuba: without a contrast of indices there is no reflection, not even a metal's
+  if (F > 0)  // as in Mitsuba: with equal indices nothing is reflected, not even by a metal
     e.f_cos = s.reflectance(F, cos_d, base) *
               (.25f * D * s.facets.G1_over_cos(s.wo) * s.facets.G1_over_cos(wi) * wi.z);
   if (!s.front) return e;
@@ -129,7 +129,7 @@ BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
   return e;
 }
 
-// wi is below the surface; the formulas are RoughDielectric's.
+// The value for a wi below the surface, by the formulas of RoughDielectric.
 BsdfEval eval_refraction(const Seen& s, const C3& base, const V3& wi) {
   if (!s.p.transmits || !(s.bsdf > 0)) return {};
   V3 h = s.wo + wi * s.eta;

@@ -1,4 +1,5 @@
-// eval() and sample(): the lobes of one-sided material kinds, and the dispatch to the others.
+// eval() and sample() of BsdfTable: the lobes of the one-sided material kinds, and the calls for the other
+// kinds.
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/lobes.h"
 

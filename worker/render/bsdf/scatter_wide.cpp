@@ -27,12 +27,12 @@ V3 mapped_normal(const Material& m, const Lookup& look, const UvPoint& at) {
   if (m.specular_slot.constant) return {0, 0, 1};
   const V2 slope = look.textures.slope(m.specular_slot.texture, at.uv) * m.specular_weight;
   const V3 n = cross({at.du.x, at.du.y, slope.x}, {at.dv.x, at.dv.y, slope.y});
-  if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are degenerate here
+  if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are parallel or zero here
   return n.z < 0 ? -n : n;         // (u, v) may have either handedness
 }
 // The frame in which the nested material is evaluated, in the surface's own frame. Its s is as near to the
-// surface's as the mapped normal allows. A mapped normal that faces away from the viewer is rotated by half a
-// turn about the surface's normal (Schuessler et al. 2017).
+// surface's as the mapped normal allows. With flip_invalid_normals a mapped normal that faces away from the
+// viewer is rotated by half a turn about the surface's normal (Schuessler et al. 2017).
 Frame mapped_frame(const Material& m, const Lookup& look, const UvPoint& at, const V3& wo) {
   V3 n = mapped_normal(m, look, at);
   if (m.flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
@@ -101,7 +101,7 @@ NullTransmission BsdfTable::null_transmission(BsdfIndex i, const UvPoint& uv, co
       const V3 in = frame.to_local(w);
       if (!same_side(in, w)) return {};
       NullTransmission v = null_transmission({m.front}, uv.seen_in(frame), in);
-      v.transmission *= mapped_shadow(m, frame.n, w);  // as for all that it scatters
+      v.transmission *= mapped_shadow(m, frame.n, w);  // the map shadows this light too
       return v;
     }
     default:
@@ -147,7 +147,8 @@ BsdfEval BsdfTable::eval_wide(const Material& m, const UvPoint& uv, const V3& wo
   }
 }
 
-// Samples a part's scattering; a null part scatters nothing.
+// Samples the scattering of the material `part`, of which a mask, blend or map consists; a null material
+// scatters nothing.
 std::optional<BsdfSample> BsdfTable::sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo,
                                                  float u_lobe, V2 u) const {
   if (materials_[part].kind == MaterialKind::null) return std::nullopt;

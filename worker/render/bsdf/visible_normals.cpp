@@ -71,7 +71,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
       } else {
-        // Visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are equal.
+        // The visible normals of GGX are a cap of the sphere (Dupuy and Benyoub 2023); its two halves are
+        // equal, so one is enough.
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);

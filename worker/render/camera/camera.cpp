@@ -72,7 +72,7 @@ CameraRay Camera::lens_ray(double x, double y, float aperture, V2 lens) const {
   if (!kBuilt.lenses || !(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
   LS_COUNT(lens);
   const V2 p = concentric_disk(lens) * aperture;
-  // The point in focus does not depend on the lens sample.
+  // All rays of a film position meet in its point in focus, which does not depend on the lens sample.
   return perspective_ray(origin_ + lens_x_ * p.x + lens_y_ * p.y,
                          {x * focus_ - p.x, y * focus_ - p.y, focus_});
 }
@@ -81,7 +81,7 @@ CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
   const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
   const double length = along.length();
   const V3 d(along * (1 / length));
-  // Clip planes are measured along the axis; the ray starts at the near one.
+  // The distances of clip planes are measured along the camera's axis; the ray starts at the near plane.
   const auto per_depth = static_cast<float>(length / local.z);
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
 }

@@ -44,7 +44,7 @@ bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 time
 // If no primitive lets light pass, `all` and `opaque` are the same scene.
 struct Scenes {
   RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
-  std::uint32_t base[2 * kKinds] = {};  // first index of each kind on each side
+  std::uint32_t base[2 * kKinds] = {};  // index of the first primitive of each kind and side
   ShapeSet<Sphere> spheres[2];
   ShapeSet<Disk> disks[2];
   ShapeSet<Cylinder> cylinders[2];

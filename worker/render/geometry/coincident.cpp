@@ -18,7 +18,8 @@ struct Piece {  // a triangle, or half of the square about a disk
   double reach() const { return std::max(largest(V3(a)), std::max(largest(V3(b)), largest(V3(c)))); }
 };
 
-// True if all of q is closer to the plane of p than the offset of rays.
+// True if no corner of q is farther than `tolerance` from the plane of p. The tolerance is the offset by
+// which rays that leave these surfaces are moved.
 bool in_plane(const Piece& p, const Piece& q, double tolerance) {
   const V3d n = (p.b - p.a).cross(p.c - p.a).normalized();
   return std::abs(n.dot(q.a - p.a)) <= tolerance && std::abs(n.dot(q.b - p.a)) <= tolerance &&
@@ -33,7 +34,8 @@ bool boxes_touch(const Piece& p, const Piece& q, double tolerance) {
   return true;
 }
 
-// Tries both planes, because the larger piece's is the more accurate.
+// True if the boxes of p and q touch and one of them lies in the plane of the other. Both planes are tried,
+// because that of the larger piece is the more accurate.
 bool coincide(const Piece& p, const Piece& q) {
   const double tolerance = std::max(p.reach(), q.reach()) * 0x1p-20;
   return boxes_touch(p, q, tolerance) && (in_plane(p, q, tolerance) || in_plane(q, p, tolerance));
@@ -90,7 +92,7 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // hits on instances compute their own reach
+    if (!own) return;  // hits in instances compute their reach themselves
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));
@@ -187,7 +189,7 @@ class Finder {
   Geometry& g_;
   std::vector<Parts> shapes_;
   std::uint64_t pairs_ = 0, marks_ = 0;
-  bool spent_ = false;  // the budget of pairs is used up: everything is marked
+  bool spent_ = false;  // the allowed number of pairs is used up: all surfaces are marked as coincident
 };
 
 }  // namespace

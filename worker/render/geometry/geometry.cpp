@@ -136,7 +136,7 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d
   hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
   if (info.wants_slopes) {
     const double sine = std::hypot(q.x, q.y), c = sine > 0 ? q.x / sine : 1, d = sine > 0 ? q.y / sine : 0;
-    const V3d along(q.z * c, q.z * d, -sine);  // derivative by the polar angle, in the sphere's axes
+    const V3d along(q.z * c, q.z * d, -sine);  // dp/dtheta, theta the polar angle, in the sphere's axes
     const V3d dpdv(along.x * r[0] + along.y * r[3] + along.z * r[6],
                    along.x * r[1] + along.y * r[4] + along.z * r[7],
                    along.x * r[2] + along.y * r[5] + along.z * r[8]);
@@ -324,7 +324,7 @@ double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, do
   const double dx = d.dot(s.u), dy = d.dot(s.v), dz = d.dot(s.axis);
   const double fx = f.dot(s.u), fy = f.dot(s.v), fz = f.dot(s.axis);
   const double a = dx * dx + dy * dy;
-  if (!(a > 0)) return kInf;  // parallel to the axis
+  if (!(a > 0)) return kInf;  // the ray is parallel to the axis
   const double b = -(fx * dx + fy * dy), nx = fx + dx * (b / a), ny = fy + dy * (b / a);
   const double disc = s.radius * s.radius - (nx * nx + ny * ny);
   if (!(disc >= 0)) return kInf;

@@ -52,7 +52,7 @@ struct SurfaceInfo {  // one per scene shape
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: the smallest reach
   // of a hit.
   float reach = 0;
-  double edge = 0;  // hits whose barycentric coordinates all exceed this are clear of all edges
+  double edge = 0;  // if all barycentric coordinates of a hit exceed this, it is clear of all edges
 };
 
 struct Sphere {
@@ -94,7 +94,7 @@ struct PrimitiveSet {
 };
 struct PlacedInstance {
   std::uint32_t group = 0;
-  float mirrored = 1;         // -1: the map reverses orientations
+  float mirrored = 1;         // -1 if the map reverses orientations, else 1
   Affine to_world, to_local;  // between the world's space and the group's
 };
 
@@ -115,8 +115,8 @@ struct SurfaceHit {
   V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
   std::uint32_t surface = 0;
   PrimitiveId primitive;
-  // The largest coordinate that was used to compute the hit. The position p, and the distances to this
-  // surface that the BVH finds, are accurate to a few ulps of `reach` (see offset_point).
+  // The largest coordinate that was used to compute the hit. The position p, and the distances that the BVH
+  // finds, measured perpendicular to the surface, are accurate to a few ulps of `reach` (see offset_point).
   float reach = 1;
   FacePoint face;  // set if SurfaceInfo::wants_attributes
 

@@ -34,7 +34,7 @@ bool mirrored_inwards(const Shape& shape, float orientation) {
   if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;
   const bool mesh =
       std::holds_alternative<CubeShape>(shape.geometry) || std::holds_alternative<MeshShape>(shape.geometry);
-  return mesh && orientation > 0;  // relative to the winding, which mirroring reverses
+  return mesh && orientation > 0;  // the orientation is relative to the winding, which mirroring reverses
 }
 
 // A space: p' = (p - center) * scale maps a box to unit size about a centre. The scale is a power of two.
@@ -58,8 +58,9 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
-// How many of the bits of a float32 are left for the shape of a mesh with the bounds b in a space with this
-// origin: few if the mesh lies far from it.
+// The share of the resolution of float32 that is left for the shape of a mesh with the bounds b if
+// coordinates are relative to `origin`: 1 near the origin, and 2^-n if the mesh is so far away that n of the
+// 24 bits only tell where it lies.
 double bits_left(const Bounds& b, const V3d& origin) {
   const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
   const double size = std::max(half.x, std::max(half.y, half.z)),
@@ -67,9 +68,9 @@ double bits_left(const Bounds& b, const V3d& origin) {
   return size / std::max(size, far);
 }
 
-// The space about the middle of all shapes' box; but if that leaves some mesh less than 8 of 24 bits (a small
-// scene lit by a sphere of radius 1e5 at 1e7), about the mesh with the fewest bits, if that is better for all
-// meshes.
+// The space of the world. Its centre is the middle of the box of all shapes. If that leaves some mesh less
+// than 8 of 24 bits (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre is that of the
+// mesh with the fewest bits, provided that every mesh then has more bits than that one had.
 Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
@@ -82,7 +83,7 @@ Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   if (m == meshes.end() || !(bits_left(*m, s.center) < kFewBits)) return s;
   const V3d there = (m->lo + m->hi) * .5;
   if (!(bits_left(*worst(there), there) > bits_left(*m, s.center))) return s;
-  Bounds wide = all;  // enlarged to be symmetric about the new middle
+  Bounds wide = all;  // enlarged to be symmetric about `there`, the new centre
   for (const V3d& corner : {all.lo, all.hi}) wide.add(there * 2 - corner);
   return unit_space(wide);
 }
@@ -299,7 +300,8 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The BVH inverts the map itself, in float32, and limits the distance of ray origins (accel.cpp).
+  // The BVH inverts the map itself, in float32, and cannot trace rays from too far away (near_enough() in
+  // accel.cpp). So the inverse must not be too large.
   constexpr double kLargestInverse = 5e8;
   const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||

@@ -19,7 +19,8 @@ LocalMesh rectangle() {
   return m;
 }
 
-// Six faces; each has the unit square as its uv, u along a and v along a x n (as in Mitsuba 3.9.1's cube).
+// The cube's mesh of six faces. The uv of each face fill the unit square, with u along a and v along a x n,
+// where n is its normal (as in Mitsuba 3.9.1's cube).
 LocalMesh cube() {
   struct Face {
     V3d n, a;

@@ -87,7 +87,8 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (first) add_surface(*first, stream, ray);
 }
 
-// A component can be as large as the whole radiance, which is usable; one that is not finite counts as 0.
+// Adds the light components of a sample whose radiance is usable. A component can be as large as the whole
+// radiance; one that is not finite counts as 0.
 void AovPixel::add_light() {
   const auto part = [&](LightPart p) {
     const C3& c = split_[static_cast<std::size_t>(p)];

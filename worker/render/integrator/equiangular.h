@@ -13,7 +13,7 @@
 
 namespace ls::render {
 
-// Ratios of densities are clamped to this, so that no product with them is 0 times infinity.
+// The largest ratio of densities: ratios are clamped to it, so that no product with one is 0 times infinity.
 inline constexpr float kMaxRatio = 1e30f;
 
 class EquiAngular {

@@ -37,7 +37,7 @@ class SegmentNee {
 
     static bool matters() { return true; }
   };
-  struct Vertex {  // default-constructed: not in a medium
+  struct Vertex {  // default-constructed for a vertex that is not in a medium
     bool by_depth = true, by_angle = false;
     float depth_ratio = 1;  // e_D / f
     float flight_pdf = 0, t = 0;

@@ -46,11 +46,11 @@ template <Features F>
 class VertexNee {
  public:
   struct Plan {
-    float length = 0;  // of a segment that is also sampled equi-angularly; else 0
+    float length = 0;  // length of the segment if it is also sampled equi-angularly, else 0
 
     bool matters() const { return F.equiangular && length > 0; }
   };
-  struct Vertex {  // on such a segment: relative to the part inside the medium
+  struct Vertex {  // o, length and t are relative to the part of the segment inside the medium
     bool equiangular = false, points_only = false;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
@@ -58,7 +58,8 @@ class VertexNee {
     bool uses_equiangular(bool is_point) const {
       return F.equiangular && equiangular && (is_point || !(F.grids && points_only));
     }
-    // e / f for a light with this pivot, if such lights are sampled equi-angularly.
+    // The ratio e / f at this vertex for a light with this pivot. It has a meaning only if such lights are
+    // sampled equi-angularly (uses_equiangular).
     float equiangular_ratio(const V3& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }

@@ -111,7 +111,8 @@ void EnvironmentMap::build_table() {
   first_.resize(std::size_t{n} * texels_.width);
   std::vector<double> cells(texels_.width + 1), before(n + 1, 0.);
   for (std::uint32_t j = 0; j < n; ++j) {
-    // cos a - cos b = 2 sin((a + b) / 2) sin((b - a) / 2): without cancellation.
+    // The height, a difference of cosines, is computed without cancellation as cos a - cos b = 2 sin((a + b)
+    // / 2) sin((b - a) / 2).
     rows_[j].top = std::cos(kPiD * j / n);
     rows_[j].height = 2 * std::sin(kPiD * (2. * j + 1) / (2. * n)) * std::sin(kPiD / (2. * n));
     before[j + 1] = before[j] + build_row(j, cells) * rows_[j].height;
@@ -189,8 +190,8 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
 
 V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
   LS_COUNT(environment_map);
-  // The last row that begins at or before the word; the position of the word within it is reused inside the
-  // row.
+  // `row` is the last row whose words begin at or before the word y. The position of y among the row's words
+  // is used again to sample within the row.
   const auto row = std::upper_bound(rows_.begin(), rows_.begin() + used_rows_, y,
                                     [](std::uint32_t word, const Row& r) { return word < r.first; }) -
                    1;

@@ -67,7 +67,7 @@ class EnvironmentMap {
   struct Row {                // a row of cells
     double top = 1;           // cosine at its upper edge
     double height = 0;        // difference of cosines
-    float density = 0;        // share of the words / solid angle of one cell
+    float density = 0;        // share of the words, over the solid angle of one cell
     std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
     std::uint32_t used = 0;   // number of cells up to the last one with a word
   };
@@ -85,7 +85,7 @@ class EnvironmentMap {
   float scale_ = 1;
   Frame frame_;  // axes of the map in the world: right-handed or mirrored
   std::vector<Row> rows_;
-  std::vector<std::uint32_t> first_;  // first of the words that choose a cell, row by row
+  std::vector<std::uint32_t> first_;  // for each cell, row by row, the first of the words that choose it
   std::uint32_t used_rows_ = 0;
   double flux_ = 0;
 };

@@ -31,7 +31,8 @@ class LightTree::Builder {
     for (std::uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;
     tree_.trails_.resize(lights_.size());
     tree_.nodes_.reserve(2 * lights_.size() - 1);
-    // Depth first, left before right; right children wait in the stack with their parent's index.
+    // Nodes are made depth first, the left child before the right one. Right children wait on the stack with
+    // their parent's index.
     std::vector<Job> jobs{{0, static_cast<std::uint32_t>(order_.size()), 0, 0, kNoParent}};
     while (!jobs.empty()) {
       const Job job = jobs.back();
@@ -53,8 +54,8 @@ class LightTree::Builder {
  private:
   static constexpr std::uint32_t kNoParent = 0xffffffffu;
   static constexpr int kBins = 16;
-  // From this depth on, lights are halved by their order: 2^24 lights become single at depth 30 + 24, and
-  // trails have 64 bits.
+  // From depth kDeepest on, lights are halved by their order, without regard to cost. So 2^24 lights are all
+  // separated at depth 30 + 24, which fits the 64 bits of a trail.
   static constexpr int kDeepest = 30;
   struct Job {
     std::uint32_t begin, end;
@@ -202,7 +203,7 @@ std::uint64_t LightTree::left_share(std::uint32_t node, std::uint64_t words, con
   const double a = importance(nodes_[node + 1], x, n), b = importance(nodes_[nodes_[node].right], x, n);
   if (!(a + b > 0) || !std::isfinite(a + b)) return words - words / 2;
   const auto share = static_cast<std::uint64_t>(std::floor(static_cast<double>(words) * (a / (a + b)) + .5));
-  // Every child that may have a word gets at least one.
+  // Every child whose importance is positive gets at least one word, if there are two or more.
   const std::uint64_t at_least = a > 0 && words > 1 ? 1 : 0, at_most = b > 0 && words > 1 ? words - 1 : words;
   return std::clamp(share, at_least, at_most);
 }

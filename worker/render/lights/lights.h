@@ -214,7 +214,7 @@ class Lights {
   static double beam_flux(const Light& light);  // per unit radiance and area; pi without a beam
 
   std::vector<Light> lights_;
-  std::vector<std::uint32_t> suns_;  // indices of the suns
+  std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
   // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]: its probability is exactly their share.
   std::vector<std::uint32_t> last_;
   bool alone_ = false;  // a single light: no choice needed

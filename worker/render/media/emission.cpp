@@ -191,7 +191,9 @@ class EmissionWalk {
     add(c, e, absorbed);
   }
 
-  // Emission per length, sampled as if the density were constant along the interval; exact if it is.
+  // Adds emission per length on [a, b], sampled as if the density were constant along the interval. If it is
+  // constant, the samples are distributed exactly as the transmittance. `whole` is the density integrated
+  // over the interval.
   void add_thin(int c, double a, double b, double whole, double u) {
     const double h = b - a, s = m_.sigma_t[c], k = s * whole / h, t = truncated_exponential(u, k, h);
     add(c, source(a + t), h * mean_transmittance(k * h) * std::exp(k * t - s * depth(a, a + t)));

@@ -175,12 +175,13 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
     const V3 q(o + d * t);
     return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
   };
-  // Two-point Gauss-Legendre: exact for the cubic that a trilinear field is along a line.
+  // Two-point Gauss-Legendre quadrature is exact for the cubic that a trilinear field is along a line.
   const auto integral = [&](double a, double length) {
     const double middle = a + length / 2, g = length * .28867513459481288;  // 1 / (2 sqrt 3)
     return length / 2 * (value_at(middle - g) + value_at(middle + g));
   };
-  // Planes that separate the field's patches: through nodes, or half way between them.
+  // The planes that separate the field's patches go through the nodes, or, without interpolation, half way
+  // between them.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   double plane[3], exit[3];
   for (int k = 0; k < 3; ++k) {
@@ -196,7 +197,7 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
     const double b = std::max(a, std::min<double>(t1, exit[k])), here = integral(a, b - a);
     if (p.integral + here >= wanted) {
       const double rest = wanted - p.integral;
-      // Newton's method with a bracket: the integral is monotonic.
+      // The point is found by Newton's method with a bracket, which works because the integral is monotonic.
       double lo = 0, hi = b - a, h = here > 0 ? hi * std::min(1., rest / here) : 0;
       for (int i = 0; i < 32; ++i) {
         const double excess = integral(a, h) - rest;

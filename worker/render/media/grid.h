@@ -140,7 +140,7 @@ class Grid {
   Affine exact_;  // world to index, not rounded to float32
   VolumeFilter filter_ = VolumeFilter::trilinear;
   Wrap wrap_ = Wrap::clamp;
-  bool padded_ = false;  // a layer of nodes from the opposite end surrounds the given ones
+  bool padded_ = false;  // a layer of nodes copied from the opposite end surrounds the given ones
   float max_value_ = 0;
   int cell_size_ = 8;
   std::array<int, 3> cells_{};
@@ -191,7 +191,8 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary i lies at first + i * spacing; number of cells ahead; stride in the cell table.
+  // Per axis: boundary i between cells lies at the distance first_ + i * spacing_; left_ is the number of
+  // cells ahead, and stride_ the step in the cell table to the next one.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];

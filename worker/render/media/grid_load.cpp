@@ -39,7 +39,7 @@ std::vector<float> channel(std::span<const float> interleaved, std::size_t c, st
   return values;
 }
 
-// A .vol file, or a raw grid, whose values are nodes that span its own box from face to face.
+// Loads a .vol file, or a raw grid, whose values are at nodes that span its own box from face to face.
 Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
   auto path = files.path(v.file);

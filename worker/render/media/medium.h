@@ -41,9 +41,9 @@ struct Medium {
   // is the extinction per unit of density, and sigma_s is the albedo times sigma_t.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
-  // Null, or one density grid per channel: three grids of the same shape with the same macro cells. Then
-  // `density` is their mean, which is used to place points, and sigma_t is the same for all
-  // (spectral_grids.h).
+  // Null, or, if the density differs between channels, one density grid per channel: three grids of the same
+  // shape with macro cells of the same size. Then `density` is the mean of the three, which is used to place
+  // points, and sigma_t is the same for all channels (spectral_grids.h).
   std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
   // For a grid with constant albedo: 1 - albedo, stored separately because 1 - (1 - 1e-7) in float32 is off
@@ -134,14 +134,14 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
   const float s = m.sigma_t[hero];
-  // The choice of exactly integrated cells must not depend on the hero: all channels must weight the same
-  // experiment.
+  // Which cells are integrated exactly must not depend on the hero, because the densities of all channels
+  // must refer to the same way of sampling.
   const float s_max = kChromatic ? max_component(m.sigma_t) : s;
   // The integral, so far, of the majorant or, in cells that are integrated exactly, of the density.
   [[maybe_unused]] double passed = 0;
   [[maybe_unused]] int nulls = 0;
-  // T_c / T_hero times the null collisions' sigma_c / s, combined because each factor alone may overflow
-  // float32.
+  // The ratio of the transmittances of channel c and the hero, times sigma_c / s for each null collision.
+  // Both are combined because each factor alone may overflow float32.
   [[maybe_unused]] const auto ratio = [&](int c, double integral) {
     const float sigma = m.sigma_t[c];
     if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
@@ -213,7 +213,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   // deep, so that both stay within float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
-  // Remaining optical depth of the residual up to the next collision; the remainder carries over from cell to
+  // The optical depth of the residual that remains up to the next collision; it carries over from cell to
   // cell.
   float left = stream.exponential();
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {

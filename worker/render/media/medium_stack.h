@@ -50,7 +50,7 @@ class MediaState {
   bool any() const { return count_ > 0; }
   bool several() const { return count_ > 1; }
   std::uint32_t one() const { return effect_[0]; }
-  // The media in effect, in ascending order; one that is present twice is listed twice.
+  // The indices of the media in effect, in ascending order. A medium that is present twice is listed twice.
   std::span<const std::uint32_t> all() const { return {effect_.data(), static_cast<std::size_t>(count_)}; }
   bool overflowed() const { return overflowed_; }
 

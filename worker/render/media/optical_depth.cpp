@@ -55,7 +55,7 @@ OpticalDepth::Point OpticalDepth::grid_after(float x) const {
     }
     passed += here;
   }
-  return {to_, total_, 0, {0, 0, 0}};  // rounding put x beyond the end
+  return {to_, total_, 0, {0, 0, 0}};  // x lies beyond the end by rounding only
 }
 
 C3 OpticalDepth::grid_scattering(const Point& at_point, const V3& p) const {

@@ -75,8 +75,8 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
   v.shrink_to_fit();
 }
 
-// True if the last channel is an alpha that masks: some images whose colour is the mask also have an alpha
-// that is nearly opaque.
+// True if the last channel is an alpha channel that masks, that is, falls below 1/2 somewhere. Some images
+// whose colour is the mask also have an alpha channel, but a nearly opaque one.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

@@ -20,7 +20,7 @@ struct Texels {
   std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3
   std::vector<std::uint8_t> u8;                       // either u8 or f32 is used
   std::vector<float> f32;
-  std::array<float, 256> decode{};  // decoding table of u8
+  std::array<float, 256> decode{};  // the linear value of each 8-bit code
   C3 mean{0, 0, 0};
   std::uint64_t clamped = 0;  // negative values set to 0
 

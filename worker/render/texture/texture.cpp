@@ -79,7 +79,8 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
 }
 
-// An attribute that no mesh has is never read: Geometry::build rejects all other uses.
+// The entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated,
+// because Geometry::build rejects meshes that use it and lack it.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;

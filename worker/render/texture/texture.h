@@ -49,7 +49,7 @@ class TextureTable {
   V2 slope(TextureIndex i, V2 uv) const;
   double aspect(TextureIndex i) const;  // width over height of a bitmap; 1 for other textures
   bool is_constant(TextureIndex i) const;
-  C3 constant(TextureIndex i) const;  // its value if is_constant(i), else its mean
+  C3 constant(TextureIndex i) const;  // the texture's value if is_constant(i), else its mean
   C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights
   std::size_t size() const;
   std::uint64_t bytes() const;           // memory of the texels

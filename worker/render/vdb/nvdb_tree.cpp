@@ -268,7 +268,7 @@ class Tree {
   Type type_ = kFloat;
   Layout layout_{};
   std::uint64_t root_ = 0;
-  Coord lo_{}, end_{};  // box that is read: [lo, end)
+  Coord lo_{}, end_{};  // the box of voxels that is read: [lo, end)
 };
 
 }  // namespace

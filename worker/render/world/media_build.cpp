@@ -106,7 +106,8 @@ Result<void> HeteroBuilder::density() {
   sigma = {per_unit, per_unit, per_unit};
   Volume shape = volume;
   if (auto* c = std::get_if<ConstVolume>(&shape)) {
-    // The colour goes into the coefficients; the grid is 1 inside the medium.
+    // A constant density, which may be a colour, is multiplied into the coefficients; the grid is then 1
+    // inside the medium.
     sigma = times(c->value, per_unit);
     c->value = {1, 1, 1};
   }

@@ -43,11 +43,11 @@ class World {
   bool coincident = false;        // some surfaces coincide, one of them null (coincident.h)
   bool lights_on_others = false;  // emitting null surfaces are among the coincident ones
   Features need;
-  bool use_media = true;  // false: the integrator `path`, which ignores media
+  bool use_media = true;  // false for the integrator `path`, which ignores media
   // True if there are homogeneous media and lights with a position: then segments are also sampled
   // equi-angularly.
   bool equiangular = false;
-  bool equiangular_points = false;  // the same in grids, if there are point lights inside
+  bool equiangular_points = false;  // the same in grids, if there are point lights in them or near them
   bool null_transmission = false;   // some surface has null transmission: shadow rays must collect it
   // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
   // media.

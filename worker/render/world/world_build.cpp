@@ -227,7 +227,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
-  w.need.overlaps = found.overlaps || w.coincident;        // depends on positions in the shapes' files
+  w.need.overlaps = found.overlaps || w.coincident;        // known only once the shapes are read
   w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
   if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
   if (!w.need.covers(found))
