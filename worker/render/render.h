@@ -77,7 +77,8 @@ struct WorldReport {
   std::vector<Structure> structures;
   std::string variant;  // the chosen integrator instantiation, out of `variants` compiled ones
   std::size_t variants = 0;
-  // Inputs that were corrected: negative densities and texels set to 0, degenerate triangles dropped, ...
+  // The number of inputs that were corrected: negative densities and texels set to 0, degenerate triangles
+  // dropped, and so on.
   std::uint64_t clamped_inputs = 0;
 };
 // How many inputs of the scene were corrected, by cause.

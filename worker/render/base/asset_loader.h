@@ -1,4 +1,4 @@
-// Maps a scene's asset index to the local file.
+// Finds the local file of an asset (a mesh, image or volume that the scene refers to by index).
 #pragma once
 
 #include <filesystem>

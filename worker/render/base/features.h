@@ -19,8 +19,8 @@ struct Features {
   // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
   bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
-  // Present in every variant unless built.h leaves them out: index-matched surfaces, null transmission,
-  // equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
+  // Features that every variant has, unless the build leaves them out (built.h): index-matched surfaces, null
+  // transmission, equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
   bool boundaries = kBuilt.boundaries, null_transmission = kBuilt.null_transmission;
   bool equiangular = kBuilt.equiangular, found_lights = kBuilt.found_lights, health = kBuilt.health;
   bool operator==(const Features&) const = default;

@@ -57,9 +57,9 @@ class BsdfTable {
   BsdfTable(BsdfTable&&) noexcept;
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
-  // `textures` must outlive the table. invalid_argument: an index out of range, a material that contains
-  // itself, a two-sided one whose side lets light through, an index of refraction or roughness that is not a
-  // positive finite number.
+  // Builds the table of the scene's materials. `textures` must outlive it. Fails with invalid_argument on an
+  // index out of range, a material that contains itself, a two-sided material one of whose sides lets light
+  // through, and an index of refraction or roughness that is not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;

@@ -263,8 +263,8 @@ class Builder {
            m.alpha_v.value.x < kSpecularAlpha;
   }
   void metal(Material& m, const Rgb& eta, const Rgb& k, TextureIndex specular) {
-    // A metal of this index reflects all but 4e-9 of the light, which is everything in float32; larger
-    // indices would overflow the fourth powers in fresnel_conductor.
+    // The largest index of a metal. With this index it reflects all but 4e-9 of the light, which is
+    // everything in float32; larger indices would overflow the fourth powers in fresnel_conductor.
     constexpr double kLargestIndex = 1e9;
     for (int c = 0; c < 3; ++c) {
       m.eta[c] = static_cast<float>(std::min(eta[c], kLargestIndex));

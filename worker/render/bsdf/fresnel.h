@@ -55,7 +55,7 @@ inline double internal_diffuse_reflectance(double eta) {
 // incidence cos_i in [0, 1]. With eta = 0 everything is reflected.
 inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
-  // eta^2 - k^2 - s2, accurate where it nearly vanishes too
+  // t1 is eta^2 - k^2 - s2, computed so that it is accurate also where it nearly vanishes.
   const float t1 = (eta - 1) * (eta + 1) - k * k + c2;
   const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
   const float a = safe_sqrt(.5f * (a2b2 + t1));

@@ -12,8 +12,8 @@
 
 namespace ls::render {
 
-// If both roughnesses are below this, the surface is a perfect mirror; otherwise a smaller one is raised to
-// kMinAlpha.
+// If both roughnesses are below kSpecularAlpha, the surface is a perfect mirror. If not, a roughness below
+// kMinAlpha is raised to kMinAlpha.
 inline constexpr float kSpecularAlpha = 1e-3f;
 inline constexpr float kMinAlpha = 1e-4f;
 

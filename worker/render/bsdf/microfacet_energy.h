@@ -41,7 +41,8 @@ class CosineTable {
   std::vector<float> x_, y_;
 };
 
-// How far a white furnace may deviate from 1: the error of the tables and of the quadrature behind them.
+// How far the reflected light may deviate from 1 if a surface without absorption is lit by 1 from everywhere
+// (a white furnace): the error of the tables and of the quadrature behind them.
 inline constexpr double kEnergyTolerance = 5e-4;
 
 struct MicrofacetEnergy {

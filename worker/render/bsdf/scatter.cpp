@@ -9,13 +9,13 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Diffuse.
+// The lobe of diffuse materials.
 BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
   const float p = wi.z * kInvPi;
   return {reflectance * p, p};
 }
 
-// Conductors.
+// The lobes of conductors.
 struct Metal {
   C3 eta, k, tint;
   C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
@@ -43,7 +43,7 @@ std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microface
   return s;
 }
 
-// Plastics.
+// The lobes of plastics: a dielectric coat over a diffuse base.
 float coat_reflectance(float cos, float ior) {
   return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
 }

@@ -46,7 +46,8 @@ float mapped_shadow(const Material& m, const V3& n, const V3& wi) {
   const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
   return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
 }
-// A direction must be on the same side in both frames: nothing is lit or seen through the surface.
+// True if a and b, one direction in two frames, is on the same side of the surface in both. Otherwise light
+// would pass through the surface.
 bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 
 V3 to_side(const V3& w, bool outside) { return {w.x, w.y, outside ? w.z : -w.z}; }
@@ -182,7 +183,7 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoin
       const float rest = k ? u_lobe / x.chance[1] : (u_lobe - x.chance[1]) / x.chance[0];
       auto s = sample_part(k ? m.back : m.front, uv, wo, std::min(rest, 0x1.fffffep-1f), u);
       if (!s) return s;
-      // If the other part contributes nothing, the result equals this part's alone, bit for bit.
+      // If the other material contributes nothing, the result is that of this material alone, bit for bit.
       if (x.share[1 - k] == 0 && x.chance[1 - k] == 0) return s;
       if (s->delta) {
         s->weight *= x.share[k] / x.chance[k];

@@ -28,7 +28,7 @@ class Camera {
   CameraRay ray(double fx, double fy, V2 lens) const;
   // True if the origins and directions of all rays of this camera are in the range of float32.
   bool usable() const;
-  // Distance from the camera, or its lens, to the start of a ray in direction d.
+  // The distance from the camera, or from its lens, to the point at which a ray in direction d starts.
   float near_distance(const V3& d) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
@@ -46,7 +46,8 @@ class Camera {
   V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
   V3 origin_;
   V3 lens_x_, lens_y_;  // axes of the lens in world units
-  // Camera-space direction (x, y, 1) of a film position: x = x0 + dx * fx, y likewise.
+  // The film position fx, fy has the camera-space direction (x, y, 1) with x = x0_ + dx_ * fx, and y
+  // likewise.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
   float aperture_ = 0, focus_ = 1;            // scene units
   float near_ = 0, far_ = 0;                  // world units

@@ -30,7 +30,8 @@ enum : unsigned {
   kFirstInstance = 2 * kKinds
 };
 
-// All primitives but triangles are user geometries, intersected by our own double-precision code.
+// The shapes of one kind, as Embree's callbacks get them. All primitives but triangles are user geometries,
+// which our own double-precision code intersects.
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
@@ -77,7 +78,8 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
                    ray.tfar);
 }
 
-// A trace with a filter that accepts no hit, so that all hits along the ray are collected.
+// The state of a trace that collects all hits along the ray: its filter accepts no hit, so that Embree goes
+// on.
 struct Collecting : Tracing {
   using Tracing::Tracing;
   std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set

@@ -116,7 +116,7 @@ class Finder {
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
-    // Each pair of null surfaces occurs twice.
+    // Each pair of null surfaces is found twice, once from each side; it is compared only once.
     if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
       mark(n.surface, 1, n.instance == kNone);

@@ -14,8 +14,8 @@
 namespace ls::render {
 namespace {
 
-// +1 or -1: relates the winding normal of a mesh, or the outward normal of a sphere, to the dialect's normal
-// (checked against Mitsuba 3.9.1, where a mirrored sphere is inside out).
+// The sign, +1 or -1, that relates the winding normal of a mesh, or the outward normal of a sphere, to the
+// dialect's normal (checked against Mitsuba 3.9.1, where a mirrored sphere is inside out).
 float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
   // A rectangle's normal is its transformed +z, and a mesh with normals follows them; mirroring reverses the
@@ -28,7 +28,7 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
 }
 
 // True if the normals of a mirrored body point inwards, as some do in Mitsuba. Its medium stays inside:
-// mirroring a glass of water should not fill the room.
+// mirroring a glass of water should not fill the room around it with water.
 bool mirrored_inwards(const Shape& shape, float orientation) {
   if (!(Affine(shape.to_world).determinant() < 0)) return false;
   if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;

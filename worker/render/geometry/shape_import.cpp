@@ -70,7 +70,8 @@ Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
 }
 
 Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
-  // Uniform scaling: the columns are orthogonal and equally long, up to the rounding of composed transforms.
+  // The map scales uniformly if its columns are orthogonal and equally long, up to the rounding of composed
+  // transforms.
   const V3d x = m.vector({1, 0, 0}), y = m.vector({0, 1, 0}), z = m.vector({0, 0, 1});
   const double l = x.length(), tolerance = 1e-5 * l;
   if (std::abs(y.length() - l) > tolerance || std::abs(z.length() - l) > tolerance ||
@@ -118,8 +119,8 @@ void transform(LocalMesh& m, const Affine& to_scene) {
   }
 }
 
-// If a file has no normals, the dialect computes smooth ones: each vertex's triangles weighted by their angle
-// there (Thuermer and Wuethrich 1998).
+// If a file has no normals, the dialect computes smooth ones: at each vertex the normalised sum of the
+// normals of its triangles, weighted by their angles there (Thuermer and Wuethrich 1998).
 void smooth(LocalMesh& m) {
   m.normals.assign(m.positions.size(), V3d(0));
   for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
@@ -204,7 +205,7 @@ void add_bounds(const Placed& p, Bounds& b) {
   if (p.cylinder) {
     const Cylinder& c = *p.cylinder;
     for (int k = 0; k < 3; ++k) {
-      // half extent of the circle along this axis of the world
+      // `r` is the half extent of the cylinder's circle along axis k.
       const double r = c.radius * std::sqrt(c.u[k] * c.u[k] + c.v[k] * c.v[k]),
                    end = c.p0[k] + c.axis[k] * c.length;
       b.lo[k] = std::min(b.lo[k], std::min(c.p0[k], end) - r);

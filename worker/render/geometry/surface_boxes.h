@@ -1,4 +1,5 @@
-// Bounding boxes of a world's surfaces, one per instance.
+// Computes the bounding boxes of a world's surfaces: one for each surface, or one for each of its instances
+// if it is in a group.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,5 @@
-// Transfers mesh attributes from files to the textures that read them.
+// Checks mesh attributes (values at vertices or faces) from files and stores them for the textures that read
+// them.
 #pragma once
 
 #include <string>
@@ -20,7 +21,7 @@ std::vector<std::string> attribute_names(const Scene& scene, const std::vector<s
 Result<void> check_attributes(const MeshData& mesh, std::string_view file, const Scene& scene,
                               const std::vector<scene::AttributeUse>& uses);
 
-// Empty storage for the attributes that the scene's textures name.
+// Storage, still empty, for the attributes that the scene's textures name.
 SurfaceAttributes attributes_of(const Scene& scene);
 // Adds to `all` the values of one attribute of the mesh of `surface`. `base` is the index of the mesh's first
 // vertex (for an attribute of faces: first triangle) in the world's lists. `kept` is used for attributes of

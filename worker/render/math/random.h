@@ -19,7 +19,7 @@ constexpr std::uint64_t combine_mixed(std::uint64_t a, std::uint64_t mixed_b) {
 }
 constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) { return combine_mixed(a, mix64(b)); }
 
-// 32 random bits as a float in [0, 1). 24 bits are kept, so the largest value is 1 - 2^-24.
+// Turns 32 random bits into a float in [0, 1). The upper 24 bits are kept, so the largest value is 1 - 2^-24.
 inline float unit_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
 // The value -log y for a uniform number y whose complement x = 1 - y is given too, both to full relative
 // precision: depths below t then occur with probability 1 - e^-t however small t is. y alone does not

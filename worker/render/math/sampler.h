@@ -1,5 +1,6 @@
-// The random numbers of one sample: a pure function of (seed, pixel, sample index, vertex, purpose). Even
-// sample indices form half A, odd ones half B; each half of each pixel is its own scrambled Sobol sequence.
+// The random numbers of one sample of a pixel. They are a pure function of (seed, pixel, sample index,
+// vertex, purpose). Even sample indices form half A, odd ones half B; each half of each pixel is its own
+// scrambled Sobol sequence.
 #pragma once
 
 #include <array>
@@ -76,7 +77,8 @@ class SampleStream {
   }
   static const MixedSlots kMixedSlots;
 
-  // A Sobol sequence of 32-bit points has 2^32 members; later samples are hashed.
+  // `sequence` is the key of the half, `index` the index of the sample in it. A Sobol sequence of 32-bit
+  // points has 2^32 members; samples beyond get hashed numbers.
   SampleStream(std::uint64_t sequence, std::uint64_t index)
       : sequence_(sequence),
         sample_(combine(sequence, index)),

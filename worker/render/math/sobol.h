@@ -103,8 +103,8 @@ inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
 
 }  // namespace detail
 
-// Four coordinates, as 32-bit fractions, of a point of the sequence identified by `key`. `reversed_index` is
-// the point's index, bits reversed.
+// The four coordinates, as 32-bit fractions, of one point of the scrambled sequence that `key` identifies.
+// `reversed_index` is the index of the point with its bits reversed.
 inline std::array<std::uint32_t, 4> sobol4_reversed(std::uint32_t reversed_index, std::uint64_t key) {
   const std::uint32_t i = scramble_reversed(reversed_index, static_cast<std::uint32_t>(key));
   const detail::U64x2 seeds = {mix64(key), mix64(key + 1)};

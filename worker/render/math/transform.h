@@ -24,8 +24,8 @@ struct Affine {
             a[6] * v.x + a[7] * v.y + a[8] * v.z};
   }
   V3d point(const V3d& p) const { return vector(p) + b; }
-  // Multiplies by the cofactor matrix (inverse transpose times determinant): correct for normals of mirroring
-  // maps too, up to sign.
+  // Transforms a normal: multiplies n by the cofactor matrix (inverse transpose times determinant): correct
+  // for normals of mirroring maps too, up to sign.
   V3d normal(const V3d& n) const {
     const V3d x(a[0], a[3], a[6]), y(a[1], a[4], a[7]), z(a[2], a[5], a[8]);
     return y.cross(z) * n.x + z.cross(x) * n.y + x.cross(y) * n.z;

@@ -92,7 +92,7 @@ class EmissionWalk {
     if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
     if (!emitter_) return true;
     if (!emitter_->inside(at)) return false;
-    // With several channels only the first one's bound is available.
+    // If the emission grid has several channels, only the bound of the first one is available here.
     if (m_.emitter[1] != m_.emitter[0]) return true;
     const float hi = emitter_->cell().hi;
     return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
@@ -173,7 +173,9 @@ class EmissionWalk {
     for (int c = 0; c < channels_; ++c) through_[c] *= std::exp(-m_.sigma_t[c] * whole);
   }
 
-  // Samples the point where this channel's light is absorbed on the interval.
+  // Samples, by the random number u, the point of the interval [a, b] at which light of a channel is
+  // absorbed. s is the channel's extinction per density, and `absorbed` the share of light that the interval
+  // absorbs.
   double absorption_point(double a, double b, double s, double absorbed, double u) const {
     const Passage p = density_.pass(*m_.density, a, b, absorption_depth(u, s, absorbed));
     return p.reached ? density_.distance(p.t) : b;

@@ -1,4 +1,4 @@
-// Sampling of the points on a ray interval at which medium emission is evaluated (emission.cpp).
+// Samples the points on an interval of a ray at which medium emission is evaluated (emission.cpp).
 #pragma once
 
 #include <algorithm>

@@ -9,12 +9,12 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Interpolating eight float32 numbers can exceed their maximum by a few ulps (docs/measurements/stability.md
-// N09).
+// Bounds of a cell are multiplied by kInflate, because interpolation between eight float32 numbers can exceed
+// their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
 
-// The part of [t0, t1] inside the box; empty if t0 > t1. A ray parallel to a face and outside of it has an
-// empty part; if inside, that face does not limit it.
+// The part of an interval of a ray that lies inside a box: [t0, t1], empty if t0 > t1. A ray parallel to a
+// face and outside of it has an empty part; if inside, that face does not limit it.
 struct Interval {
   double t0, t1;
 };

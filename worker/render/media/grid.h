@@ -171,7 +171,7 @@ class CellWalk {
     return true;
   }
   const MacroCell& cell() const { return *cell_; }
-  // Index of the cell in the cell table of `walked`, the traversed grid.
+  // The index of the current cell in the cell table of `walked`, which must be the traversed grid.
   std::size_t number(const Grid& walked) const {
     return static_cast<std::size_t>(cell_ - walked.macro_.data());
   }

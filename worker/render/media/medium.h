@@ -27,7 +27,8 @@ namespace ls::render {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// What emission is proportional to: length, or absorption.
+// What a medium's emission is proportional to: length, or absorption. For black_body it is proportional to
+// absorption, and the factor is the radiance of a black body.
 enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
 
 // The lights about which segments through a medium are also sampled equi-angularly (vertex_nee.h): none,
@@ -46,8 +47,8 @@ struct Medium {
   // points, and sigma_t is the same for all channels (spectral_grids.h).
   std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
-  // For a grid with constant albedo: 1 - albedo, stored separately because 1 - (1 - 1e-7) in float32 is off
-  // by a fifth.
+  // For a grid with constant albedo, this is 1 - albedo, the share of extinction that is absorption. It is
+  // stored separately because 1 - (1 - 1e-7) in float32 is off by a fifth.
   C3 absorbing{1, 1, 1};
   HenyeyGreenstein phase;
   // The emission (emission.h). A homogeneous medium emits `emission` [radiance per world unit]. A grid emits
@@ -166,7 +167,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
   for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
     const float hi = w.cell().hi, length = w.end() - w.begin(), rate = s * hi, room = rate * length;
     if (s_max * hi * length > kExactDepth) [[unlikely]] {
-      // A hero without extinction passes through; the other channels still need the integral.
+      // A hero without extinction passes through the cell, but the other channels still need the integral.
       const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
                                         s > 0 ? double{depth} / s : std::numeric_limits<double>::infinity());
       if (p.reached) return scatter(w.entry() + p.t, passed + p.integral);

@@ -28,14 +28,14 @@ class ChannelFlight {
   // Accounts for null collisions. `product` is, for each channel, the product over these collisions of
   // (majorant - density), relative to that of the hero.
   void add_nulls(const double (&product)[3]) {
-    // log 0: such a flight is impossible in that channel
+    // A product of 0 gives the logarithm -infinity: such a flight is impossible in that channel.
     for (int c = 0; c < 3; ++c) log_[c] += std::log(product[c]);
   }
   Flight scattered(double t, const C3& rho) const {
     Flight f;
     f.scattered = true;
     f.t = static_cast<float>(t);
-    // Rounding may place the end of a cell's integral where the hero has no density; very rare.
+    // By rounding, an integral over a cell may, very rarely, end where the hero has no density.
     if (!(rho[hero_] > 0)) {
       f.weight = C3(0);
       return f;
@@ -84,7 +84,7 @@ Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V
   for (CellWalk w(grid_of(m, 0), o, d, 0, t_max); w.next();) {
     const Cells cells(m, w);
     const float length = w.end() - w.begin(), hi = cells.of[hero]->hi, rate = s * hi, room = rate * length;
-    // The choice of exactly integrated cells must not depend on the hero.
+    // Which cells are integrated exactly must not depend on the hero (see fly_grid in medium.h).
     if (s * cells.hi() * length > detail::kExactDepth) [[unlikely]] {
       const Passage p =
           grid_of(m, hero).pass(w.origin(), w.direction(), w.begin(), w.end(), double{depth} / s);

@@ -16,7 +16,8 @@ namespace ls::render {
 
 inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
 
-// Bytes that this process may still allocate, as the limit counts them.
+// The number of bytes that this process may still allocate, as the limit counts them; kNoDataLimit if there
+// is no limit.
 inline std::uint64_t data_left() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kNoDataLimit;

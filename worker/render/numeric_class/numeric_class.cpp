@@ -52,8 +52,8 @@ void add_math_in_double(Sha256& h) {
   RandomStream r(3);
   for (int i = 0; i < 4096; ++i) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
-    // Sine and cosine of different numbers, as the renderer calls them: the compiler turns both of the same
-    // number into another function.
+    // Sine and cosine are taken of different numbers, as in the renderer: if both are of the same number, the
+    // compiler calls another function for the two.
     for (double y : {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
                      std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
                      std::hypot(u, x), std::expm1(x), std::log1p(u)}) {

@@ -42,7 +42,8 @@ class TextureTable {
   // The value of texture i at uv. `face` is the point on a triangle at which mesh attributes are read;
   // without it they are black.
   C3 eval(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
-  // The texture as a scalar: its luminance; checkerboards take their other colour (see scene.h).
+  // The value of texture i at uv as a scalar: its luminance. In a checkerboard read as a scalar the two
+  // colours are swapped, as in Mitsuba (see CheckerboardTexture in scene.h).
   float number(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
   // The derivatives by u and v of the luminance of texture i at uv if it is a bilinear bitmap; 0 for other
   // textures.

@@ -7,7 +7,8 @@
 
 namespace ls::render {
 
-// A point on a triangle, for reading mesh attributes. The corners have the weights 1 - b1 - b2, b1, b2.
+// A point on a triangle, for reading mesh attributes. Its barycentric coordinates, the weights of the three
+// corners, are 1 - b1 - b2, b1 and b2.
 struct FacePoint {
   std::uint32_t surface = 0, triangle = 0;
   float b1 = 0, b2 = 0;

@@ -35,7 +35,7 @@ void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
 }
 
-// Peak memory so far, in bytes.
+// The peak memory of this process so far, in bytes.
 std::uint64_t taken() {
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);

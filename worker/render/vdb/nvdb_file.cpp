@@ -19,7 +19,7 @@ constexpr std::uint32_t kAbi = 32;
 // The largest number of bytes that one compressed byte can expand to: neither zlib (at most 1032) nor Blosc's
 // codecs exceed it.
 constexpr std::uint64_t kMaxExpansion = 1100;
-// Blosc buffers are split into pieces of this many bytes.
+// A buffer compressed with Blosc is split into pieces of kBloscPiece bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
 
 enum Codec : std::uint16_t { kPlain, kZip, kBlosc };

@@ -13,7 +13,8 @@ namespace {
 
 using Coord = std::array<std::int64_t, 3>;
 
-// Offsets in the grid (672 bytes), in the tree behind it, and in nodes, which depend on the type of values.
+// Byte offsets of fields in the grid's header (672 bytes) and in the tree that follows it. Those that depend
+// on the type of values are in Layout.
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
@@ -40,7 +41,7 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// The value of a voxel: one component, or all three.
+// The value of a voxel: only the first component is used if the grid has one channel.
 using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {

@@ -48,7 +48,7 @@ Result<void> check_extinction(const Rgb& sigma, double largest, double world_sca
   return {};
 }
 
-// Sets the medium's emission to `factor` times values of at most `largest`.
+// Sets the emission of m to `factor` times values that are at most `largest`.
 Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, double largest) {
   for (const double e : factor)
     if (!(e * largest <= kMaxEmission))

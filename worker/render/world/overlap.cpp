@@ -29,8 +29,8 @@ bool any_touch(std::vector<SurfaceBox> boxes) {
   return false;
 }
 
-// True if there is a boundary that does not have the surrounding medium `ambience` on either side, although
-// that medium surrounds it.
+// True if there is a boundary that has the medium `ambience` on neither side, so that `ambience` may surround
+// it.
 bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
   if (ambience == kNone) return false;
   return std::any_of(g.surfaces.begin(), g.surfaces.end(), [&](const SurfaceInfo& s) {

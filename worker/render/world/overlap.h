@@ -1,4 +1,5 @@
-// Detects nested and intersecting media boundaries once, so that scenes without them pay nothing.
+// Detects nested and intersecting boundaries of media, once, when the world is built, so that scenes without
+// them take no longer to render.
 #pragma once
 
 #include "worker/render/media/medium_stack.h"

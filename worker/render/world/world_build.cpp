@@ -15,7 +15,7 @@
 namespace ls::render {
 namespace {
 
-// The features required by the scene's needs.
+// The features that a scene with the needs n requires of the integrator.
 Features features_of(const scene::Needs& n) {
   return {.media = n.media,
           .grids = n.grids,
@@ -115,7 +115,7 @@ void place_camera(const Scene& scene, const RenderSettings& settings, World& w) 
   w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
 }
 
-// Experimental builds without some parts reject scenes that need those.
+// Fails if the world needs a part of the renderer that this build leaves out (built.h).
 Result<void> check_built(const World& w) {
   const bool has = kBuiltFeatures.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
                    (kBuilt.null_transmission || !w.null_transmission) &&
@@ -246,8 +246,9 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if (m.grid ? w.equiangular_points : w.equiangular)
       m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
   }
-  // Equi-angular sampling picks a light before the shading point is known. MIS needs the same pmf at
-  // vertices, so the tree is used in media only when no segment is sampled.
+  // Equi-angular sampling chooses a light before the shading point is known. Multiple importance sampling
+  // needs the same probability of the light at vertices. So for points in media the tree is used only if no
+  // segments are sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
   return std::shared_ptr<const World>(world);

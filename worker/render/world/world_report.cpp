@@ -1,4 +1,5 @@
-// Describes a built world: what it has and leaves out, and the memory of each structure.
+// Describes a built world (WorldReport): which features it uses and which it does not, and the memory of each
+// structure.
 #include <fmt/format.h>
 
 #include "worker/render/world/world.h"
