@@ -1,4 +1,5 @@
-// Accumulates the AOVs of a pixel while its samples are rendered. Definitions: docs/reference/aovs.md.
+// Accumulates the AOVs (auxiliary images, such as depth or albedo) of a pixel while its samples are rendered.
+// docs/reference/aovs.md defines them.
 #pragma once
 
 #include <array>

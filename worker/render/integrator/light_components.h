@@ -1,4 +1,5 @@
-// Splits the radiance of a sample by the path that the light took: the components of the light AOVs.
+// The components into which the radiance of a sample is split by the path that the light took. The light AOVs
+// (auxiliary images) are sums of them.
 #pragma once
 
 #include <array>

@@ -184,7 +184,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
       }
     }
     if (!met) {
-      // A non-finite direction meets nothing: reject the sample. One that was cut off before keeps its cause.
+      // A ray with a non-finite direction meets nothing; then the sample is rejected. A sample that was
+      // rejected before keeps its cause.
       if (!F.health || is_finite(ray_.d))
         add_environment();
       else
@@ -275,7 +276,8 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
   if (!s) return {Collision::absorbed};
   const V3 w = normalize(hit.shading.to_world(s->wi));
-  // the direction crosses the geometric surface
+  // The path is absorbed if w lies on different sides of the surface by its geometric and by its shading
+  // normal.
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return {Collision::absorbed};
   beta_ *= s->weight;
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;

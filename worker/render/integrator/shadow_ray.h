@@ -1,4 +1,4 @@
-// Part of path_tracer.h, which includes it: the light carried by a shadow ray.
+// Part of path_tracer.h, which includes it: computes how much light a shadow ray carries.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Path termination: hard limits, and Russian roulette for paths that lose no energy.
+// When paths end: the hard limits, and Russian roulette for paths that lose no energy.
 #pragma once
 
 namespace ls::render {

@@ -96,7 +96,8 @@ class VertexNee {
     return v;
   }
 
-  // Strategy (1); d is the direction of travel before the scattering.
+  // Strategy (1): adds the light from a sampled light that is scattered at the vertex p. d is the direction
+  // of travel before the scattering.
   template <class Path>
   static void at_vertex(Path& path, const Medium& medium, const V3& p, const V3& d) {
     const Lights& lights = path.world_.lights;

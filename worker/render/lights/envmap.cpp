@@ -22,15 +22,16 @@ constexpr float kBelowOne = 0x1.fffffep-1f;
 // The tolerance for a to_world that is not exactly a rotation because it was written with six digits.
 constexpr double kSlack = 1e-4;
 
-// The orthogonal matrix nearest to a multiple of m, by Newton's iteration X <- (X + X^-T) / 2 for the polar
-// decomposition (Higham 1986); nullopt if m also stretches.
+// The orthogonal matrix nearest to t up to a uniform scale, by Newton's iteration X <- (X + X^-T) / 2 for the
+// polar decomposition (Higham 1986). Returns nullopt if t also stretches.
 std::optional<Affine> rotation_of(const Transform& t) {
   Affine m(t);
   if (!m.invertible()) return std::nullopt;
   const double size = m.vector({1, 0, 0}).length();
   for (double& a : m.a) a /= size;
   Affine x = m;
-  // Each round doubles the number of correct digits: from six, two rounds give all of them.
+  // Each round of the loop doubles the number of correct digits, so that from six digits two rounds give all
+  // of them.
   for (int round = 0; round < 8; ++round) {
     const Affine inverse = x.inverse();
     for (std::size_t i = 0; i < 3; ++i)

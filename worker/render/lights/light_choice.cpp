@@ -8,7 +8,8 @@
 namespace ls::render {
 namespace {
 
-// With fewer lights with a position than this, only the table is used (docs/decisions/0008-many-lights.md).
+// The smallest number of lights with a position for which the tree is used; with fewer, only the table is
+// (docs/decisions/0008-many-lights.md).
 constexpr std::ptrdiff_t kTreeFrom = 32;
 // Of the words that choose lights in the tree, every kTableShare-th chooses by the table. So the tree cannot
 // make any light rarer than 1/16 of its share in the table.

@@ -38,7 +38,8 @@ struct LightNumbers {
   std::uint32_t light = 0, x = 0, y = 0;
 };
 
-// The chosen light, and for area lights the numbers that determine the point on it.
+// The chosen light, the probability with which it was chosen, and, for area lights, the numbers that
+// determine the point on it.
 struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
@@ -48,8 +49,9 @@ struct LightChoice {
 
 class Lights {
  public:
-  // Sets the light index of the surfaces of `geometry`. Lights without power or area are left out and
-  // counted. `images` loads environment maps; scenes without one do not need it.
+  // Builds the list of the scene's lights and sets the light index of the surfaces of `geometry`. Lights
+  // without power or area are left out and counted. `images` loads environment maps; scenes without one do
+  // not need it.
   static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                               const ImageLoader& images = {});
 
@@ -137,7 +139,8 @@ class Lights {
     bool textured = false;
     bool beam = false;     // area lights: radiance depends on the angle
     bool uniform = false;  // area lights: neither textured nor a beam
-    // parallelogram: corner and edges; disk: centre and axes; directional: direction of travel
+    // For a parallelogram: its corner and edges. For a disk: its centre and axes. For directional: the
+    // direction of travel.
     V3 position, axis_u, axis_v, normal;
     V2 uv0, uv_u, uv_v;  // parallelogram: uv at the corner and along the edges
     double area = 0;

@@ -37,18 +37,18 @@ inline V3 normalize(const V3& v) {
   const float l2 = dot(v, v);
   return l2 > 0 ? v * (1 / std::sqrt(l2)) : v;
 }
-// Reflects w about the unit vector m, both pointing away from the surface.
+// Reflects w about the unit vector m. Both w and m, and the result, point away from the surface.
 inline V3 reflect(const V3& w, const V3& m) { return m * (2 * dot(w, m)) - w; }
 
-// Rec. 709 luminance.
+// The luminance of linear RGB, by the primaries of Rec. 709.
 inline float luminance(const C3& c) { return .212671f * c.x + .715160f * c.y + .072169f * c.z; }
 inline float max_component(const C3& c) { return std::max(c.x, std::max(c.y, c.z)); }
 inline float mean_component(const C3& c) { return (c.x + c.y + c.z) * (1.f / 3); }
 inline bool is_black(const C3& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline bool is_finite(const V3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis,
-// Revisited").
+// A right-handed orthonormal frame (s, t, n) about a unit vector n (Duff et al. 2017, "Building an
+// Orthonormal Basis, Revisited").
 struct Frame {
   V3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
 

@@ -1,4 +1,4 @@
-// Integer mixing and counter-based random numbers.
+// Functions that mix integers, and random numbers computed from counters.
 #pragma once
 
 #include <cmath>

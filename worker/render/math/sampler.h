@@ -33,7 +33,7 @@ enum class Purpose : std::uint32_t {
   end  // not a purpose: their number
 };
 
-// Four numbers for one purpose at one path vertex.
+// Four random numbers for one purpose at one vertex of a path.
 struct Group {
   std::array<std::uint32_t, 4> bits;
   float u(int i) const { return unit_float(bits[static_cast<std::size_t>(i)]); }

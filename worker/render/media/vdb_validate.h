@@ -16,7 +16,7 @@ namespace ls::render {
 // malformed, and with resource_exhausted if a limit is exceeded.
 Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t max_values);
 
-// The error for a malformed reply.
+// The error that the caller reports for a malformed reply.
 tl::unexpected<Error> vdb_nonsense();
 
 }  // namespace ls::render
