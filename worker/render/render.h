@@ -22,16 +22,17 @@ namespace ls::render {
 class World;
 using ls::Health;
 
-// Local file of each of the scene's assets, by digest.
+// The local file of each asset of a scene (mesh, image, volume), by the asset's digest.
 using AssetFiles = std::map<Digest, std::filesystem::path>;
 
-// Builds BVH, grids and light tables; deterministic for any `threads`.
-// invalid_argument: the scene or one of its files is at fault (the message names which and why);
-// resource_exhausted: a limit is exceeded.
+// Prepares the scene for rendering: builds the BVH, grids and light tables. The result does not depend on
+// `threads`, the number of threads that it uses. Fails with invalid_argument if the scene or one of its files
+// is at fault (the message names which and why), and with resource_exhausted if a limit is exceeded.
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
-// The sample being rendered, for crash reports. Written with relaxed stores.
+// The pixel and index of the sample that a thread is rendering, for crash reports. The thread writes it with
+// relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
@@ -43,18 +44,20 @@ struct TileResult {
   bool stopped = false;     // `stop` was set: sums are not valid
 };
 
-// Renders a sample range of a tile on the calling thread. A pure function of (world, tile, samples).
+// Renders the samples `samples` of each pixel of `tile` on the calling thread. The result is a pure function
+// of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample being rendered.
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// Names of the integrator variants that cover the world, cheapest first. render_tile_as() renders with one of
-// them; all give the same bits.
+// The names of the integrator variants that can render this world, cheapest first. A variant is the
+// integrator compiled for one set of features (features.h). render_tile_as() renders with one of them; all
+// give the same bits.
 std::vector<std::string> covering_variants(const World& world);
 std::vector<std::string> all_variants(const World& world);  // all variants of the world's integrator
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// The value of one sample of one pixel, for replay.
+// The value of one sample of one pixel, so that a single sample can be rendered again.
 struct SampleValue {
   double rgb[3];
   bool finite;    // false: the sample is rejected
@@ -62,7 +65,8 @@ struct SampleValue {
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
 
-// The features that the scene uses and leaves out, in words, and the size of each structure.
+// A report for people: the names of the features that the scene uses and of those it does not use, and the
+// size of each data structure.
 struct WorldReport {
   struct Structure {
     std::string name;
@@ -73,15 +77,16 @@ struct WorldReport {
   std::vector<Structure> structures;
   std::string variant;  // the chosen integrator instantiation, out of `variants` compiled ones
   std::size_t variants = 0;
-  // Inputs that were corrected: negative densities and texels set to 0, degenerate triangles dropped, ...
+  // The number of inputs that were corrected: negative densities and texels set to 0, degenerate triangles
+  // dropped, and so on.
   std::uint64_t clamped_inputs = 0;
 };
-// The corrected inputs by cause.
+// How many inputs of the scene were corrected, by cause.
 const Health& changed_inputs(const World& world);
 WorldReport describe(const World& world);
 
-// SHA-256 of the build and of the results of a start-up battery: machines of the same class produce the same
-// bits. Computed once.
+// The numeric class of this machine and build: the SHA-256 of the build id and of the results of a battery of
+// test computations, run once, at the first call. Machines of the same class produce the same bits.
 const Digest& numeric_class();
 
 }  // namespace ls::render

@@ -1,4 +1,4 @@
-// Maps a scene's asset index to the local file.
+// Finds the local file of an asset (a mesh, image or volume that the scene refers to by index).
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,8 @@ struct AssetLoader {
   const Scene& scene;
   const AssetFiles& files;
 
-  // internal: the caller did not supply the file that the scene names.
+  // The local file of the scene's asset number i. Fails with Errc::internal if the caller of build_world()
+  // supplied no file with that asset's digest.
   Result<std::filesystem::path> path(AssetIndex i) const {
     const Asset& asset = scene.assets.at(i.value);
     const auto it = files.find(asset.digest);

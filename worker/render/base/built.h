@@ -1,4 +1,4 @@
-// Optional parts compiled into the renderer: normally all. Only the experiment of
+// The optional parts of the renderer that this build contains: normally all of them. Only the experiment of
 // docs/measurements/leave-out.md builds without some (cmake -DLIGHTSHAFT_WITHOUT=grids,textures), to measure
 // what their presence costs a scene that does not use them; such a build refuses scenes that need them.
 #pragma once
@@ -23,12 +23,13 @@ struct Built {
   bool light_trees = true;
   bool lenses = true;
   bool found_lights = true;  // lights that rays can hit: area lights and environments
-  // Needed by every scene, but switchable so that its cost can be measured: the checks that count bad
-  // samples.
+  // The checks that count bad samples. Every scene needs them; they can be left out only so that their cost
+  // can be measured.
   bool health = true;
 };
 
-// `list`: names separated by commas; an unknown name is a compile error.
+// All parts but those named in `list`. The names in `list` are separated by commas; an unknown name is a
+// compile error.
 constexpr Built built_without(std::string_view list) {
   Built b;
   while (!list.empty()) {

@@ -1,5 +1,6 @@
-// The features that a scene needs of the integrator. A variant may remove code, but never change the use of
-// random numbers or the order of arithmetic, so all variants that cover a scene give the same bits
+// The features that a scene needs of the integrator. A variant is the integrator compiled for one set of
+// features: it may leave code out, but it never changes the use of random numbers or the order of arithmetic.
+// So all variants that have the features of a scene render it to the same bits
 // (docs/decisions/0012-what-a-scene-needs.md).
 #pragma once
 
@@ -12,13 +13,14 @@ struct Features {
   bool grids = false;      // heterogeneous media
   bool chromatic = false;  // extinction that differs between channels
   bool emission = false;   // media that emit light
-  // nested or intersecting media (medium_stack.h); coincident surfaces, one of them null (coincident.h)
+  // The scene has nested or intersecting media (medium_stack.h), or coincident surfaces of which one is null,
+  // that is, index-matched (coincident.h).
   bool overlaps = false;
-  // surfaces that light passes straight through: index-matched ones, masks, thin sheets
+  // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
   bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
-  // Present in every variant unless built.h leaves them out: index-matched surfaces, null transmission,
-  // equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
+  // Features that every variant has, unless the build leaves them out (built.h): index-matched surfaces, null
+  // transmission, equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
   bool boundaries = kBuilt.boundaries, null_transmission = kBuilt.null_transmission;
   bool equiangular = kBuilt.equiangular, found_lights = kBuilt.found_lights, health = kBuilt.health;
   bool operator==(const Features&) const = default;

@@ -1,12 +1,13 @@
-// Bounds the threads that libraries start while a world is built (TBB under Embree and OpenVDB). Embree's own
-// setting does not bound them.
+// Limits the threads that TBB, the library under Embree and OpenVDB, starts while a world is built. Embree's
+// own setting does not limit them.
 #pragma once
 
 #include <memory>
 
 namespace ls::render {
 
-// Active while the returned object lives; of several limits the tightest applies.
+// Limits TBB to `threads` threads in this process for as long as the returned object lives. If several such
+// objects live, the lowest limit applies.
 std::shared_ptr<void> limit_threads(int threads);
 
 }  // namespace ls::render

@@ -1,5 +1,6 @@
-// Work counters, for the tests and benchmarks that show that a scene pays nothing for features it does not
-// use. Only in builds with LIGHTSHAFT_COUNT; in all others LS_COUNT expands to nothing.
+// Work counters: how often each thread did each kind of work. Tests and benchmarks use them to show that a
+// scene pays nothing for features it does not use. They exist only in builds with LIGHTSHAFT_COUNT; in all
+// others LS_COUNT expands to a statement without effect.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@ namespace ls::render {
 
 struct WorkCounters {
   std::uint64_t density = 0;            // grid evaluations
-  std::uint64_t macro_cells = 0;        // visited by trackers
+  std::uint64_t macro_cells = 0;        // macro cells visited by trackers
   std::uint64_t phase = 0;              // phase function evaluations and samples
   std::uint64_t transmittance = 0;      // evaluations in homogeneous media
   std::uint64_t medium_emission = 0;    // segments integrated for medium emission
@@ -19,7 +20,7 @@ struct WorkCounters {
   std::uint64_t instances = 0;          // hits transformed through an instance
   std::uint64_t user_geometry = 0;      // spheres, disks and cylinders tested by the BVH
   std::uint64_t light_tree = 0;         // light-tree samples and pdf evaluations
-  std::uint64_t environment_map = 0;    // lookups and samples
+  std::uint64_t environment_map = 0;    // environment map lookups and samples
   std::uint64_t lens = 0;               // aperture samples
   std::uint64_t shadow_rays = 0;
 };

@@ -1,4 +1,4 @@
-// Work counters by name, in builds that count.
+// Lists the counters of work_counters.h as pairs of name and count, for builds that count.
 #pragma once
 
 #include <array>

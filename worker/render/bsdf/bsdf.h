@@ -1,10 +1,11 @@
-// Surface scattering by index: one flat table, a switch on the material kind, textures read only where they
-// are not constant. Values are Mitsuba 3's (separable Smith masking, its Beckmann rational fit, its rough
-// plastic tables).
+// The surface scattering functions (BSDFs) of a scene, in one flat table by index. A switch on the material's
+// kind selects the code, and a texture is looked up only where it is not constant. The values are those of
+// Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic tables).
 //
 // Some surfaces have null transmission (mask, thin dielectric): part of the light passes straight through.
 // Paths and shadow rays pass through without a vertex, so that next-event estimation reaches lights behind;
-// eval() and sample() cover the rest of the light, and their weights keep its share of the whole.
+// eval() and sample() cover only the light that does not pass straight through. Their values are not
+// normalised to it: they remain fractions of all the light that arrives.
 //
 // Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer
 // or the previous vertex) and wi (towards the next vertex or the light) are unit vectors that point AWAY from
@@ -28,7 +29,8 @@ struct MicrofacetEnergy;
 
 struct BsdfEval {
   C3 f_cos{0, 0, 0};  // f |cos wi| [1/sr]; delta lobes give 0
-  // density with which sample() chooses wi by a smooth lobe [1/sr]; positive wherever f_cos is
+  // The density [1/sr] with which sample() chooses wi by one of its smooth (not delta) lobes. It is positive
+  // wherever f_cos is.
   float pdf = 0;
 };
 
@@ -43,7 +45,8 @@ struct BsdfSample {
 
 struct NullTransmission {
   C3 transmission{0, 0, 0};  // share of light that passes straight through
-  // of passing straight through; 1 - probability is positive wherever other scattering is possible
+  // The probability with which a path is to pass straight through. It is below 1 wherever the surface can
+  // also scatter otherwise.
   float probability = 0;
 };
 
@@ -54,19 +57,22 @@ class BsdfTable {
   BsdfTable(BsdfTable&&) noexcept;
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
-  // `textures` must outlive the table. invalid_argument: an index out of range, a material that contains
-  // itself, a two-sided one whose side lets light through, an index of refraction or roughness that is not a
-  // positive finite number.
+  // Builds the table of the scene's materials. `textures` must outlive it. Fails with invalid_argument on an
+  // index out of range, a material that contains itself, a two-sided material one of whose sides lets light
+  // through, and an index of refraction or roughness that is not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;
-  // nullopt: absorbed, or the sampled direction is on the wrong side. u_lobe and u are in [0, 1).
+  // Samples wi for the given wo. u_lobe, in [0, 1), chooses the lobe and u, in [0, 1)^2, the direction within
+  // the lobe. Returns nullopt if the light is absorbed, or if the sampled direction is on the wrong side of
+  // the surface.
   std::optional<BsdfSample> sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe, V2 u) const;
 
-  // For light travelling along w, from either side.
+  // The null transmission at `uv` for light that travels along the direction w, which may cross the surface
+  // from either side.
   NullTransmission null_transmission(BsdfIndex i, const UvPoint& uv, const V3& w) const;
 
-  bool is_null(BsdfIndex i) const;                // index-matched boundary: light passes unchanged
+  bool is_null(BsdfIndex i) const;                // an index-matched boundary: light passes unchanged
   bool has_null_transmission(BsdfIndex i) const;  // part of the light passes straight through, part does not
   bool has_smooth(BsdfIndex i) const;             // has a lobe that is not a delta: use next-event estimation
   bool reads_uv(BsdfIndex i) const;               // some parameter is a texture
@@ -80,7 +86,7 @@ class BsdfTable {
   struct Principled;
 
  private:
-  // One-sided kinds other than uniform diffuse.
+  // eval() and sample() for the one-sided material kinds other than uniform diffuse.
   BsdfEval eval_lobes(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
   std::optional<BsdfSample> sample_lobes(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
                                          V2 u) const;
@@ -94,7 +100,7 @@ class BsdfTable {
 
   std::vector<Material> materials_;
   std::vector<Principled> principled_;  // additional parameters of principled materials
-  // of the materials with multiple_scattering
+  // The compensation tables of the materials with multiple_scattering; the materials point at them.
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;

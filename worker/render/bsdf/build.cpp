@@ -21,7 +21,8 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Records the first error, so that the conversions below read as tables.
+// Builds the table of materials. It records only the first error and goes on, so that the conversions below
+// need no error handling of their own and read as tables.
 class Builder {
  public:
   Builder(const Scene& scene, const TextureTable& textures, const std::vector<scene::BsdfTraits>& traits)
@@ -72,8 +73,8 @@ class Builder {
     m.alpha_v = roughness(b.alpha_v);
     m.specular_slot = reflectance(b.specular_reflectance);
     m.second_slot = reflectance(b.specular_transmittance);
-    // With facets of slope t refraction deviates by about (ior - 1) t: invisible, but a lobe too narrow for
-    // float32.
+    // Facets of slope t deflect refracted light by about (ior - 1) t. For an ior this close to 1 that is
+    // invisible, but the lobe would be too narrow for float32; so the boundary is treated as smooth.
     if (mirror(m) || std::abs(m.ior - 1) < kSpecularAlpha)
       m.kind = MaterialKind::dielectric;
     else if (b.multiple_scattering)
@@ -113,7 +114,8 @@ class Builder {
     if (error) return m;
     if (b.multiple_scattering) {
       m.energy = energy(EnergyOf::coat, m, b.alpha, eta);
-      // Reflected back inside: by reciprocity 1 / eta^2 of the transmitted light leaves.
+      // The share of diffuse light from inside that the coat reflects back: by reciprocity, light from inside
+      // is transmitted 1 / eta^2 times as much as light from outside.
       if (m.energy)
         m.coat.internal_reflectance = static_cast<float>(1 - m.energy->through.mean() / (eta * eta));
     } else {
@@ -180,7 +182,8 @@ class Builder {
     p.transmits = b.spec_trans.has_value();
     p.spec_trans = b.spec_trans ? reflectance(*b.spec_trans) : Slot{C3(0), {}, true};
     p.eta = static_cast<float>(index(b.eta, 1));
-    // As in Mitsuba: keeps some contrast of indices, without which facets vanish.
+    // As in Mitsuba, the index is kept away from 1, because without a contrast of indices the facets neither
+    // reflect nor refract.
     if (p.transmits && std::abs(p.eta - 1) < 1e-3f) p.eta = 1.001f;
     principled.push_back(p);
     return m;
@@ -202,14 +205,15 @@ class Builder {
     const float d = mean(m.second_slot), s = mean(m.specular_slot);
     m.specular_weight = d + s > 0 ? s / (d + s) : 1;
   }
-  // Integrated once for all materials with equal parameters: a table takes 30 ms, and scenes give many
-  // objects the same coat.
+  // The table of a plastic's coat. It is integrated once for all materials with equal parameters, because
+  // that takes 30 ms and scenes give many objects the same coat.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta) {
     const auto [it, fresh] = coats_.try_emplace({type, alpha, eta});
     if (fresh) it->second = make_rough_plastic_table(type, alpha, eta);
     return it->second;
   }
-  // Likewise integrated once for all materials with equal parameters.
+  // The table of multiple scattering between microfacets. Like coat(), it is integrated once for all
+  // materials with equal parameters.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Material& m, double alpha, double eta) {
     if (error) return nullptr;
@@ -236,7 +240,8 @@ class Builder {
     }
     return {textures_.constant(t), t, textures_.is_constant(t)};
   }
-  // Reflectances outside [0, 1] are clamped, so that surfaces conserve energy, and counted.
+  // The Slot of a reflectance. Values outside [0, 1] are clamped, so that surfaces conserve energy, and
+  // counted.
   Slot reflectance(TextureIndex t) {
     Slot s = slot(t);
     if (!s.constant) return s;
@@ -258,8 +263,8 @@ class Builder {
            m.alpha_v.value.x < kSpecularAlpha;
   }
   void metal(Material& m, const Rgb& eta, const Rgb& k, TextureIndex specular) {
-    // A metal of this index reflects all but 4e-9 of the light, which is everything in float32; larger
-    // indices would overflow the fourth powers in fresnel_conductor.
+    // The largest index of a metal. With this index it reflects all but 4e-9 of the light, which is
+    // everything in float32; larger indices would overflow the fourth powers in fresnel_conductor.
     constexpr double kLargestIndex = 1e9;
     for (int c = 0; c < 3; ++c) {
       m.eta[c] = static_cast<float>(std::min(eta[c], kLargestIndex));
@@ -280,8 +285,8 @@ class Builder {
     }
     return eta;
   }
-  // Resolves the material of one side of a two-sided one. A two-sided material nested there shows its front
-  // on both sides.
+  // The index of the material to use for one side of a two-sided material, whose material there is b. If b is
+  // itself two-sided, its front is used for both sides.
   std::uint32_t side(BsdfIndex b) {
     if (traits_[b.value].transmits) refuse("a two-sided material cannot hold one that lets light through");
     while (const auto* nested = std::get_if<TwoSidedBsdf>(&scene_.bsdfs[b.value])) b = nested->front;
@@ -295,7 +300,7 @@ class Builder {
   std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> energies_;
 };
 
-// True if `holds` for a part that the material consists of.
+// True if `holds` is true for any of the materials that m consists of.
 template <class F>
 bool any_part(const Material& m, F holds) {
   switch (m.kind) {

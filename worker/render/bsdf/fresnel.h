@@ -7,14 +7,15 @@ namespace ls::render {
 
 struct DielectricFresnel {
   double reflectance = 0;
-  double cos_t =
-      0;  // of the refracted direction, with sign opposite to cos_i; 0 under total internal reflection
+  // Cosine of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection.
+  double cos_t = 0;
   double eta_it = 1;  // index on the transmitted side over the index on the incident side
   double eta_ti = 1;  // its inverse
 };
 
-// cos_i > 0: from the outside; eta: index inside over outside. In double, because near eta = 1 the amplitudes
-// cancel.
+// Reflectance and refraction at a smooth boundary of two dielectrics. cos_i is the cosine of the incident
+// direction from the outward normal: positive if light comes from the outside. eta is the index inside over
+// the index outside. Computed in double, because near eta = 1 the amplitudes cancel.
 inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   const bool outside = cos_i >= 0;
   DielectricFresnel f;
@@ -34,9 +35,10 @@ inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   return f;
 }
 
-// Diffuse reflectance of a smooth boundary for light from inside, whose index is eta times the outside's.
-// Light from the less dense side by Simpson's rule (the integrand 2 F mu is smooth for an index above 1:
-// relative error below 1e-7), from the denser side by reciprocity.
+// Diffuse reflectance of a smooth boundary for light from inside, whose index is eta times the outside's. The
+// value for light from the less dense side is computed by Simpson's rule (the integrand 2 F mu is smooth for
+// an index above 1: relative error below 1e-7), and the value for the denser side follows from it by
+// reciprocity.
 inline double internal_diffuse_reflectance(double eta) {
   const double n = std::max(eta, 1 / eta);
   constexpr int kSteps = 256;
@@ -49,10 +51,11 @@ inline double internal_diffuse_reflectance(double eta) {
   return eta >= 1 ? 1 - (1 - into_denser) / (n * n) : into_denser;
 }
 
-// Complex index eta + i k relative to the outside; cos_i in [0, 1]. (0, k) reflects everything.
+// Reflectance of a conductor whose complex index, relative to the outside, is eta + i k, for the cosine of
+// incidence cos_i in [0, 1]. With eta = 0 everything is reflected.
 inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
-  // eta^2 - k^2 - s2, accurate where it nearly vanishes too
+  // t1 is eta^2 - k^2 - s2, computed so that it is accurate also where it nearly vanishes.
   const float t1 = (eta - 1) * (eta + 1) - k * k + c2;
   const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
   const float a = safe_sqrt(.5f * (a2b2 + t1));

@@ -2,8 +2,8 @@
 
 namespace ls::render::beckmann {
 
-// M. Giles, "Approximating the erfinv function" (2010), single precision polynomials: relative error below
-// 1e-6.
+// The inverse of erf by the single precision polynomials of M. Giles, "Approximating the erfinv function"
+// (2010): relative error below 1e-6.
 double erf_inverse(double x) {
   double w = -std::log((1 - x) * (1 + x)), p;
   if (w < 5) {
@@ -24,8 +24,8 @@ double erf_inverse(double x) {
 
 // Visible slopes s have the density exp(-s^2) (cos - s sin)+, whose integral up to s is
 //   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2),  s <= cot.
-// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. Bounded: each step that does not
-// converge quadratically halves the bracket, and 64 halvings exhaust a double.
+// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. The number of steps is bounded:
+// each step that does not converge quadratically halves the bracket, and 64 halvings exhaust a double.
 double visible_slope(double cos_theta, double sin_theta, double u) {
   constexpr double kHalfSqrtPi = .886226925452758014;
   constexpr double kEnd = 6.5;  // exp(-42): beyond any float32 u

@@ -1,5 +1,7 @@
 // Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba.
-// All directions are in the local frame, above the surface (z > 0), of unit length. No division by a cosine.
+// All directions are unit vectors in the local frame, above the surface (z > 0). The functions return G1 /
+// cos and densities over D, so that callers need not divide by a cosine. ax and ay are the roughnesses
+// (alpha) along x and y.
 //
 // Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because the dialect
 // defines the material by it; in the sampling *density* it is the exact one, so that the density is exact.
@@ -10,35 +12,40 @@
 
 namespace ls::render {
 
-// If both roughnesses are below this, the surface is a perfect mirror; otherwise a smaller one is raised to
-// kMinAlpha.
+// If both roughnesses are below kSpecularAlpha, the surface is a perfect mirror. If not, a roughness below
+// kMinAlpha is raised to kMinAlpha.
 inline constexpr float kSpecularAlpha = 1e-3f;
 inline constexpr float kMinAlpha = 1e-4f;
 
-// Length of the tangential part of w scaled to a surface of roughness 1: (ax x, ay y, z).
+// The length of the tangential part of w after stretching w to (ax x, ay y, z), where the surface looks like
+// one of roughness 1.
 inline float stretched_sine(const V3& w, float ax, float ay) {
   return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y));
 }
 
 namespace ggx {
-// Written with the tangential part of m, to avoid cancellation near the normal.
+// The density of microfacet normals m. Written with the tangential part of m, to avoid cancellation near the
+// normal.
 inline float D(const V3& m, float ax, float ay) {
   return 1 / (kPi * ax * ay * sqr(sqr(m.x / ax) + sqr(m.y / ay) + m.z * m.z));
 }
 inline float G1_over_cos(const V3& w, float ax, float ay) {
   return 2 / (w.z + std::sqrt(sqr(ax * w.x) + sqr(ay * w.y) + w.z * w.z));
 }
-// For bounded visible normals (Tokuyoshi and Eto 2024): how much of the cap below the horizon is excluded.
+// The factor k of bounded visible normals (Tokuyoshi and Eto 2024). It shrinks the part of the sampled
+// spherical cap below the horizon, so that fewer normals are sampled that reflect wo downwards.
 inline float bound_k(const V3& wo, float ax, float ay) {
   const float a = std::min(std::min(ax, ay), 1.f), s = 1 + std::sqrt(wo.x * wo.x + wo.y * wo.y);
   return (1 - a * a) * s * s / (s * s + a * a * wo.z * wo.z);
 }
-// Density of the reflected direction, divided by D(m).
+// The density of the direction that wo is reflected to by sample_normal() with k = bound_k(), divided by
+// D(m).
 inline float pdf_over_D(const V3& wo, float ax, float ay) {
   const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
   return .5f / (bound_k(wo, ax, ay) * wo.z + t);
 }
-// k: 1 for all visible normals, bound_k() for those that reflect upwards.
+// Samples a microfacet normal that is visible from wo. u is in [0, 1)^2. k = 1 samples all visible normals; k
+// = bound_k() leaves out normals that reflect wo downwards.
 inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
   const float b = k * i.z;
@@ -69,10 +76,10 @@ inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
          (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
 }
 inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_G1_over_cos(wo, ax, ay); }
-// By inversion, in double; u in [0, 1)^2.
+// Samples a microfacet normal that is visible from wo, by inversion, in double; u is in [0, 1)^2.
 V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
-// The inverse cdf, at u, of visible slopes along the viewing direction, for roughness 1 and a viewer at this
-// angle.
+// The inverse, at u, of the cumulative distribution of visible slopes along the viewing direction, for
+// roughness 1 and a viewer at the angle theta from the normal.
 double visible_slope(double cos_theta, double sin_theta, double u);
 double erf_inverse(double x);
 }  // namespace beckmann
@@ -92,8 +99,8 @@ struct Microfacets {
     return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, ggx::bound_k(wo, ax, ay))
                                    : beckmann::sample_normal(wo, ax, ay, u);
   }
-  // All visible normals m, with the density D(m) visible_over_D(wo) dot(wo, m). For refraction, which also
-  // uses normals that would reflect downwards.
+  // Samples any visible normal m, with the density D(m) visible_over_D(wo) dot(wo, m). Refraction needs this,
+  // because it also uses normals that would reflect wo downwards.
   V3 sample_visible(const V3& wo, const V2& u) const {
     return type == Microfacet::ggx ? ggx::sample_normal(wo, ax, ay, u, 1)
                                    : beckmann::sample_normal(wo, ax, ay, u);

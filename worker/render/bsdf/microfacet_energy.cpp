@@ -10,17 +10,18 @@
 namespace ls::render {
 namespace {
 
-// Intervals start at powers of two, because the functions vary near grazing angles on the scale of alpha,
-// which is at least 1/1024; 2^12 parts of each reach the resolution of float32.
+// The tables' intervals first lie between powers of two, kOctaves of them, because near grazing angles the
+// functions vary on the scale of alpha, which is at least 1/1024. Each is halved at most kDeepest times: 2^12
+// parts reach the resolution of float32.
 constexpr int kOctaves = 16, kDeepest = 12;
 
 const Quadrature& quadrature(double eta) {
   static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
-  return eta >= 1 ? kSmooth : kKinked;  // below 1, total reflection has a kink
+  return eta >= 1 ? kSmooth : kKinked;  // for eta below 1 the integrand has a kink, at total reflection
 }
 
-// The viewer's masking in the value divided by that in the density of visible normals: not 1 for Beckmann,
-// whose value is a fit (microfacet.h).
+// The masking of the viewer as the BSDF's value has it, divided by the masking in the density of visible
+// normals. The ratio is not 1 for Beckmann, whose value uses a fit (microfacet.h).
 double fit(Microfacet type, double alpha, double mu) {
   if (type == Microfacet::ggx || alpha < kSpecularAlpha) return 1;
   const V3 w(static_cast<float>(std::sqrt((1 - mu) * (1 + mu))), 0, static_cast<float>(mu));

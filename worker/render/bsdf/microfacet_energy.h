@@ -18,11 +18,12 @@
 
 namespace ls::render {
 
-// A function on [0, 1], piecewise linear with adaptively placed nodes.
+// A table of a function of a cosine in [0, 1]: piecewise linear, with adaptively placed nodes.
 class CosineTable {
  public:
   CosineTable() = default;
-  // The error is at most `tolerance`, checked at the middle and the quarter points of each interval.
+  // Tabulates f. The error is at most `tolerance`, checked at the middle and the quarter points of each
+  // interval.
   CosineTable(const std::function<double(double)>& f, double tolerance);
 
   float at(float x) const {
@@ -40,7 +41,8 @@ class CosineTable {
   std::vector<float> x_, y_;
 };
 
-// How far a white furnace may deviate from 1: the error of the tables and of the quadrature behind them.
+// How far the reflected light may deviate from 1 if a surface without absorption is lit by 1 from everywhere
+// (a white furnace): the error of the tables and of the quadrature behind them.
 inline constexpr double kEnergyTolerance = 5e-4;
 
 struct MicrofacetEnergy {
@@ -48,7 +50,7 @@ struct MicrofacetEnergy {
   CosineTable through;                  // plastics: light that the coat lets in, compensated likewise
   float mean = 1;                       // conductors: E_mean
 
-  // For a conductor with mean reflectance F.
+  // The factor f' / f, seen at the cosine `cos`, of a conductor whose mean Fresnel reflectance is F.
   C3 factor(float cos, const C3& F) const {
     const float lacking = missing.at(cos), lost = 1 - mean;
     const auto again = [&](float f) { return f * mean / (1 - f * lost); };
@@ -59,12 +61,12 @@ struct MicrofacetEnergy {
 };
 
 MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
-// eta: inside over outside.
+// eta is the index inside over the index outside.
 MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);
-// Sets `through`, and leaves missing_behind empty.
+// The tables for the coat of a rough plastic. Sets `through`, and leaves `missing_behind` empty.
 MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta);
 
-// 2 int F mu dmu of a conductor.
+// The mean Fresnel reflectance 2 int F mu dmu of a conductor, per channel.
 C3 mean_fresnel(const C3& eta, const C3& k);
 
 }  // namespace ls::render

@@ -14,15 +14,16 @@ float mix(float a, float b, float t) { return a * (1 - t) + b * t; }
 float fifth(float x) { return sqr(sqr(x)) * x; }
 float schlick_weight(float cos) { return fifth(std::clamp(1 - cos, 0.f, 1.f)); }
 
-// Schlick's w in F = F0 + (1 - F0) w, coming from outside an index of eta; for eta below 1 by the refracted
-// angle.
+// Schlick's weight w in F = F0 + (1 - F0) w for light that comes, at the cosine `cos`, from outside of a
+// material whose relative index is eta. For eta below 1 the cosine of the refracted angle is used.
 float schlick(float cos, float eta) {
   return schlick_weight(eta > 1 ? cos : safe_sqrt(1 - (1 - cos) * (1 + cos) / (eta * eta)));
 }
 C3 schlick(const C3& f0, float w) { return f0 * (1 - w) + C3(w); }
 
-// The clear coat's facets (GTR with exponent 1), alpha from 0.1 to 0.001. Their normals have the density D
-// cos. Written with the tangential part of m, to avoid cancellation near the normal.
+// The clear coat's facets (GTR with exponent 1), alpha from 0.1 to 0.001. Their normals m have the density
+// D(m) cos, with the cosine of m to the surface normal. D is written with the tangential part of m, to avoid
+// cancellation near the normal.
 struct CoatFacets {
   float a2;
   explicit CoatFacets(float gloss) : a2(sqr(mix(.1f, .001f, gloss))) {}
@@ -37,8 +38,8 @@ struct CoatFacets {
   }
 };
 
-// The material at one point, seen from wo. All directions are on wo's side from here on: a wo from behind is
-// mirrored to the front, with the inverse index.
+// The material at one point, seen from wo. If wo is behind the surface, it is mirrored to the front and the
+// inverse index is used; so from here on the side of wo is always z > 0.
 struct Seen {
   const BsdfTable::Principled& p;
   const Lookup& look;
@@ -64,10 +65,11 @@ struct Seen {
     chance_diffuse = diffuse / sum;
   }
 
-  // False from inside a surface that light does not enter.
+  // False if wo is grazing, or inside of a surface that light does not enter.
   bool visible() const { return wo.z > 0 && (front || bsdf > 0); }
   float fresnel(float cos) const { return static_cast<float>(fresnel_dielectric(cos, eta).reflectance); }
-  // Probability that a sampled visible normal with this reflectance reflects.
+  // The probability that light is reflected, not refracted, at a sampled visible normal with the Fresnel
+  // reflectance F.
   float reflecting(float F) const { return front ? 1 - bsdf * (1 - F) : F; }
 
   C3 tint(const C3& base) const {
@@ -83,7 +85,8 @@ struct Seen {
   }
 };
 
-// Diffuse, retro-reflection, approximate subsurface scattering, and sheen.
+// The value f |cos wi| of the diffuse lobe: diffuse reflection, retro-reflection, approximate subsurface
+// scattering, and sheen.
 C3 diffuse_f_cos(const Seen& s, const C3& base, const V3& wi, float cos_d) {
   const float out = schlick_weight(wi.z), in = schlick_weight(s.wo.z);
   const float retro = 2 * s.look.share(s.p.roughness) * sqr(cos_d);
@@ -107,7 +110,7 @@ BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
   const float F = s.fresnel(cos_d), D = s.facets.D(h);
   BsdfEval e;
   e.pdf = s.chance_facets * s.reflecting(F) * .25f * D * s.facets.visible_over_D(s.wo);
-  if (F > 0)  // as in Mitsuba: without a contrast of indices there is no reflection, not even a metal's
+  if (F > 0)  // as in Mitsuba: with equal indices nothing is reflected, not even by a metal
     e.f_cos = s.reflectance(F, cos_d, base) *
               (.25f * D * s.facets.G1_over_cos(s.wo) * s.facets.G1_over_cos(wi) * wi.z);
   if (!s.front) return e;
@@ -126,7 +129,7 @@ BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
   return e;
 }
 
-// wi is below the surface; the formulas are RoughDielectric's.
+// The value for a wi below the surface, by the formulas of RoughDielectric.
 BsdfEval eval_refraction(const Seen& s, const C3& base, const V3& wi) {
   if (!s.p.transmits || !(s.bsdf > 0)) return {};
   V3 h = s.wo + wi * s.eta;

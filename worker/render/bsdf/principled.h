@@ -18,7 +18,7 @@ struct BsdfTable::Principled {
   Slot base_color, roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness,
       clearcoat, clearcoat_gloss;
   bool transmits = false;
-  float eta = 1.5f;  // inside over outside
+  float eta = 1.5f;  // index of refraction inside over outside
 
   bool reads_uv() const {
     for (const Slot* s : {&base_color, &roughness, &anisotropic, &metallic, &spec_trans, &spec_tint, &sheen,

@@ -2,8 +2,9 @@
 // sampled by their visible normals (Heitz and d'Eon 2014). A sampled reflection below the surface, or a
 // refraction above it, is absorbed: it would meet other microfacets, which this model leaves out.
 //
-// Seen from wo's side, whichever it is: eta is the index beyond over the index on this side. With m the
-// microfacet's normal, V = visible_over_D(wo) and q = dot(wo, m) + eta dot(wi, m) = +-|wo + eta wi|:
+// All formulas are as seen from the side that wo is on, inside or outside: eta is the index on the other side
+// over the index on wo's side. With m the microfacet's normal, V = visible_over_D(wo) and q = dot(wo, m) +
+// eta dot(wi, m) = +-|wo + eta wi|:
 //   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
 //   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
 // where 1 / eta^2, for radiance, cancels the eta^2 of the value.
@@ -24,7 +25,7 @@ struct RoughDielectric {
         transmittance(look.reflectance(m.second_slot)),
         eta(outside ? m.ior : 1 / m.ior) {}
 
-  // wo above the surface, wi on either side.
+  // Requires wo above the surface; wi may be on either side.
   BsdfEval eval(const V3& wo, const V3& wi) const {
     const bool reflected = wi.z > 0;
     V3 h = wo + wi * (reflected ? 1.f : eta);

@@ -1,4 +1,5 @@
-// eval() and sample(): the lobes of one-sided material kinds, and the dispatch to the others.
+// eval() and sample() of BsdfTable: the lobes of the one-sided material kinds, and the calls for the other
+// kinds.
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/lobes.h"
 
@@ -8,13 +9,13 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Diffuse.
+// The lobe of diffuse materials.
 BsdfEval eval_diffuse(const C3& reflectance, const V3& wi) {
   const float p = wi.z * kInvPi;
   return {reflectance * p, p};
 }
 
-// Conductors.
+// The lobes of conductors.
 struct Metal {
   C3 eta, k, tint;
   C3 reflectance(float cos) const { return fresnel_conductor(std::min(cos, 1.f), eta, k) * tint; }
@@ -26,7 +27,8 @@ BsdfEval eval_rough_metal(const Metal& metal, const Microfacets& facets, const V
   return {metal.reflectance(dot(wo, h)) * (.25f * D * G), D * facets.pdf_over_D(wo)};
 }
 
-// The weight is F G1(wi) times a ratio near 1: D, which may be huge or lose digits, cancels out.
+// Samples a rough conductor. The weight is F G1(wi) times a ratio near 1, because D, which may be huge or
+// lose digits, cancels out.
 std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microfacets& facets, const V3& wo,
                                              const V2& u) {
   const V3 h = facets.sample_normal(wo, u);
@@ -41,12 +43,13 @@ std::optional<BsdfSample> sample_rough_metal(const Metal& metal, const Microface
   return s;
 }
 
-// Plastics.
+// The lobes of plastics: a dielectric coat over a diffuse base.
 float coat_reflectance(float cos, float ior) {
   return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
 }
 
-// kSmooth: the coat is a plane boundary, by Fresnel's formulas; otherwise a rough one, by tables.
+// A plastic seen from wo. With kSmooth its coat is a plane boundary, computed by Fresnel's formulas; without,
+// a rough one, computed from tables.
 template <bool kSmooth>
 struct Plastic {
   const Material& m;
@@ -69,7 +72,8 @@ struct Plastic {
     if (kSmooth) return 1 - coat_reflectance(cos, m.ior);
     return m.energy ? m.energy->through.at(cos) : m.coat.at(cos);
   }
-  // Light that entered, scattered any number of times below the coat, and left.
+  // The value f |cos wi| of the light that entered the coat, was scattered any number of times below it, and
+  // left again.
   C3 diffuse_f_cos(const V3& wi) const {
     const float r = m.coat.internal_reflectance;
     const C3 inside = m.nonlinear ? C3(1) - diffuse * r : C3(1 - r);

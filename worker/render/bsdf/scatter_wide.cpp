@@ -1,5 +1,6 @@
-// Kinds that scatter to both sides of the surface, let light pass, or consist of other materials. The latter
-// recurse, at most scene::kMaxBsdfNesting deep (checked by build()).
+// The material kinds that scatter to both sides of the surface, let light pass, or consist of other
+// materials. For the last of these the functions call each other recursively, at most scene::kMaxBsdfNesting
+// deep (checked by build()).
 #include "worker/render/base/work_counters.h"
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/principled.h"
@@ -11,8 +12,8 @@ namespace {
 
 using Material = BsdfTable::Material;
 
-// Reflectance of a sheet, with all reflections between its two sides: R + T R T + T R^3 T + ... = 2 R / (1 +
-// R).
+// The reflectance of a thin sheet of a dielectric, with all reflections between its two sides, where R is the
+// reflectance and T the transmittance of one side: R + T R T + T R^3 T + ... = 2 R / (1 + R).
 float sheet_reflectance(float cos, float ior) {
   const double r = fresnel_dielectric(std::abs(cos), ior).reflectance;
   return static_cast<float>(2 * r / (1 + r));
@@ -26,32 +27,35 @@ V3 mapped_normal(const Material& m, const Lookup& look, const UvPoint& at) {
   if (m.specular_slot.constant) return {0, 0, 1};
   const V2 slope = look.textures.slope(m.specular_slot.texture, at.uv) * m.specular_weight;
   const V3 n = cross({at.du.x, at.du.y, slope.x}, {at.dv.x, at.dv.y, slope.y});
-  if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are degenerate here
+  if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are parallel or zero here
   return n.z < 0 ? -n : n;         // (u, v) may have either handedness
 }
-// The frame for the nested material: s as near to the surface's as the normal allows. A normal that faces
-// away from the viewer is rotated by half a turn about the surface's (Schuessler et al. 2017).
+// The frame in which the nested material is evaluated, in the surface's own frame. Its s is as near to the
+// surface's as the mapped normal allows. With flip_invalid_normals a mapped normal that faces away from the
+// viewer is rotated by half a turn about the surface's normal (Schuessler et al. 2017).
 Frame mapped_frame(const Material& m, const Lookup& look, const UvPoint& at, const V3& wo) {
   V3 n = mapped_normal(m, look, at);
   if (m.flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
   const float l2 = dot(n, n);
   return l2 > 0 && std::isfinite(l2) ? Frame::from_tangent(n * (1 / std::sqrt(l2)), V3(1, 0, 0)) : Frame();
 }
-// Shadowing factor for light from wi, by facets with the map's slope (Estevez, Lecocq, Stein 2019).
+// The shadowing factor for light from wi, by facets that have the slope of the map's normal n (Estevez,
+// Lecocq, Stein 2019).
 float mapped_shadow(const Material& m, const V3& n, const V3& wi) {
   if (!m.shadows) return 1;
   const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
   return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
 }
-// A direction must be on the same side in both frames: nothing is lit or seen through the surface.
+// True if a and b, one direction in two frames, is on the same side of the surface in both. Otherwise light
+// would pass through the surface.
 bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 
 V3 to_side(const V3& w, bool outside) { return {w.x, w.y, outside ? w.z : -w.z}; }
 
 }  // namespace
 
-// A blend seen from wo. `share`: weight of each part in the mixture; `chance`: probability of sampling it
-// (null parts are never sampled).
+// A blend of two materials seen from wo. `share` is the weight of each of them in the mixture, and `chance`
+// the probability of sampling it (a null material is never sampled).
 struct BsdfTable::Mixture {
   float share[2], chance[2];
 };
@@ -98,7 +102,7 @@ NullTransmission BsdfTable::null_transmission(BsdfIndex i, const UvPoint& uv, co
       const V3 in = frame.to_local(w);
       if (!same_side(in, w)) return {};
       NullTransmission v = null_transmission({m.front}, uv.seen_in(frame), in);
-      v.transmission *= mapped_shadow(m, frame.n, w);  // as for all that it scatters
+      v.transmission *= mapped_shadow(m, frame.n, w);  // the map shadows this light too
       return v;
     }
     default:
@@ -144,7 +148,8 @@ BsdfEval BsdfTable::eval_wide(const Material& m, const UvPoint& uv, const V3& wo
   }
 }
 
-// Samples a part's scattering; a null part scatters nothing.
+// Samples the scattering of the material `part`, of which a mask, blend or map consists; a null material
+// scatters nothing.
 std::optional<BsdfSample> BsdfTable::sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo,
                                                  float u_lobe, V2 u) const {
   if (materials_[part].kind == MaterialKind::null) return std::nullopt;
@@ -178,7 +183,7 @@ std::optional<BsdfSample> BsdfTable::sample_wide(const Material& m, const UvPoin
       const float rest = k ? u_lobe / x.chance[1] : (u_lobe - x.chance[1]) / x.chance[0];
       auto s = sample_part(k ? m.back : m.front, uv, wo, std::min(rest, 0x1.fffffep-1f), u);
       if (!s) return s;
-      // If the other part contributes nothing, the result equals this part's alone, bit for bit.
+      // If the other material contributes nothing, the result is that of this material alone, bit for bit.
       if (x.share[1 - k] == 0 && x.chance[1 - k] == 0) return s;
       if (s->delta) {
         s->weight *= x.share[k] / x.chance[k];

@@ -8,7 +8,7 @@
 
 namespace ls::render {
 
-// Gauss-Legendre: roots of P_n by Newton's method from Tricomi's estimate.
+// The nodes are the roots of the Legendre polynomial P_n, found by Newton's method from Tricomi's estimate.
 Quadrature gauss_legendre(int n) {
   Quadrature q;
   for (int i = 0; i < n; ++i) {
@@ -38,8 +38,8 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// Share of light from i = (sin, 0, cos) that a microfacet with normal m sends this way, times the masking of
-// the new direction.
+// The share of the light from i = (sin, 0, cos) that a microfacet with the normal m = (mx, my, mz) reflects
+// or refracts as `way` says, times the masking of the new direction.
 double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
                double my, double mz) {
   const double im = sin * mx + cos * mz;
@@ -71,7 +71,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
       } else {
-        // Visible normals of GGX as a cap of the sphere (Dupuy and Benyoub 2023); its two halves are equal.
+        // The visible normals of GGX are a cap of the sphere (Dupuy and Benyoub 2023); its two halves are
+        // equal, so one is enough.
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);

@@ -1,5 +1,5 @@
-// Perspective (with optional thin lens), orthographic and spherical cameras, in Mitsuba's conventions (looks
-// along +z, +x to the left of the image).
+// Perspective (with optional thin lens), orthographic and spherical cameras, in Mitsuba's conventions: the
+// camera looks along its +z axis, and its +x axis points to the left of the image.
 #pragma once
 
 #include "common/image/frame/frame.h"
@@ -17,23 +17,24 @@ struct CameraRay {
 class Camera {
  public:
   Camera() = default;
-  // `size`: the whole frame in pixels. `center` and `scale` map scene to world coordinates: p' = (p - center)
-  // * scale. `textures`, for sensors with an aperture_scale, must outlive the camera.
+  // `size` is the size of the whole frame in pixels. `center` and `scale` map scene to world coordinates: p'
+  // = (p - center) * scale. `textures` is needed only for sensors with an aperture_scale, and must then
+  // outlive the camera.
   Camera(const Sensor& sensor, FrameSize size, V3d center, double scale,
          const TextureTable* textures = nullptr);
 
-  // fx, fy: position on the whole frame in pixels, (0, 0) is its top left corner; lens in [0, 1)^2, unused by
-  // a pinhole.
+  // The ray through the position (fx, fy) of the whole frame, in pixels from its top left corner. `lens`, in
+  // [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it.
   CameraRay ray(double fx, double fy, V2 lens) const;
-  // True if all its rays have an origin and direction in the range of float32.
+  // True if the origins and directions of all rays of this camera are in the range of float32.
   bool usable() const;
-  // Distance from the camera, or its lens, to the start of a ray in direction d.
+  // The distance from the camera, or from its lens, to the point at which a ray in direction d starts.
   float near_distance(const V3& d) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 
  private:
-  // ray from o along `local`, in camera space
+  // The ray from o in the direction `local`, which is in camera space.
   CameraRay perspective_ray(const V3& o, const V3d& local) const;
   CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
   CameraRay orthographic_ray(double x, double y) const;
@@ -45,7 +46,8 @@ class Camera {
   V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
   V3 origin_;
   V3 lens_x_, lens_y_;  // axes of the lens in world units
-  // Camera-space direction (x, y, 1) of a film position: x = x0 + dx * fx, y likewise.
+  // The film position fx, fy has the camera-space direction (x, y, 1) with x = x0_ + dx_ * fx, and y
+  // likewise.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
   float aperture_ = 0, focus_ = 1;            // scene units
   float near_ = 0, far_ = 0;                  // world units

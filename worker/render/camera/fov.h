@@ -7,8 +7,8 @@
 
 namespace ls::render {
 
-// Tangent of half the horizontal field of view. fov: degrees along `axis` of a frame with this aspect (width
-// over height).
+// The tangent of half the horizontal field of view. `fov` is the field of view in degrees along `axis`;
+// `aspect` is the width of the frame over its height.
 inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
   const double t = std::tan(fov * (3.14159265358979323846 / 360));
   switch (axis) {

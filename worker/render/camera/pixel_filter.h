@@ -1,6 +1,6 @@
-// Reconstruction filters by importance sampling: each sample belongs to one pixel, its position drawn from
-// the filter, so that tiles are disjoint (Ernst, Stamminger, Greiner 2006). The scene reader rejects filters
-// with negative lobes.
+// Reconstruction filters by importance sampling. Each sample belongs to one pixel, and its position is drawn
+// from the filter around that pixel; so no sample contributes to the pixels of another tile (Ernst,
+// Stamminger, Greiner 2006). The scene reader rejects filters with negative lobes.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,8 @@ class PixelFilter {
  public:
   PixelFilter() = default;
   explicit PixelFilter(const ReconstructionFilter& filter);
-  // Offset from the pixel's centre, in pixels, for u in [0, 1).
+  // The offset of a sample from the pixel's centre along one axis, in pixels, for the random number u in [0,
+  // 1).
   double offset(float u) const;
 
  private:

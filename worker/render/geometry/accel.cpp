@@ -21,8 +21,8 @@ namespace {
 
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
 
-// Written in the 16-byte words in which Embree reads: a load that spans several smaller stores has to wait
-// for them.
+// Rays are written in the 16-byte words in which Embree reads them, because a load that spans several smaller
+// stores has to wait for them.
 using F32x4 = float __attribute__((vector_size(16)));
 using U32x4 = std::uint32_t __attribute__((vector_size(16)));
 void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
@@ -35,14 +35,16 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
   std::memcpy(&r.tfar, &rest, sizeof rest);
 }
 
-// Embree is undefined on NaN, and Debian's build stops at rays from beyond 1.8e18 (for instances:
-// kLargestInverse).
+// True if Embree can trace a ray from o. Embree's behaviour is undefined on NaN, and Debian's build of it
+// stops the program at rays from beyond 1.8e18. For rays transformed into instances, kLargestInverse ensures
+// the same.
 bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
 
-// The Embree scenes over one set of primitives. all == opaque if no primitive lets light pass.
+// The Embree scenes over one set of primitives: all of them, the opaque ones, and those that let light pass.
+// If no primitive lets light pass, `all` and `opaque` are the same scene.
 struct Scenes {
   RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
-  std::uint32_t base[2 * kKinds] = {};  // first index of each kind on each side
+  std::uint32_t base[2 * kKinds] = {};  // index of the first primitive of each kind and side
   ShapeSet<Sphere> spheres[2];
   ShapeSet<Disk> disks[2];
   ShapeSet<Cylinder> cylinders[2];
@@ -134,7 +136,7 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
   add_shapes(g.cylinders, set.cylinders, to.cylinders[side], kCylinders);
 }
 
-// Adds the set's primitives; the caller commits the scenes.
+// Adds the primitives of `set` to the Embree scenes `to`. The caller then commits these scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
   // between() traces `all`, which is this scene only if there are no boundaries.
@@ -195,13 +197,13 @@ void attach_instances(const Geometry& g, Accel::State& st) {
 PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive, std::uint32_t instance) {
   return {static_cast<PrimitiveId::Kind>(geometry % kKinds), in.base[geometry] + primitive, instance};
 }
-// Primitive of a hit in an instance; not inlined, to keep it out of the code for primitives outside of
-// groups.
+// The primitive of a hit in an instance. This function is not inlined, to keep it out of the code for
+// primitives outside of groups.
 [[gnu::noinline]] PrimitiveId instanced(const Accel::State& st, const RTCHit& hit) {
   const std::uint32_t instance = hit.instID[0] - kFirstInstance;
   return primitive_in(st.groups[st.group_of[instance]], hit.geomID - kInGroup, hit.primID, instance);
 }
-// nullopt: the ray hit nothing.
+// The primitive that `hit` names; nullopt if the ray hit nothing.
 [[gnu::always_inline]] inline std::optional<PrimitiveId> primitive_of(const Accel::State& st,
                                                                       const RTCHit& hit) {
   static_assert(RTC_INVALID_GEOMETRY_ID >= kInGroup);
@@ -305,7 +307,7 @@ std::uint64_t Accel::bytes() const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
 }
 std::string Accel::describe() {
-  // The version of the loaded library, which the headers do not know.
+  // The version is asked of the loaded library, because it may differ from that of the headers.
   const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
   const auto version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
   if (device) rtcReleaseDevice(device);

@@ -1,5 +1,5 @@
-// The interface to Embree: finds which primitive a ray meets, nothing else (Geometry::complete computes
-// distances and positions, so that no reciprocal estimate of the processor reaches the image).
+// The interface to Embree. It finds only which primitive a ray meets; Geometry::complete then computes
+// distance and position, so that no approximate reciprocal of the processor reaches the image.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace ls::render {
 
-// Primitives ordered by kind, index and instance.
+// The primitives that Accel::between() found on a line, at most kMost, ordered by kind, index and instance.
 struct CoincidentHits {
   static constexpr int kMost = 64;
   std::array<PrimitiveId, kMost> ids;
@@ -30,19 +30,21 @@ class Accel {
   // `coincident` enables between(); it costs a little at each triangle hit.
   static Result<Accel> build(const Geometry& geometry, int threads, bool coincident = false);
 
-  // The nearest primitive in (0, t_max); directions need not be of unit length.
+  // The nearest primitive that the ray o + t d meets at a t in (0, t_max). Here and below d need not be of
+  // unit length.
   std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const;
-  // The nearest boundary with full or partial null transmission in (0, t_max).
+  // The nearest primitive at a t in (0, t_max) that lets light pass straight through, all of it or a part.
   std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const;
-  // All primitives met on the straight line from a to b, at most CoincidentHits::kMost. Only in a world that
-  // was built with `coincident`.
+  // All primitives met on the straight line from a to b, at most CoincidentHits::kMost. Requires that build()
+  // was called with `coincident`.
   CoincidentHits between(const V3& a, const V3& b) const;
-  // True if an opaque primitive is met in (0, t_max).
+  // True if the ray o + t d meets an opaque primitive at a t in (0, t_max).
   bool occluded(const V3& o, const V3& d, float t_max) const;
 
   bool has_boundaries() const;
-  std::uint64_t bytes() const;  // as Embree reports them
-  // Embree's version and the instruction set that it is configured to use; part of the numeric class.
+  std::uint64_t bytes() const;  // memory of the BVH, as Embree reports it
+  // Embree's version and the instruction set that it is configured to use. The text is part of the numeric
+  // class: the digest that identifies machines that render the same bits (numeric_class() in render.h).
   static std::string describe();
 
   struct State;

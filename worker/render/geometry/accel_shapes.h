@@ -16,9 +16,10 @@
 
 namespace ls::render {
 
-// Geometry ids, the same in every scene that they are attached to: kind + side * kKinds; side 0 is opaque, 1
-// lets light pass. In the scenes of groups they are higher by kInGroup, so that a hit's id alone identifies
-// primitives outside of groups. In the world's scenes the instances follow in order from kFirstInstance on.
+// The Embree geometry ids of the primitives: kind + side * kKinds, where side 0 holds the opaque primitives
+// and side 1 those that let light pass. They are the same in every Embree scene. In the Embree scenes of
+// groups kInGroup is added, so that the id of a hit alone tells whether the primitive is in a group. In the
+// world's Embree scenes the instances follow in order from kFirstInstance on.
 enum : unsigned {
   kTriangles = 0,
   kSpheres = 1,
@@ -29,7 +30,8 @@ enum : unsigned {
   kFirstInstance = 2 * kKinds
 };
 
-// All primitives but triangles are user geometries, intersected by our own double-precision code.
+// The shapes of one kind, as Embree's callbacks get them. All primitives but triangles are user geometries,
+// which our own double-precision code intersects.
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
@@ -39,15 +41,17 @@ struct ShapeSet {
 template <class Shape>
 void bounds_callback(const RTCBoundsFunctionArguments* args) {
   const Shape& s = static_cast<const ShapeSet<Shape>*>(args->geometryUserPtr)->shapes[args->primID];
-  // Rounded outwards by more than the last digit of the coordinates.
+  // The box is enlarged by more than the last digit of its float32 coordinates, so that rounding cannot cut
+  // the shape.
   const Box b = box_of(s);
   const V3d margin = (b.hi - b.lo) * .5e-6 + V3d(1e-6);
   const V3 lo(b.lo - margin), hi(b.hi + margin);
   *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
 }
 
-// What a callback needs to know of the ray: Embree's context, and the ray in world space. In an instance
-// Embree passes the ray transformed to the group's space in float32.
+// What a callback needs to know of the ray: Embree's context, and the ray's origin o and direction d in world
+// space. Inside an instance Embree passes to the callback only the ray as transformed, in float32, to the
+// group's space.
 struct Tracing {
   RTCIntersectContext context;
   const V3 *o, *d;
@@ -64,7 +68,7 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
   const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
   const Shape& s = set.shapes[prim];
   if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
-    // The same as Geometry::complete_instanced, so that both find the same hits.
+    // This is the same computation as in Geometry::complete_instanced, so that both find the same hits.
     const auto& tracing = *reinterpret_cast<const Tracing*>(context);
     const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
     return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
@@ -74,7 +78,8 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
                    ray.tfar);
 }
 
-// A trace with a filter that accepts no hit, so that all hits along the ray are collected.
+// The state of a trace that collects all hits along the ray: its filter accepts no hit, so that Embree goes
+// on.
 struct Collecting : Tracing {
   using Tracing::Tracing;
   std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set

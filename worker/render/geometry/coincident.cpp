@@ -10,7 +10,7 @@
 namespace ls::render {
 namespace {
 
-// Limit of compared pairs of shapes or flat pieces: about half a second.
+// The largest number of pairs of shapes or flat pieces that are compared; that takes about half a second.
 constexpr std::uint64_t kMaxPairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk
@@ -18,7 +18,8 @@ struct Piece {  // a triangle, or half of the square about a disk
   double reach() const { return std::max(largest(V3(a)), std::max(largest(V3(b)), largest(V3(c)))); }
 };
 
-// True if all of q is closer to the plane of p than the offset of rays.
+// True if no corner of q is farther than `tolerance` from the plane of p. The tolerance is the offset by
+// which rays that leave these surfaces are moved.
 bool in_plane(const Piece& p, const Piece& q, double tolerance) {
   const V3d n = (p.b - p.a).cross(p.c - p.a).normalized();
   return std::abs(n.dot(q.a - p.a)) <= tolerance && std::abs(n.dot(q.b - p.a)) <= tolerance &&
@@ -33,7 +34,8 @@ bool boxes_touch(const Piece& p, const Piece& q, double tolerance) {
   return true;
 }
 
-// Tries both planes, because the larger piece's is the more accurate.
+// True if the boxes of p and q touch and one of them lies in the plane of the other. Both planes are tried,
+// because that of the larger piece is the more accurate.
 bool coincide(const Piece& p, const Piece& q) {
   const double tolerance = std::max(p.reach(), q.reach()) * 0x1p-20;
   return boxes_touch(p, q, tolerance) && (in_plane(p, q, tolerance) || in_plane(q, p, tolerance));
@@ -74,7 +76,7 @@ class Finder {
     return {d.center - d.u - d.v, d.center + d.u + d.v, d.center + (d.u - d.v) * side};
   }
 
-  // Stops when there are too many pairs to compare.
+  // Searches for coincident surfaces and marks them. It stops when there are too many pairs to compare.
   void search() {
     const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
     const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
@@ -90,7 +92,7 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // hits on instances compute their own reach
+    if (!own) return;  // hits in instances compute their reach themselves
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));
@@ -114,7 +116,7 @@ class Finder {
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
-    // Each pair of null surfaces occurs twice.
+    // Each pair of null surfaces is found twice, once from each side; it is compared only once.
     if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
       mark(n.surface, 1, n.instance == kNone);
@@ -167,7 +169,7 @@ class Finder {
     }
   }
 
-  // A mesh may contain a triangle twice: cells of one file that share a wall.
+  // Marks a mesh that contains a triangle twice, as cells of one file do that share a wall.
   void twice_in_itself(const SurfaceBox& n) {
     std::vector<std::array<double, 9>> keys;
     const Parts& mine = shapes_[n.surface];
@@ -187,7 +189,7 @@ class Finder {
   Geometry& g_;
   std::vector<Parts> shapes_;
   std::uint64_t pairs_ = 0, marks_ = 0;
-  bool spent_ = false;  // the budget of pairs is used up: everything is marked
+  bool spent_ = false;  // the allowed number of pairs is used up: all surfaces are marked as coincident
 };
 
 }  // namespace

@@ -15,8 +15,8 @@ struct Barycentric {
   double t, u, v;  // p = v0 + u (v1 - v0) + v (v2 - v0)
 };
 
-// Plain division in double, never the processor's reciprocal estimates, whose bits differ between
-// manufacturers.
+// Intersects a triangle of corner v0 and edges e1 and e2. It divides in double and never uses the processor's
+// reciprocal estimates, whose bits differ between manufacturers.
 bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, const V3d& d, Barycentric& b) {
   const V3d p = d.cross(e2);
   const double det = e1.dot(p);
@@ -31,12 +31,13 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 // The BVH decides in float32 which triangle is hit; near an edge exact arithmetic may place the point just
 // outside. And where another wall of a room begins at the edge, rounding must not put the point behind that
 // wall, where a ray would leak out: by at most sqrt(3) / 2 ulps, 2^-24, of the reach. So points keep a
-// distance of four ulps from every edge. `twice_area`: of the triangle.
+// distance of four ulps of the reach from every edge. `twice_area` is twice the area of the triangle.
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;
-  // `margin` times the length of an edge is the margin in barycentric units: its share of the height over
-  // that edge.
+  // The distance to keep from an edge, in barycentric units, is its share of the triangle's height over that
+  // edge: four ulps of the reach (2^-22 reach) times the length of the edge over twice the area. `margin` is
+  // that without the length.
   const double margin = 0x1p-22 * reach / twice_area;
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);
@@ -46,7 +47,8 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
   b.v = lv + v * k;
 }
 
-// o and d are in the triangle's space: the world in single precision, a group's space in double.
+// Completes the hit on triangle i. o and d are in the triangle's space: that of the world in single precision
+// (V = V3), or that of a group in double (V = V3d).
 template <class V>
 [[gnu::always_inline]] inline bool complete_triangle(const Geometry& g, std::uint32_t i, const V& o,
                                                      const V& d, SurfaceHit& hit) {
@@ -94,7 +96,7 @@ template <class V>
   return true;
 }
 
-// A unit direction from the centre in the sphere's own axes: z through the poles.
+// The unit direction n from the sphere's centre in the sphere's own axes, whose z goes through the poles.
 V3d local_direction(const Sphere& s, const V3d& n) {
   const auto* r = s.to_local;
   return {r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
@@ -129,12 +131,12 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d
   const auto* r = s.to_local;
   const V3d q = local_direction(s, n);
   hit.uv = uv_of(q);
-  // Tangent along increasing azimuth about the local z axis.
+  // The tangent points along increasing azimuth about the sphere's own z axis.
   const V3d dpdu(-q.y * r[0] + q.x * r[3], -q.y * r[1] + q.x * r[4], -q.y * r[2] + q.x * r[5]);
   hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
   if (info.wants_slopes) {
     const double sine = std::hypot(q.x, q.y), c = sine > 0 ? q.x / sine : 1, d = sine > 0 ? q.y / sine : 0;
-    const V3d along(q.z * c, q.z * d, -sine);  // derivative by the polar angle, in the sphere's axes
+    const V3d along(q.z * c, q.z * d, -sine);  // dp/dtheta, theta the polar angle, in the sphere's axes
     const V3d dpdv(along.x * r[0] + along.y * r[3] + along.z * r[6],
                    along.x * r[1] + along.y * r[4] + along.z * r[7],
                    along.x * r[2] + along.y * r[5] + along.z * r[8]);
@@ -205,7 +207,7 @@ V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)
 
 namespace {
 
-// A triangle outside of groups, as most hits are: one test.
+// True for a triangle outside of groups, as most hits are. It takes one test.
 bool is_usual(const PrimitiveId& id) {
   static_assert(PrimitiveId::Kind::triangle == PrimitiveId::Kind{0} && kNone == ~0u);
   const auto kind = static_cast<std::uint32_t>(id.kind);
@@ -243,10 +245,11 @@ bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, Surfac
 
 namespace {
 
-// Reach of a hit in an instance. The BVH transforms the ray to the group's space in single precision: each
-// component of its origin there is a sum of four products, accurate to four ulps of the largest such sum.
-// Across the surface, in the world, the error is weighted by the mapped normal's components; the reach in the
-// group's space is transformed to the world likewise.
+// The reach of a hit p, with normal ng, in the instance i, where `local` is its reach in the group's space.
+// The BVH transforms the ray to the group's space in single precision: each component of its origin there is
+// a sum of four products, accurate to four ulps of the largest such sum. Across the surface, in the world,
+// the error is weighted by the mapped normal's components; the reach in the group's space is transformed to
+// the world likewise.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
   const auto& b = i.to_local.a;
@@ -287,7 +290,8 @@ bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, Surf
 }
 
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max) {
-  // Relative to the point nearest to the centre: no cancellation for distant or grazing rays.
+  // Distances are computed relative to the point of the ray nearest to the centre, so that no digits cancel
+  // for distant or grazing rays.
   const V3d f = o - s.center;
   const double a = d.dot(d), b = -f.dot(d), outside = f.dot(f) - s.radius * s.radius;
   if (b < 0 && outside > 0) return kInf;  // the sphere is behind the ray
@@ -313,14 +317,14 @@ double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double
   return a * a + b * b <= 1 ? t : kInf;
 }
 
-// In the plane perpendicular to the axis, relative to the nearest point to it, as for spheres. Both
-// intersections are tried, because the tube has no caps.
+// Computed in the plane perpendicular to the axis, relative to the ray's point nearest to the axis, as for
+// spheres. Both intersections are tried, because the tube has no caps.
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max) {
   const V3d f = o - s.p0;
   const double dx = d.dot(s.u), dy = d.dot(s.v), dz = d.dot(s.axis);
   const double fx = f.dot(s.u), fy = f.dot(s.v), fz = f.dot(s.axis);
   const double a = dx * dx + dy * dy;
-  if (!(a > 0)) return kInf;  // parallel to the axis
+  if (!(a > 0)) return kInf;  // the ray is parallel to the axis
   const double b = -(fx * dx + fy * dy), nx = fx + dx * (b / a), ny = fy + dy * (b / a);
   const double disc = s.radius * s.radius - (nx * nx + ny * ny);
   if (!(disc >= 0)) return kInf;

@@ -1,7 +1,8 @@
 // The shapes of a world: triangles, spheres, disks and cylinders in world space (recentred, scaled by a power
 // of two to unit size), and ray hits on them. Normals point as the dialect defines, flips included;
-// `interior` is the side they point away from. The shapes of a group lie in the group's own space, also
-// scaled to unit size; its instances map that to the world.
+// `interior` is the side they point away from. A group is a set of shapes that is placed in the world by
+// instances. Its shapes lie in the group's own space, also scaled to unit size; each instance maps that space
+// to the world.
 #pragma once
 
 #include <cstdint>
@@ -29,24 +30,29 @@ struct SurfaceInfo {  // one per scene shape
   bool borders = false;                              // `transition`, or coincides with a surface that has one
   bool plain = false;                                // neither emits nor lets light pass, as most surfaces
   bool crossed = false;                              // some light reaches its other side
-  bool sheet = false;              // not closed: has an edge, or bounds a body together with others
+  // A sheet is a surface that is not closed: it has an edge, or it bounds a body only together with other
+  // surfaces.
+  bool sheet = false;
   bool null = false;               // index-matched: rays pass straight through
   bool null_transmission = false;  // part of the light passes straight through (BsdfTable::null_transmission)
   bool normals = false, uvs = false;  // triangles: per-vertex data
-  // True if something on it reads uv, or a direction along it (anisotropy). Otherwise hits have uv = (0, 0)
-  // and an arbitrary frame.
+  // wants_uv: the material or the light of the surface, or an AOV, reads uv; if not, hits have uv = (0, 0).
+  // wants_tangent: the material depends on a direction along the surface (anisotropy); if not, hits have an
+  // arbitrary shading frame.
   bool wants_uv = true, wants_tangent = true;
   bool wants_slopes = false;      // hits have dp/du and dp/dv (bump maps); implies wants_tangent
   bool wants_attributes = false;  // hits have a FacePoint (mesh_attribute textures)
   bool smooth = true;             // the material has a lobe that is not a delta: use next-event estimation
   float orientation = 1;          // -1: normals are flipped against winding or outward direction
-  // For surfaces that coincide with others somewhere, one of them null: the largest reach of all of these
-  // (see SurfaceHit::reach), so that a ray steps over all of them at once. 0: none coincides.
+  // For a surface that coincides somewhere with others, one of them null: the largest reach (see
+  // SurfaceHit::reach) of any of these surfaces, so that one step takes a ray over all of them. 0 if the
+  // surface coincides with no other.
   float coincident_reach = 0;
-  // Reach of hits on a triangle, if the reaches of all triangles are within a factor of 16; 0: each has its
-  // own. For other shapes the smallest reach.
+  // For triangles: the reach (see SurfaceHit::reach) of every hit, if the reaches of all triangles of the
+  // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: the smallest reach
+  // of a hit.
   float reach = 0;
-  double edge = 0;  // hits whose barycentric coordinates all exceed this are clear of all edges
+  double edge = 0;  // if all barycentric coordinates of a hit exceed this, it is clear of all edges
 };
 
 struct Sphere {
@@ -65,8 +71,8 @@ struct Cylinder {      // points p0 + z length + (u cos a + v sin a) radius, z i
   std::uint32_t surface = 0;
 };
 
-// Index range of the primitives of one kind in one set: [first, passing) are opaque, [passing, last) let
-// light pass.
+// The index range of the primitives of one kind in one PrimitiveSet. Those in [first, passing) are opaque;
+// those in [passing, last) let light pass straight through.
 struct PrimitiveRange {
   std::uint32_t first = 0, passing = 0, last = 0;
   std::uint32_t count() const { return last - first; }
@@ -88,7 +94,7 @@ struct PrimitiveSet {
 };
 struct PlacedInstance {
   std::uint32_t group = 0;
-  float mirrored = 1;         // -1: the map reverses orientations
+  float mirrored = 1;         // -1 if the map reverses orientations, else 1
   Affine to_world, to_local;  // between the world's space and the group's
 };
 
@@ -109,13 +115,13 @@ struct SurfaceHit {
   V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
   std::uint32_t surface = 0;
   PrimitiveId primitive;
-  // The largest coordinate used in computing the hit: p, and the distances that the BVH finds across the
-  // surface, are accurate to a few ulps of it (see offset_point).
+  // The largest coordinate that was used to compute the hit. The position p, and the distances that the BVH
+  // finds, measured perpendicular to the surface, are accurate to a few ulps of `reach` (see offset_point).
   float reach = 1;
   FacePoint face;  // set if SurfaceInfo::wants_attributes
 
   UvPoint uv_point() const { return {uv, du, dv, &face}; }
-  // Sets du and dv from dp/du and dp/dv in the world; `scale` is the geometry's.
+  // Sets du and dv from the derivatives dp/du and dp/dv in world space; `scale` is Geometry::scale.
   void set_slopes(const V3& dpdu, const V3& dpdv, double scale) {
     const auto k = static_cast<float>(1 / scale);
     du = shading.to_local(dpdu) * k;
@@ -128,8 +134,9 @@ class Geometry {
   // Reads the scene's shapes. Fails on files and transforms from which no surface can be made.
   static Result<Geometry> build(const Scene& scene, const AssetLoader& files);
 
-  // Primitives are sorted: the world's own before those of the groups, in the groups' order; within each set
-  // opaque ones before those that let light pass.
+  // In each of the lists below the primitives are sorted. Those of the world itself come first, then those of
+  // each group, in the order of the groups. Within each of these sets the opaque primitives come before those
+  // that let light pass straight through.
   std::vector<V3> positions;
   std::vector<V3> normals;             // parallel to positions if any surface has normals, else empty
   std::vector<V2> uvs;                 // parallel to positions if any surface has uvs, else empty
@@ -156,10 +163,10 @@ class Geometry {
   std::uint64_t bytes() const;
 
   V3 vertex(std::uint32_t triangle, int k) const { return positions[indices[3 * triangle + k]]; }
-  // Completes a hit on this primitive: t, position, normals, uv, from exact data and plain arithmetic. False
-  // if the ray does not meet it after all.
+  // Computes the hit of the ray o + t d on the primitive `id` (t, position, normals, uv) from the shape's own
+  // data in plain arithmetic. Returns false if by this computation the ray misses the primitive.
   bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
-  // The largest coordinate of the triangle's corners.
+  // The largest absolute coordinate of the triangle's corners.
   float reach_of(std::uint32_t triangle) const;
 
  private:
@@ -168,30 +175,33 @@ class Geometry {
   bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
 };
 
-// Distance along the ray to the shape within (t_min, t_max), or infinity. Also used by the BVH callbacks.
+// The first t in (t_min, t_max) at which the ray o + t d meets the shape, or infinity. The BVH callbacks use
+// it too.
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max);
 
-// uv from the azimuth and polar angle, each normalised to its range, of a unit direction from the sphere's
-// centre.
+// The uv of the point that lies in the direction n, a unit vector, from the sphere's centre. u is the azimuth
+// and v the polar angle, each divided by its range.
 V2 sphere_uv(const Sphere& s, const V3d& n);
 
 inline float largest(const V3& v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
 
-// Moves a point off the surface to the side of `w`, by 16 ulps of the reach. Rounding takes p at most one ulp
-// off the surface (sqrt(3) / 2). The BVH takes a triangle's corners relative to the ray's origin and finds
-// the distance of its plane by products of these: each component is accurate to half an ulp of the difference
-// of two coordinates, at most twice the reach, and so are the six rounded products and sums: together below 8
-// ulps. That leaves a safety factor of two.
+// Moves the point p on a surface of geometric normal ng off the surface, to the side that `w` points to, by
+// 16 ulps of the reach. Rounding takes p at most one ulp off the surface (sqrt(3) / 2). The BVH takes a
+// triangle's corners relative to the ray's origin and finds the distance of its plane by products of these:
+// each component is accurate to half an ulp of the difference of two coordinates, at most twice the reach,
+// and so are the six rounded products and sums: together below 8 ulps. So 16 ulps leave a safety factor of
+// two.
 inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
   return p + ng * std::copysign(reach * 0x1p-20f, dot(ng, w));
 }
 inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
   return offset_point(hit.p, hit.ng, hit.reach, w);
 }
-// Reach for shapes intersected in double precision, where p lies up to `size` from the shape's reference
-// point: p is rounded to float32, and 2^-28 turns 16 ulps of float32 into 16 ulps of double, times 2.
+// The reach of a hit p on a shape that is intersected in double precision; `size` is the largest distance of
+// p from the shape's reference point. p itself is rounded to float32, so the largest coordinate of p counts
+// in full. `size` counts 2^-28 times, which turns 16 ulps of float32 into 16 ulps of double, times 2.
 inline float reach_in_double(const V3& p, double size) {
   return std::max(largest(p), static_cast<float>(size * 0x1p-28));
 }

@@ -14,8 +14,8 @@
 namespace ls::render {
 namespace {
 
-// +1 or -1: relates the winding normal of a mesh, or the outward normal of a sphere, to the dialect's normal
-// (checked against Mitsuba 3.9.1, where a mirrored sphere is inside out).
+// The sign, +1 or -1, that relates the winding normal of a mesh, or the outward normal of a sphere, to the
+// dialect's normal (checked against Mitsuba 3.9.1, where a mirrored sphere is inside out).
 float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
   // A rectangle's normal is its transformed +z, and a mesh with normals follows them; mirroring reverses the
@@ -28,16 +28,16 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
 }
 
 // True if the normals of a mirrored body point inwards, as some do in Mitsuba. Its medium stays inside:
-// mirroring a glass of water should not fill the room.
+// mirroring a glass of water should not fill the room around it with water.
 bool mirrored_inwards(const Shape& shape, float orientation) {
   if (!(Affine(shape.to_world).determinant() < 0)) return false;
   if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;
   const bool mesh =
       std::holds_alternative<CubeShape>(shape.geometry) || std::holds_alternative<MeshShape>(shape.geometry);
-  return mesh && orientation > 0;  // relative to the winding, which mirroring reverses
+  return mesh && orientation > 0;  // the orientation is relative to the winding, which mirroring reverses
 }
 
-// Maps a box to unit size about a centre; the scale is a power of two.
+// A space: p' = (p - center) * scale maps a box to unit size about a centre. The scale is a power of two.
 struct Space {
   V3d center{0, 0, 0};
   double scale = 1;
@@ -58,7 +58,9 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
-// Float32 leaves few bits for the shape of a mesh that lies far from the origin.
+// The share of the resolution of float32 that is left for the shape of a mesh with the bounds b if
+// coordinates are relative to `origin`: 1 near the origin, and 2^-n if the mesh is so far away that n of the
+// 24 bits only tell where it lies.
 double bits_left(const Bounds& b, const V3d& origin) {
   const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
   const double size = std::max(half.x, std::max(half.y, half.z)),
@@ -66,9 +68,9 @@ double bits_left(const Bounds& b, const V3d& origin) {
   return size / std::max(size, far);
 }
 
-// The space about the middle of all shapes' box; but if that leaves some mesh less than 8 of 24 bits (a small
-// scene lit by a sphere of radius 1e5 at 1e7), about the mesh with the fewest bits, if that is better for all
-// meshes.
+// The space of the world. Its centre is the middle of the box of all shapes. If that leaves some mesh less
+// than 8 of 24 bits (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre is that of the
+// mesh with the fewest bits, provided that every mesh then has more bits than that one had.
 Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
@@ -81,12 +83,13 @@ Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   if (m == meshes.end() || !(bits_left(*m, s.center) < kFewBits)) return s;
   const V3d there = (m->lo + m->hi) * .5;
   if (!(bits_left(*worst(there), there) > bits_left(*m, s.center))) return s;
-  Bounds wide = all;  // enlarged to be symmetric about the new middle
+  Bounds wide = all;  // enlarged to be symmetric about `there`, the new centre
   for (const V3d& corner : {all.lo, all.hi}) wide.add(there * 2 - corner);
   return unit_space(wide);
 }
 
-// The area-weighted normals of a closed mesh add up to zero.
+// True if the mesh is a sheet, that is, not closed: the area-weighted normals of a closed mesh add up to
+// zero.
 bool is_sheet(const LocalMesh& mesh) {
   V3d sum(0);
   double area = 0;
@@ -153,7 +156,8 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     add_channel(g.attributes, a, surface, a.name.starts_with("face_") ? first_triangle : base, kept);
 }
 
-// Precomputes for the triangles from `first` on what completing a hit would otherwise compute each time.
+// Precomputes SurfaceInfo::reach and edge for the triangles from `first` on, which completing a hit would
+// otherwise compute each time.
 void note_reach(const Geometry& g, std::uint32_t first, SurfaceInfo& info) {
   float least = std::numeric_limits<float>::infinity(), most = 0;
   for (std::uint32_t i = first; i < g.triangle_count(); ++i) {
@@ -227,7 +231,7 @@ struct Parts {
   std::vector<Bounds> meshes;  // of the world's own triangle meshes
 };
 
-// Vertices have 32-bit indices, in the BVH too.
+// The largest number of vertices: their indices have 32 bits, in the BVH too.
 constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
 
 Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
@@ -265,7 +269,7 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   return parts;
 }
 
-// Appends the shapes of one space, opaque ones first. `shapes`: their indices, in order.
+// Appends to g the shapes of one space, opaque ones first. `shapes` holds their indices in order.
 PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, const Parts& parts,
                         const Space& space) {
   PrimitiveSet set;
@@ -296,7 +300,8 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The BVH inverts the map itself, in float32, and limits the distance of ray origins (accel.cpp).
+  // The BVH inverts the map itself, in float32, and cannot trace rays from too far away (near_enough() in
+  // accel.cpp). So the inverse must not be too large.
   constexpr double kLargestInverse = 5e8;
   const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||

@@ -1,4 +1,4 @@
-// Bounding boxes of shapes other than triangles, exact up to rounding in double.
+// Computes the bounding boxes of spheres, disks and cylinders, exact up to rounding in double.
 #pragma once
 
 #include <algorithm>

@@ -19,7 +19,8 @@ LocalMesh rectangle() {
   return m;
 }
 
-// Six faces; each has the unit square as its uv, u along a and v along a x n (as in Mitsuba 3.9.1's cube).
+// The cube's mesh of six faces. The uv of each face fill the unit square, with u along a and v along a x n,
+// where n is its normal (as in Mitsuba 3.9.1's cube).
 LocalMesh cube() {
   struct Face {
     V3d n, a;
@@ -69,7 +70,8 @@ Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
 }
 
 Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
-  // Uniform scaling: the columns are orthogonal and equally long, up to the rounding of composed transforms.
+  // The map scales uniformly if its columns are orthogonal and equally long, up to the rounding of composed
+  // transforms.
   const V3d x = m.vector({1, 0, 0}), y = m.vector({0, 1, 0}), z = m.vector({0, 0, 1});
   const double l = x.length(), tolerance = 1e-5 * l;
   if (std::abs(y.length() - l) > tolerance || std::abs(z.length() - l) > tolerance ||
@@ -86,8 +88,8 @@ Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
   return r;
 }
 
-// The start of the angle follows from the direction as written in the scene (Mitsuba: the frame of Duff et
-// al. 2017).
+// Places a cylinder. Where its azimuth starts follows from the direction of its axis as written in the scene,
+// by the frame of Duff et al. 2017, as in Mitsuba.
 Result<Cylinder> place_cylinder(const CylinderShape& s, const Affine& m) {
   const V3d p0(s.p0[0], s.p0[1], s.p0[2]), d = V3d(s.p1[0], s.p1[1], s.p1[2]) - p0, n = d.normalized();
   const double sign = std::copysign(1., n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
@@ -117,8 +119,8 @@ void transform(LocalMesh& m, const Affine& to_scene) {
   }
 }
 
-// If a file has no normals, the dialect computes smooth ones: each vertex's triangles weighted by their angle
-// there (Thuermer and Wuethrich 1998).
+// If a file has no normals, the dialect computes smooth ones: at each vertex the normalised sum of the
+// normals of its triangles, weighted by their angles there (Thuermer and Wuethrich 1998).
 void smooth(LocalMesh& m) {
   m.normals.assign(m.positions.size(), V3d(0));
   for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
@@ -203,7 +205,7 @@ void add_bounds(const Placed& p, Bounds& b) {
   if (p.cylinder) {
     const Cylinder& c = *p.cylinder;
     for (int k = 0; k < 3; ++k) {
-      // half extent of the circle along this axis of the world
+      // `r` is the half extent of the cylinder's circle along axis k.
       const double r = c.radius * std::sqrt(c.u[k] * c.u[k] + c.v[k] * c.v[k]),
                    end = c.p0[k] + c.axis[k] * c.length;
       b.lo[k] = std::min(b.lo[k], std::min(c.p0[k], end) - r);

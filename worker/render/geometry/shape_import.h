@@ -1,4 +1,4 @@
-// Scene shapes as primitives in scene space, in double, before Geometry recentres and rounds them.
+// Reads the scene's shapes as primitives in scene space, in double. Geometry later recentres and rounds them.
 #pragma once
 
 #include <limits>

@@ -25,7 +25,7 @@ struct Grown : Box {
   bool empty() const { return !(lo.x <= hi.x); }
 };
 
-// Boxes in the space of each surface's primitives.
+// The box of each wanted surface, in the space of its primitives: the world's or that of its group.
 std::vector<Grown> own_boxes(const Geometry& g, const std::vector<bool>& wanted) {
   std::vector<Grown> boxes(g.surfaces.size());
   for (std::uint32_t i = 0; i < g.triangle_count(); ++i) {
@@ -45,7 +45,7 @@ Grown moved(const Grown& b, const Affine& m) {
   return r;
 }
 
-// The group of each surface, or kNone.
+// The group that each surface belongs to, or kNone.
 std::vector<std::uint32_t> groups_of(const Geometry& g) {
   std::vector<std::uint32_t> group(g.surfaces.size(), kNone);
   for (std::uint32_t i = 0; i < g.groups.size(); ++i) {

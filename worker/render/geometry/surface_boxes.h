@@ -1,4 +1,5 @@
-// Bounding boxes of a world's surfaces, one per instance.
+// Computes the bounding boxes of a world's surfaces: one for each surface, or one for each of its instances
+// if it is in a group.
 #pragma once
 
 #include <functional>
@@ -22,8 +23,8 @@ struct SurfaceBox {
   }
 };
 
-// Boxes, in the world, of the wanted surfaces that have any primitives. nullopt if instances make the list
-// too long to be useful.
+// The bounding boxes, in the world, of the surfaces for which `wanted` is true and that have any primitives.
+// Returns nullopt if instances make the list too long to be useful.
 std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
                                                      const std::function<bool(const SurfaceInfo&)>& wanted);
 

@@ -1,4 +1,5 @@
-// Transfers mesh attributes from files to the textures that read them.
+// Checks mesh attributes (values at vertices or faces) from files and stores them for the textures that read
+// them.
 #pragma once
 
 #include <string>
@@ -14,15 +15,17 @@ namespace ls::render {
 
 std::vector<std::string> attribute_names(const Scene& scene, const std::vector<scene::AttributeUse>& uses);
 
-// Checks that the mesh in this file has the attributes that are read, in the expected size and range.
-// invalid_argument names the file and the attribute, and says what to do.
+// Checks that `mesh`, read from `file`, has the attributes that the textures in `uses` read, in the expected
+// size and range. If not, fails with invalid_argument; the message names the file and the attribute and says
+// what to do.
 Result<void> check_attributes(const MeshData& mesh, std::string_view file, const Scene& scene,
                               const std::vector<scene::AttributeUse>& uses);
 
-// Empty storage for the attributes that the scene's textures name.
+// Storage, still empty, for the attributes that the scene's textures name.
 SurfaceAttributes attributes_of(const Scene& scene);
-// Adds the values of one mesh attribute for this surface. For face attributes `kept` lists the triangles that
-// were kept.
+// Adds to `all` the values of one attribute of the mesh of `surface`. `base` is the index of the mesh's first
+// vertex (for an attribute of faces: first triangle) in the world's lists. `kept` is used for attributes of
+// faces: it lists the triangles that were kept when those of zero area were dropped.
 void add_channel(SurfaceAttributes& all, const MeshAttribute& attribute, std::uint32_t surface,
                  std::uint32_t base, const std::vector<std::uint32_t>& kept);
 

@@ -37,8 +37,8 @@ V2 uv_of_sphere(const Geometry& g, const SurfaceHit& hit) {
   return sphere_uv(s, (p - s.center).normalized());
 }
 
-// Directional albedo of a surface, estimated from one sampled direction: without the brightening by
-// refraction, and without the light that passed straight through.
+// The directional albedo of a surface, estimated from one sampled direction. It leaves out the brightening by
+// refraction and the light that passes straight through.
 C3 albedo_of(const World& w, const FirstSurface& first, const SampleStream& stream, const V3& d) {
   const SurfaceHit& hit = first.hit;
   const Group g = stream.group(0, Purpose::albedo);
@@ -87,7 +87,8 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (first) add_surface(*first, stream, ray);
 }
 
-// A component can be as large as the whole radiance, which is usable; one that is not finite counts as 0.
+// Adds the light components of a sample whose radiance is usable. A component can be as large as the whole
+// radiance; one that is not finite counts as 0.
 void AovPixel::add_light() {
   const auto part = [&](LightPart p) {
     const C3& c = split_[static_cast<std::size_t>(p)];

@@ -1,4 +1,5 @@
-// Accumulates the AOVs of a pixel while its samples are rendered. Definitions: docs/reference/aovs.md.
+// Accumulates the AOVs (auxiliary images, such as depth or albedo) of a pixel while its samples are rendered.
+// docs/reference/aovs.md defines them.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace ls::render {
 
-// uv of a hit, even if the surface's material does not use it.
+// The uv of a hit, computed even if the surface's material does not use it.
 V2 uv_of(const Geometry& geometry, const SurfaceHit& hit);
 
 class AovPixel {
@@ -23,9 +24,11 @@ class AovPixel {
   LightSplit* split() { return &split_; }  // of the current sample
   void begin_pixel();
   void begin_sample() { split_.fill(C3(0)); }  // C3{} is not initialised
-  // Call after rendering the sample at the image's pixel (x, y). `usable`: its radiance counts.
+  // To be called after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true
+  // if the radiance of the sample counts.
   void end_sample(int x, int y, std::uint64_t sample, bool usable);
-  // Writes index i of the planes of planes_of(world.aovs), `pixels` floats each.
+  // Writes the pixel's values to index i of each plane in `planes`: those of planes_of(world.aovs), one after
+  // another, of `pixels` floats each.
   void store(float* planes, std::size_t pixels, std::size_t i) const;
 
  private:

@@ -1,7 +1,8 @@
-// Equi-angular distance sampling along a segment about a pivot (Kulla and Fajardo 2012): density proportional
-// to 1 / distance^2 to the pivot. Positions are offsets x from the foot of the perpendicular, in [a, b]. The
-// textbook difference of arctangents cancels when both ends are far from the foot on one side; the forms used
-// here do not (pdf accurate to 4e-7 in float32).
+// Equi-angular distance sampling along a segment about a pivot (Kulla and Fajardo 2012): the density is
+// proportional to 1 / distance^2, where distance is that to the pivot. Positions are offsets x in [a, b],
+// along the segment, from the foot of the perpendicular that is dropped from the pivot. The textbook
+// difference of arctangents cancels when both ends are far from the foot on one side; the forms used here do
+// not (pdf accurate to 4e-7 in float32).
 #pragma once
 
 #include <algorithm>
@@ -12,12 +13,12 @@
 
 namespace ls::render {
 
-// Ratios of densities are clamped to this, so that no product with them is 0 times infinity.
+// The largest ratio of densities: ratios are clamped to it, so that no product with one is 0 times infinity.
 inline constexpr float kMaxRatio = 1e30f;
 
 class EquiAngular {
  public:
-  // The segment o + t d, t in [0, length]; d of unit length, length finite and positive.
+  // Prepares the segment o + t d, t in [0, length]. d must be of unit length, and length finite and positive.
   EquiAngular(const V3& o, const V3& d, float length, const V3& pivot) : d_(d) {
     LS_COUNT(equiangular);
     const float along = dot(pivot - o, d);

@@ -1,4 +1,5 @@
-// Splits the radiance of a sample by the path that the light took: the components of the light AOVs.
+// The components into which the radiance of a sample is split by the path that the light took. The light AOVs
+// (auxiliary images) are sums of them.
 #pragma once
 
 #include <array>
@@ -8,7 +9,8 @@
 
 namespace ls::render {
 
-// Classified by the path's first scattering, counted from the camera, and whether it is the only one.
+// A component is defined by the first scattering of the path, counted from the camera, and by whether that is
+// the only one.
 enum class LightPart : std::uint8_t {
   unscattered,    // directly visible: lights, environment, medium emission
   surface_once,   // one scattering, at a surface

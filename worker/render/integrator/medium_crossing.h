@@ -95,7 +95,8 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   return scatter_by_phase(*met);
 }
 
-// Next-event estimation at a vertex, weighted against sampling the phase function only.
+// Next-event estimation at a vertex p in a medium, where d is the direction of travel before the scattering.
+// It is weighted only against sampling of the phase function, not against equi-angular sampling.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const V3& d) {
   const Lights& lights = world_.lights;
@@ -111,9 +112,9 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
   if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
 }
 
-// Emission of each medium up to the point where a flight through the other media ends: the probability of
-// reaching a point is the transmittance of the others. A channel with a different extinction gets its own
-// flight, with the same random numbers.
+// For each medium, adds its emission up to the point where a flight through the other media ends: the
+// probability that the flight reaches a point is the transmittance of the others up to there. A channel with
+// a different extinction gets its own flight, with the same random numbers.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
   if (depth_ == 0 && world_.hide_emitters) return;
@@ -153,8 +154,9 @@ float PathTracer<F, Light>::others_end(std::size_t but, int hero, float t_max, R
   return t_max;
 }
 
-// Adds the emission of the whole segment ahead towards the path, wherever its flight will end; light found at
-// the end of the flight is added to it. Like a light that is hit, it counts at the path's current depth.
+// Adds the medium's emission along the whole segment ahead, of length t_max, wherever the path's flight will
+// end; light found at the end of the flight comes in addition. Like a light that is hit, the emission counts
+// at the path's current depth.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max) {
   if (medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)) return;
@@ -175,8 +177,9 @@ auto PathTracer<F, Light>::start_medium() const -> Within {
   return in;
 }
 
-// The media on the side that w points to, for a path that travels along `from` and is in `in`. Coincident
-// null surfaces are crossed together with this one; only scenes with F.overlaps have any.
+// The media on the side of the surface that w points to, for a path that arrives along `from` through the
+// media `in`. Null surfaces that coincide with this one are crossed together with it; only scenes with
+// F.overlaps have any.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
                                   const V3& from, Within in) const -> Within {
@@ -200,8 +203,9 @@ void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool throug
   if (s.transition) in.only(outside ? s.exterior : s.interior);
 }
 
-// The primitives between the two sides of a surface: from in front of everything that may coincide with it,
-// but not from behind the ray's origin, to where the ray continues.
+// The primitives other than the hit one that coincide with it, for a ray that arrives along `from` and
+// continues along w. They are searched on a short line: it begins in front of everything that may coincide
+// with the surface, but not behind the ray's origin, and ends where the ray continues.
 template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
@@ -212,8 +216,9 @@ CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& 
   return all;
 }
 
-// Leaves all bodies before entering any, so that a path is never inside more bodies than exist: cells of one
-// mesh that share a wall are one body.
+// The media after crossing the hit surface and all null surfaces that coincide with it. All bodies are left
+// before any is entered, so that a path is never inside more bodies than exist: cells of one mesh that share
+// a wall are one body.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
     -> Within {
@@ -232,9 +237,10 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
   return in;
 }
 
-// Of coincident surfaces, replaces a null one by the one that scatters light, whichever the ray from o along
-// d found first: otherwise fog on a floor would let light through the floor, and a pane on a boundary would
-// not attenuate it. Shadow rays end at t_max, in front of the surface that their light is on.
+// If `hit` is on a null surface that coincides with one that scatters light, replaces it by the hit on the
+// latter, whichever of them the ray from o along d found first. Otherwise fog on a floor would let light
+// through the floor, and a pane of glass on a null boundary would not attenuate the light. Shadow rays end at
+// t_max, in front of the surface that their light is on.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
@@ -251,8 +257,8 @@ void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const 
   }
 }
 
-// Adds the emission of null surfaces that coincide with this hit, whichever of them the ray found: next-event
-// estimation, against which this light is weighted, finds them too.
+// Adds the emission of all null surfaces that coincide with the hit one, whichever of them the ray found.
+// Next-event estimation, against which this light is weighted, finds all of them too.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
   const CoincidentHits others = others_at(hit, ray_.d, ray_.d);

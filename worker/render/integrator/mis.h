@@ -7,7 +7,7 @@
 
 namespace ls::render {
 
-// Weight of the strategy with density `own`.
+// The weight, by the balance heuristic, of the strategy with density `own` against one with density `other`.
 inline float balance_weight(float own, float other) { return own / (own + other); }
 
 inline float mis_weight(MisHeuristic heuristic, float own, float other) {

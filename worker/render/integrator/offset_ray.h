@@ -15,12 +15,12 @@ namespace ls::render {
 struct OffsetRay {
   V3 start{0, 0, 0}, origin{0, 0, 0}, d{0, 0, 1};
 
-  // How far `origin` is ahead of `start` along the ray; negative: it was moved backwards.
+  // How far `origin` is ahead of `start` along the ray. Negative if `origin` was moved backwards.
   float lead() const { return dot(origin - start, d); }
 
-  // From `start` to the surface that the ray from `origin` met. If `origin` is farther from it than `start`
-  // (a vertex in a medium that was moved away from this very surface), the length is measured to the
-  // surface's plane.
+  // The length from `start` to the surface that the ray from `origin` met. If `origin` is farther from that
+  // surface than `start` (because a vertex in a medium was moved away from this very surface), the length is
+  // measured to the surface's plane.
   float length_to(const SurfaceHit& hit) const {
     const float ahead = lead();
     if (ahead < 0) [[unlikely]]
@@ -28,8 +28,9 @@ struct OffsetRay {
     return hit.t + ahead;
   }
 
-  // `p`, the point at t of the segment, moved as far off the surfaces at both ends of the segment as rays
-  // that leave them: rounding must not put it on the other side.
+  // The point p, which lies at distance t on the segment s, moved off the surfaces at both ends of the
+  // segment. It is kept as far from them as the origin of a ray that leaves them, so that rounding cannot put
+  // it on their other side.
   V3 moved_off_ends(V3 p, Segment s, float t) const {
     const V3 from_end = s.end ? missing_offset(offset_point(*s.end, -d) - s.end->p, p - s.end->p) : V3(0);
     if (s.lead > 0) p += missing_offset(origin - start, d * t);
@@ -39,13 +40,13 @@ struct OffsetRay {
     return p;
   }
 
-  // Continues from the vertex at t of the segment, in the direction it had.
+  // Moves the ray's start to the vertex at distance t on the segment s; the direction stays the same.
   void advance_to(Segment s, float t) {
     const V3 p = start + d * t;
     origin = moved_off_ends(p, s, t);
     start = p;
   }
-  // Leaves a surface in the direction w.
+  // Makes this the ray that leaves the surface at `hit` in the direction w.
   void leave(const SurfaceHit& hit, const V3& w) {
     start = hit.p;
     origin = offset_point(hit, w);
@@ -53,16 +54,17 @@ struct OffsetRay {
   }
 
  private:
-  // How much of a surface's offset is still missing at a point with this displacement from the surface; zero
-  // once the point is clear. Behind the surface more than all of it is missing: a line nearly parallel to a
-  // curved surface leaves the surface earlier than the line from the moved start does, along which the length
-  // was measured.
+  // How much of a surface's offset (the vector by which rays that leave it are moved) is still missing at a
+  // point that is displaced by `from_surface` from the surface. Zero once the point is clear of the surface.
+  // For a point behind the surface more than the whole offset is missing: a line nearly parallel to a curved
+  // surface leaves the surface earlier than the line from the moved start does, along which the length was
+  // measured.
   static V3 missing_offset(const V3& offset, const V3& from_surface) {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
-  // For a ray towards the surface that its start was moved away from, but that ends before it: the part of
-  // that displacement that remains at t.
+  // For a ray that goes towards the very surface from which its origin was moved away, but that ends before
+  // it: the part of that displacement that remains at distance t.
   V3 remaining_lead(float t) const {
     const V3 offset = origin - start;
     return offset * (1 - t * dot(offset, d) / dot(offset, offset));

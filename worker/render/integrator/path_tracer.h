@@ -1,11 +1,11 @@
-// The path tracer: one sample of radiance along a camera ray.
+// The path tracer: computes one sample of the radiance along a camera ray.
 //
-// State of a path: `beta`, its weight relative to the hero channel, and `density`, each channel's sampling
-// density relative to the hero's (see medium.h). A contribution is beta * light / mean(density): the balance
-// heuristic over channels. Direct light is found both by BSDF or phase-function sampling and by next-event
-// estimation, combined by the balance heuristic. At surfaces next-event estimation starts from the path's own
-// vertices. In media it is a strategy, `Light` (vertex_nee.h: the default; segment_nee.h), with these
-// members:
+// The hero is the colour channel, drawn once per path, that decides every distance (see medium.h). The state
+// of a path is `beta`, its weight relative to the hero, and `density`, each channel's sampling density
+// relative to that of the hero. A contribution is beta * light / mean(density): the balance heuristic over
+// channels. Direct light is found both by BSDF or phase-function sampling and by next-event estimation,
+// combined by the balance heuristic. At surfaces next-event estimation starts from the path's own vertices.
+// In media it is a strategy, `Light` (vertex_nee.h: the default; segment_nee.h), with these members:
 //   Plan ahead(path, medium, segment)               called before each flight through a medium: adds light
 //                                                   scattered once, anywhere on the segment;
 //   Plan::matters()                                 true if vertices on this segment need a Vertex;
@@ -36,7 +36,8 @@ namespace ls::render {
 
 struct SampleOutcome {
   C3 radiance{0, 0, 0};
-  HealthCause cut_off = HealthCause::none;  // first cause for rejecting the sample, whatever its radiance
+  // The first reason for rejecting the sample whatever its radiance is; none if there was no such reason.
+  HealthCause cut_off = HealthCause::none;
   std::uint64_t majorant_violations = 0;
 
   void reject(HealthCause cause) {
@@ -45,7 +46,9 @@ struct SampleOutcome {
 };
 struct FirstSurface {
   SurfaceHit hit;
-  float not_passed = 1;  // 1 / (1 - null transmission): compensates the decision not to pass straight through
+  // 1 / (1 - probability of passing straight through): the weight that makes up for the random decision not
+  // to pass.
+  float not_passed = 1;
 };
 
 enum class Collision : std::uint8_t {
@@ -57,12 +60,14 @@ enum class Collision : std::uint8_t {
 template <Features F, template <Features> class Light = VertexNee>
 class PathTracer {
  public:
-  // `split` receives the components of the radiance; required with F.split, ignored otherwise.
+  // The sample's radiance is added to the components in `split`. `split` is required with F.split and ignored
+  // otherwise.
   PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr)
       : world_(world), stream_(stream), split_(split) {}
 
   SampleOutcome trace(const CameraRay& ray);
-  // The first surface at which the path would be scattered if there were no media; for AOVs.
+  // The first surface at which the path would be scattered if there were no media. The AOVs describe this
+  // surface.
   std::optional<FirstSurface> first_surface(const CameraRay& ray);
 
  private:
@@ -81,7 +86,7 @@ class PathTracer {
   };
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
 
-  // Free flight up to the surface at `end`, or up to `reach` if there is none.
+  // Free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
   Step fly(const SurfaceHit* end, float reach);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach);
   Step fly_through_several(const SurfaceHit* end, float reach);
@@ -94,8 +99,8 @@ class PathTracer {
   Step scatter_on_surface(const SurfaceHit& hit);
   bool passes_null(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
-  // True if the depth limit allows another segment after so many scatterings and so many passed null
-  // boundaries and null-transmitting surfaces.
+  // True if the depth limit allows another segment after this many scatterings and after `passed` crossings
+  // of null boundaries and null-transmitting surfaces.
   bool may_go_on(int scatterings, int passed) const {
     return world_.depth_allows(scatterings + (world_.passing_counts ? passed : 0));
   }
@@ -109,7 +114,7 @@ class PathTracer {
                                                       float left, Within medium, RandomStream stream);
   C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
   Within start_medium() const;
-  // `surface` is that of the hit.
+  // `surface` is the surface of `hit`.
   [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
                                               const V3& from, Within in) const;
   void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
@@ -119,7 +124,8 @@ class PathTracer {
   [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
 
-  // `ahead`: the light was scattered once more than the path so far, in the medium ahead.
+  // Adds light to the sample. `ahead` is true if the light was scattered once more than the path so far, in
+  // the medium ahead of it.
   void add(const C3& weighted, bool ahead = false) {
     C3 light = weighted;
     if constexpr (F.chromatic) light = weighted / mean(density_);
@@ -178,7 +184,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
       }
     }
     if (!met) {
-      // A non-finite direction meets nothing: reject the sample. One that was cut off before keeps its cause.
+      // A ray with a non-finite direction meets nothing; then the sample is rejected. A sample that was
+      // rejected before keeps its cause.
       if (!F.health || is_finite(ray_.d))
         add_environment();
       else
@@ -211,8 +218,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   return outcome_;
 }
 
-// Passes index-matched surfaces, and null-transmitting ones with their probability, using the same random
-// numbers as the path itself as long as both meet the same surfaces.
+// Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
+// are those of the path itself as long as both meet the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -234,7 +241,7 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
   return std::nullopt;
 }
 
-// Next-event estimation at a surface.
+// Next-event estimation at a surface; wo is the direction back along the path, in the local frame.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
@@ -256,7 +263,8 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
 }
 
-// absorbed: by the surface, or because the path has reached its maximum depth.
+// Scatters the path at a surface. Returns Collision::absorbed if the surface absorbs the path, or if the path
+// has reached its maximum depth.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
@@ -268,7 +276,8 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
   if (!s) return {Collision::absorbed};
   const V3 w = normalize(hit.shading.to_world(s->wi));
-  // the direction crosses the geometric surface
+  // The path is absorbed if w lies on different sides of the surface by its geometric and by its shading
+  // normal.
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return {Collision::absorbed};
   beta_ *= s->weight;
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;
@@ -277,8 +286,8 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.n = hit.shading.n;
   last_.pdf = s->pdf;
   last_.delta = s->delta;
-  // For reflected rays too: the media on either side are those the scene declares (as for next-event
-  // estimation).
+  // The medium is set for reflected rays too: the media on the two sides are those that the scene declares,
+  // as for next-event estimation.
   if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
   ray_.leave(hit, w);
   return {Collision::scattered, g.u(3)};
@@ -329,7 +338,7 @@ void PathTracer<F, Light>::add_environment() {
   add(beta_ * world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf));
 }
 
-// Russian roulette; false ends the path.
+// Russian roulette with the random number u: if it returns false, the path ends.
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::survives(float u) {
   if (is_black(beta_)) return false;

@@ -13,7 +13,8 @@
 namespace ls::render {
 namespace {
 
-// Treats denormals as zero while rays are traced, as Embree requires, but not beyond: folding needs them.
+// While an object of this class lives, the thread treats denormals as zero, as Embree requires for tracing
+// rays. Afterwards it does not: adding up results (folding) needs denormals.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
@@ -25,7 +26,8 @@ class FlushDenormals {
   unsigned saved_;
 };
 
-// Cheapest first; the last covers every scene.
+// The variants of the integrators other than `volpath_distant_mis`, cheapest first. The last one has the
+// features of every scene.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
     variant<Features{.passing = true}>("surfaces that light passes"),
@@ -49,16 +51,18 @@ const Variant& choose(const World& w) {
 }
 
 // The largest radiance of which 2^31 samples can be summed in float32. A larger sample is an error of the
-// scene; adding it would make the whole unit infinite, which no retry can fix. NaN fails the test too. The
-// limit applies to single samples, so that rejection does not depend on how samples are grouped.
+// scene. Adding it could make the sums of a whole unit (a tile and a range of samples) infinite, and
+// rendering the unit again would not help. NaN fails the test too. The limit applies to single samples, so
+// that rejection does not depend on how samples are grouped.
 constexpr float kLargestRadiance = 0x1p96f;
 bool usable(const SampleOutcome& s) {
   const C3& c = s.radiance;
   return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
          std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
 }
-// True if usable and nothing needs to be counted, as for nearly every sample. Floats from 0 up to the limit
-// have the same order as their bit patterns; negative ones and NaN lie beyond the limit.
+// True if the sample is usable and nothing about it needs to be counted, as for nearly every sample. Floats
+// from 0 up to the limit have the same order as their bit patterns; negative ones and NaN lie beyond the
+// limit.
 bool clean(const SampleOutcome& s) {
   const auto fine = [](float x) {
     return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(kLargestRadiance);
@@ -68,7 +72,7 @@ bool clean(const SampleOutcome& s) {
 }
 bool negative(const SampleOutcome& s) { return s.radiance.x < 0 || s.radiance.y < 0 || s.radiance.z < 0; }
 
-// Why the sample is not usable; none if it is.
+// The reason why the sample is not usable, or HealthCause::none if it is usable.
 HealthCause rejected_for(const SampleOutcome& s) {
   if (usable(s) || s.cut_off != HealthCause::none) return s.cut_off;
   const C3& c = s.radiance;
@@ -76,7 +80,8 @@ HealthCause rejected_for(const SampleOutcome& s) {
   return is_finite(c) ? HealthCause::too_large : HealthCause::infinite;
 }
 
-// Not inlined, to keep it out of the code for good samples.
+// Counts in `health` what is wrong with the sample at `spot`. Not inlined, to keep it out of the code for
+// good samples.
 [[gnu::cold, gnu::noinline]] void count(const SampleOutcome& s, const HealthLocation& spot, Health& health) {
   health.add(HealthCause::majorant_violation, s.majorant_violations, spot);
   const HealthCause cause = rejected_for(s);
@@ -88,7 +93,7 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
-// AOV accumulators beside the colour sums: this one, which does nothing, or an AovPixel.
+// What accumulates AOVs beside the colour sums: NoAovs, which does nothing, or an AovPixel.
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
   static void begin_pixel() {}
@@ -106,7 +111,8 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
     aovs.begin_sample();
     const SampleOutcome out = sample(w, x, y, s, aovs.split());
     aovs.end_sample(x, y, s, usable(out));
-    // A bad sample is counted, contributes zero and stays in N; it is never drawn again.
+    // A bad sample is counted and contributes zero, but still counts as one of the N samples of its pixel. It
+    // is never drawn again.
     if (kBuilt.health && !clean(out)) [[unlikely]] {
       count(out, {x, y, s}, health);
       if (!usable(out)) continue;
@@ -149,7 +155,7 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
   return render_tile_with(w, sample, tile, range, stop, crumb, AovPixel(w));
 }
 
-// For a variant that splits the light, whether or not the settings request it.
+// Renders with a variant that splits the light into components, whether or not the settings request that.
 TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
   return render_tile_with(w, v.sample, tile, range, nullptr, nullptr, AovPixel(w));
 }

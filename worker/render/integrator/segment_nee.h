@@ -1,6 +1,6 @@
 // The integrator `volpath_distant_mis` as a strategy of path_tracer.h: on every segment through a medium,
 // light scattered once on it is found by next-event estimation from points sampled for that purpose, not from
-// the vertices at which the path's own flights end. Those have no next-event estimation.
+// the vertices at which the path's own flights end. At those vertices no next-event estimation is done.
 //
 // Points are sampled by (D) depth: the truncated exponential, in grids that of the macro cells' means
 // (optical_depth.h) mixed with a uniform density; and by (A) angle: equi-angularly about the light. Each
@@ -9,9 +9,10 @@
 //
 // Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
-// next-event estimation gets the weight e p_l / (e p_l + f p_s), where e is the sum of the densities used.
-// Any functions of the path alone would be unbiased; closer approximations give less variance. Channels are
-// combined as in path_tracer.h: densities are means over each channel as the hero.
+// next-event estimation gets the weight e p_l / (e p_l + f p_s), where e is the sum of the densities used. In
+// place of e and f any functions of the path alone would give unbiased results; closer approximations of the
+// densities give less variance. Channels are combined as in path_tracer.h: densities are means over each
+// channel as the hero.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +37,7 @@ class SegmentNee {
 
     static bool matters() { return true; }
   };
-  struct Vertex {  // default-constructed: not in a medium
+  struct Vertex {  // default-constructed for a vertex that is not in a medium
     bool by_depth = true, by_angle = false;
     float depth_ratio = 1;  // e_D / f
     float flight_pdf = 0, t = 0;
@@ -83,7 +84,8 @@ class SegmentNee {
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}  // all done in ahead()
 
  private:
-  // The mean of a density over channels, weighted by the channel densities of the path so far.
+  // The mean over channels of density(sigma), where sigma is the channel's extinction; each channel is
+  // weighted by its density of the path so far.
   template <class Path, class Fn>
   static float over_channels(const Path& path, const Medium& medium, Fn density) {
     if constexpr (F.chromatic) {
@@ -96,7 +98,8 @@ class SegmentNee {
     }
   }
 
-  // Density of (D), per unit of x.
+  // The density of strategy (D) at x, per unit of x, the density of the medium integrated along the ray
+  // (optical_depth.h).
   template <class Path>
   static float depth_pdf(const Path& path, const Medium& medium, const Plan& plan, float x) {
     const float total = plan.depths.total();
@@ -130,7 +133,8 @@ class SegmentNee {
     return v;
   }
 
-  // Light scattered once, from one sampled point.
+  // Samples one point of the segment, by angle or by depth, and adds the light that is scattered once, there,
+  // towards the path.
   template <class Path>
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
                       const LightChoice& choice, bool by_angle, std::uint32_t bits) {

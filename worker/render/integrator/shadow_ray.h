@@ -1,4 +1,4 @@
-// Part of path_tracer.h, which includes it: the light carried by a shadow ray.
+// Part of path_tracer.h, which includes it: computes how much light a shadow ray carries.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,9 @@
 
 namespace ls::render {
 
-// Light that reaches `start` from the sampled light through boundaries and media. p is `start` moved off its
-// surface after the light was sampled: the ray is re-aimed from p, so that it ends just before the light and
-// not on it.
+// The radiance that reaches `start` from the sampled light, attenuated by boundaries and media. p is `start`
+// moved off its surface, after the light was sampled: the ray is re-aimed from p, so that it ends just before
+// the light and not on it.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
                                     const Within& medium, RandomStream stream) {
@@ -30,8 +30,9 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
 
-// Attenuates `value` along the unoccluded ray from p by null transmission at surfaces and transmittance of
-// media.
+// Returns `value` attenuated by the null transmission of surfaces and the transmittance of media along the
+// ray from p in the direction d, of length `left`, which no opaque surface blocks. `medium` holds the media
+// at the start of the ray.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {

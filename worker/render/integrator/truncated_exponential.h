@@ -1,6 +1,6 @@
 // The exponential density sigma e^(-sigma x) truncated to [0, length], written with expm1 and log1p so that
-// it is accurate from a depth of 1e-20, where it is uniform, to 1e6 (the textbook 1 - exp is 0 in float32 for
-// all depths below 6e-8).
+// it is accurate from an optical depth sigma length of 1e-20, where it is uniform, to 1e6 (the textbook 1 -
+// exp is 0 in float32 for all depths below 6e-8).
 #pragma once
 
 #include <algorithm>
@@ -11,18 +11,20 @@
 
 namespace ls::render {
 
-// Below this depth the density is uniform to the last bit; products with it stay clear of underflow.
+// Below this optical depth the density is uniform to the last bit. The value is large enough that products
+// with it do not underflow.
 inline constexpr float kThinDepth = 1e-20f;
 
-// sigma >= 0; length > 0, possibly infinite; x in [0, length]. Returns 0 if sigma is 0 and length infinite,
-// where no such density exists.
+// The density at x, for sigma >= 0, length > 0, which may be infinite, and x in [0, length]. Returns 0 if
+// sigma is 0 and length infinite, where no such density exists.
 inline float truncated_pdf(float sigma, float length, float x) {
   const float depth = sigma * length;
   if (!(depth > kThinDepth)) return 1 / length;
   return sigma * std::exp(-sigma * x) / -std::expm1(-depth);
 }
 
-// v: uniform in (0, 1). Not finite if no such density exists.
+// Samples x with that density from v, a uniform random number in (0, 1). The result is not finite if no such
+// density exists.
 inline float truncated_sample(float sigma, float length, double v) {
   const float depth = sigma * length;
   if (!(depth > kThinDepth)) return static_cast<float>(v) * length;
@@ -31,8 +33,9 @@ inline float truncated_sample(float sigma, float length, double v) {
   return std::min(x / sigma, length);
 }
 
-// The same mixed with a uniform density, for grids, where the mean density of the cells may be far above the
-// density along the ray. The probability of the uniform part, in units of 2^-32:
+// The truncated exponential mixed with a uniform density. It is used for grids, where the mean density of the
+// cells may be far above the density along the ray. kEvenShare is the probability of the uniform part, in
+// units of 2^-32.
 inline constexpr std::uint32_t kEvenShare = 429496730;  // a tenth
 
 inline float mixed_depth_pdf(float sigma, float length, float x) {

@@ -1,4 +1,5 @@
-// Renders one sample of a pixel with the path tracer variant that fits the scene's features and integrator.
+// The variants of the path tracer: the path tracer compiled for one set of features and one integrator each.
+// A scene is rendered with a variant that has the features it needs.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,9 @@
 
 namespace ls::render {
 
-// The last parameter receives the light components if the variant has Features::split; ignored otherwise.
+// Renders one sample: the parameters are the world, the pixel's x and y in the image, and the sample's index.
+// If the variant has Features::split, the last parameter receives the light components; otherwise it is
+// ignored.
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*);
 struct Variant {
   Features covers;
@@ -38,9 +41,11 @@ constexpr Variant variant(const char* name) {
   return {F, name, &sample_with<F, Light>};
 }
 
-// Variants of `volpath_distant_mis`, cheapest first; the last covers every scene.
+// The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
+// every scene.
 std::span<const Variant> distant_variants();
-// Variants of `volpath` and `volpath_distant_mis` with light components; they cover every scene.
+// The variants of the integrators `volpath` and `volpath_distant_mis` that also compute light components.
+// Each has the features of every scene.
 extern const Variant kSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

@@ -3,12 +3,12 @@
 // media for every light with a position; in grids, on the part of a segment that has any density, for point
 // lights (docs/decisions/0011-equi-angular-points-in-grids.md).
 //
-// (2) is phase-function sampling that hits a light. For a vertex at distance t of a segment, (1) and (2)
-// share the density f(t) of free flight and (3) has e(t). With p_l, p_s the solid-angle densities of light
-// and direction sampling, the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l. Only the
-// ratio e / f matters: equiangular_ratio() below. In grids f is the density of flights through the macro
-// cells' means (optical_depth.h): weights need not use the true density, only the same function of the vertex
-// for all strategies.
+// Strategy (2) is phase-function sampling that hits a light. For a vertex at distance t of a segment, (1) and
+// (2) share the density f(t) of free flight and (3) has e(t). With p_l, p_s the solid-angle densities of
+// light and direction sampling, the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l.
+// Only the ratio e / f matters: equiangular_ratio() below. In grids f is the density of flights through the
+// macro cells' means (optical_depth.h): weights need not use the true density, only the same function of the
+// vertex for all strategies.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,9 @@
 
 namespace ls::render {
 
-// Density of the free flight that ends at this point, averaged over channels as the hero. `density`: that of
-// the path so far, by channel, relative to the hero's.
+// The density with which a free flight ends at this point, averaged over the channels as the hero (the
+// channel that decides distances: medium.h). `density` is each channel's density of the path so far, relative
+// to that of the hero.
 template <Features F>
 float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const OpticalDepth::Point& at_point) {
   if constexpr (F.chromatic) {
@@ -37,19 +38,19 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Opti
   }
 }
 
-// e / f at one point. The macro cells' means may make f underflow to 0 where flights still end: then the
-// ratio is clamped, for all strategies alike.
+// The ratio e / f at one point. With the macro cells' means f may underflow to 0 where flights still end;
+// then the ratio is clamped, for all strategies alike.
 inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
 
 template <Features F>
 class VertexNee {
  public:
   struct Plan {
-    float length = 0;  // of a segment that is also sampled equi-angularly; else 0
+    float length = 0;  // length of the segment if it is also sampled equi-angularly, else 0
 
     bool matters() const { return F.equiangular && length > 0; }
   };
-  struct Vertex {  // on such a segment: relative to the part inside the medium
+  struct Vertex {  // o, length and t are relative to the part of the segment inside the medium
     bool equiangular = false, points_only = false;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
@@ -57,11 +58,13 @@ class VertexNee {
     bool uses_equiangular(bool is_point) const {
       return F.equiangular && equiangular && (is_point || !(F.grids && points_only));
     }
-    // e / f for a light with this pivot, if such lights are sampled equi-angularly.
+    // The ratio e / f at this vertex for a light with this pivot. It has a meaning only if such lights are
+    // sampled equi-angularly (uses_equiangular).
     float equiangular_ratio(const V3& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }
-    // For a light that was hit, so not a point light.
+    // The density of (1) and (3) together over that of the flight, for a light that was hit, which is never a
+    // point light.
     float found_as_light(const V3& pivot) const {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
@@ -87,12 +90,14 @@ class VertexNee {
     v.t = t - depths.from();
     const OpticalDepth::Point at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
-    // Also where the flight density underflows to 0: points are sampled there too (sample_equiangular).
+    // This holds also where the flight density underflows to 0, because points are sampled there too
+    // (sample_equiangular).
     v.equiangular = at_point.rate > 0 && v.length > 0;
     return v;
   }
 
-  // Strategy (1); d is the direction of travel before the scattering.
+  // Strategy (1): adds the light from a sampled light that is scattered at the vertex p. d is the direction
+  // of travel before the scattering.
   template <class Path>
   static void at_vertex(Path& path, const Medium& medium, const V3& p, const V3& d) {
     const Lights& lights = path.world_.lights;
@@ -119,8 +124,8 @@ class VertexNee {
     return F.grids && medium.equiangular_mode == EquiangularMode::points;
   }
 
-  // Strategy (3): light scattered once, at a point near the light. Not inlined, to keep it out of the code
-  // for media that do not use it.
+  // Strategy (3): adds light that is scattered once, at a point of the segment that is sampled equi-angularly
+  // about the light. Not inlined, to keep it out of the code for media that do not use it.
   template <class Path>
   [[gnu::noinline]] static void sample_equiangular(Path& path, const Medium& medium, Segment segment) {
     const Lights& lights = path.world_.lights;

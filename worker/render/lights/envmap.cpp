@@ -15,21 +15,23 @@ namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
 constexpr double kWords = 0x1p32;
-// As for samples (render_tile.cpp): larger values cannot be summed.
+// The largest radiance of a texel, the same as that of a sample (render_tile.cpp): larger values cannot be
+// summed.
 constexpr float kLargestTexel = 0x1p96f;
 constexpr float kBelowOne = 0x1.fffffep-1f;
-// Tolerance for matrices written with six digits.
+// The tolerance for a to_world that is not exactly a rotation because it was written with six digits.
 constexpr double kSlack = 1e-4;
 
-// The orthogonal matrix nearest to a multiple of m, by Newton's iteration X <- (X + X^-T) / 2 for the polar
-// decomposition (Higham 1986); nullopt if m also stretches.
+// The orthogonal matrix nearest to t up to a uniform scale, by Newton's iteration X <- (X + X^-T) / 2 for the
+// polar decomposition (Higham 1986). Returns nullopt if t also stretches.
 std::optional<Affine> rotation_of(const Transform& t) {
   Affine m(t);
   if (!m.invertible()) return std::nullopt;
   const double size = m.vector({1, 0, 0}).length();
   for (double& a : m.a) a /= size;
   Affine x = m;
-  // Each round doubles the number of correct digits: from six, two rounds give all of them.
+  // Each round of the loop doubles the number of correct digits, so that from six digits two rounds give all
+  // of them.
   for (int round = 0; round < 8; ++round) {
     const Affine inverse = x.inverse();
     for (std::size_t i = 0; i < 3; ++i)
@@ -40,14 +42,15 @@ std::optional<Affine> rotation_of(const Transform& t) {
   return x;
 }
 
-// First of the 2^32 words of share i, given the cumulative sums `before`. Shares that begin beyond the last
-// word are empty.
+// The first of the 2^32 random words that choose share i. `before` holds the cumulative sums of the shares.
+// Shares that begin beyond the last word are empty.
 std::uint64_t first_word(const std::vector<double>& before, std::size_t i) {
   return static_cast<std::uint64_t>(std::llround(before[i] / before.back() * kWords));
 }
 
-// x in (0, 1) with density proportional to a (1 - x) + b x, from u in (0, 1); stable if a = b or one is 0.
-// Never 1, where the density may be 0, or, at a pole, the azimuth undefined.
+// Samples x in (0, 1) with density proportional to a (1 - x) + b x, from the random number u in (0, 1). It is
+// stable if a = b or one of them is 0. The result is never 1, where the density may be 0, or, at a pole, the
+// azimuth undefined.
 float sample_linear(float a, float b, float u) {
   const float sum = a + b;
   if (!(sum > 0)) return u;
@@ -109,7 +112,8 @@ void EnvironmentMap::build_table() {
   first_.resize(std::size_t{n} * texels_.width);
   std::vector<double> cells(texels_.width + 1), before(n + 1, 0.);
   for (std::uint32_t j = 0; j < n; ++j) {
-    // cos a - cos b = 2 sin((a + b) / 2) sin((b - a) / 2): without cancellation.
+    // The height, a difference of cosines, is computed without cancellation as cos a - cos b = 2 sin((a + b)
+    // / 2) sin((b - a) / 2).
     rows_[j].top = std::cos(kPiD * j / n);
     rows_[j].height = 2 * std::sin(kPiD * (2. * j + 1) / (2. * n)) * std::sin(kPiD / (2. * n));
     before[j + 1] = before[j] + build_row(j, cells) * rows_[j].height;
@@ -127,7 +131,8 @@ void EnvironmentMap::build_table() {
   }
 }
 
-// The sum over a row's cells of the mean luminance of their corners. `before` receives the partial sums.
+// Returns the sum, over the cells of a row, of the mean luminance of their corners. `before` receives the
+// cumulative sums.
 double EnvironmentMap::build_row(std::uint32_t row, std::vector<double>& before) {
   for (std::uint32_t i = 0; i < texels_.width; ++i) {
     const Corners c = corners(i, row);
@@ -177,7 +182,7 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
   const float l00 = luminance(c00), l10 = luminance(c10), l01 = luminance(c01), l11 = luminance(c11);
   const float mean = .25f * (l00 + l10 + l01 + l11);
   if (j >= used_rows_ || !(mean > 0)) return light;
-  // The cosine in double: next to a pole a whole row spans less than float32 resolves near 1.
+  // The cosine is computed in double: next to a pole a whole row spans less than float32 resolves near 1.
   const double dx = d.x, dy = d.y, dz = d.z, z = dy / std::sqrt(dx * dx + dy * dy + dz * dz);
   const auto t = static_cast<float>(std::clamp((row.top - z) / row.height, 0., 1.));
   light.pdf = row.density * cell_share(j, cell) * (lerp(lerp(l00, l10, x), lerp(l01, l11, x), t) / mean);
@@ -186,8 +191,8 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
 
 V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
   LS_COUNT(environment_map);
-  // The last row that begins at or before the word; the position of the word within it is reused inside the
-  // row.
+  // `row` is the last row whose words begin at or before the word y. The position of y among the row's words
+  // is used again to sample within the row.
   const auto row = std::upper_bound(rows_.begin(), rows_.begin() + used_rows_, y,
                                     [](std::uint32_t word, const Row& r) { return word < r.first; }) -
                    1;

@@ -1,4 +1,5 @@
-// An environment map: light from infinitely far away, by direction, from an image in latitude-longitude form.
+// An environment map: light from infinitely far away, whose radiance in each direction is given by an image
+// in latitude-longitude form.
 //
 // Mitsuba 3's convention (its plugin `envmap`). In the map's own space +y is up; u, from the left edge of the
 // image, and v, from its top, both in [0, 1], correspond to the direction
@@ -33,15 +34,16 @@
 
 namespace ls::render {
 
-// 8192 x 4096: texels and table take 16 bytes per pixel.
+// The largest environment map, in pixels: 8192 x 4096. Its texels and its table take 16 bytes per pixel.
 inline constexpr std::uint64_t kMaxEnvironmentPixels = std::uint64_t{1} << 25;
 
 class EnvironmentMap {
  public:
-  // `name` is for messages. Negative values become 0 and are counted. invalid_argument: a value that is not
-  // finite or (scaled) exceeds the largest value of a sample, fewer than 2 x 3 pixels, or a to_world other
-  // than a rotation, reflection, translation and uniform scale; resource_exhausted: more than
-  // kMaxEnvironmentPixels.
+  // Makes the map from `image`, with radiances multiplied by `scale`. `name` is for messages. Negative values
+  // become 0 and are counted. Fails with invalid_argument on a value that is not finite or that, scaled,
+  // exceeds the largest radiance that a sample may have, on an image of fewer than 2 x 3 pixels, and on a
+  // to_world other than a rotation, reflection, translation and uniform scale. Fails with resource_exhausted
+  // on more than kMaxEnvironmentPixels.
   static Result<EnvironmentMap> build(std::string_view name, ImageData image, double scale,
                                       const Transform& to_world);
 
@@ -49,13 +51,14 @@ class EnvironmentMap {
     C3 radiance;
     float pdf;  // of sample(), per steradian
   };
-  // Light from a direction, a finite unit vector that points away from the scene.
+  // The light that arrives from `direction`, a finite unit vector that points away from the scene.
   Light at(const V3& direction) const;
-  // Samples a direction from random words. The map must not be black.
+  // Samples a direction from the random words x and y. The map must not be black.
   V3 sample(std::uint32_t x, std::uint32_t y) const;
 
   bool black() const { return used_rows_ == 0; }
-  // Luminance integrated over all directions, as the table has it: within each cell from its corners.
+  // The luminance integrated over all directions, as the sampling table has it: for each cell the mean of the
+  // luminances at its corners times its solid angle.
   double flux() const { return flux_; }
   std::uint64_t clamped() const { return texels_.clamped; }
   std::uint64_t bytes() const;
@@ -64,7 +67,7 @@ class EnvironmentMap {
   struct Row {                // a row of cells
     double top = 1;           // cosine at its upper edge
     double height = 0;        // difference of cosines
-    float density = 0;        // share of the words / solid angle of one cell
+    float density = 0;        // share of the words, over the solid angle of one cell
     std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
     std::uint32_t used = 0;   // number of cells up to the last one with a word
   };
@@ -82,7 +85,7 @@ class EnvironmentMap {
   float scale_ = 1;
   Frame frame_;  // axes of the map in the world: right-handed or mirrored
   std::vector<Row> rows_;
-  std::vector<std::uint32_t> first_;  // first of the words that choose a cell, row by row
+  std::vector<std::uint32_t> first_;  // for each cell, row by row, the first of the words that choose it
   std::uint32_t used_rows_ = 0;
   double flux_ = 0;
 };

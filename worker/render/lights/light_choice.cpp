@@ -1,4 +1,4 @@
-// Choice of a light: by the table only, or at a point also by the tree.
+// How a light is chosen: by the table of all lights or, for a known point, also by the tree.
 #include <algorithm>
 #include <cmath>
 
@@ -8,17 +8,19 @@
 namespace ls::render {
 namespace {
 
-// With fewer lights with a position than this, only the table is used (docs/decisions/0008-many-lights.md).
+// The smallest number of lights with a position for which the tree is used; with fewer, only the table is
+// (docs/decisions/0008-many-lights.md).
 constexpr std::ptrdiff_t kTreeFrom = 32;
-// One in so many words of the table stays with the table, so that the tree cannot make any light rarer than
-// 1/16 of its share in the table.
+// Of the words that choose lights in the tree, every kTableShare-th chooses by the table. So the tree cannot
+// make any light rarer than 1/16 of its share in the table.
 constexpr std::uint64_t kTableShare = 16;
 
 float probability(std::uint64_t words) { return static_cast<float>(static_cast<double>(words) * 0x1p-32); }
 
 }  // namespace
 
-// Keeps the order of lights that are scene shapes: they have a position and come first anyway.
+// Moves the lights with a position to the front of the list. The order of lights that are scene shapes does
+// not change: they have a position and come first anyway.
 void Lights::sort_places_first() {
   const auto placed = [](const Light& l) { return has_place(l.kind); };
   if (std::count_if(lights_.begin(), lights_.end(), placed) < kTreeFrom) return;
@@ -67,8 +69,8 @@ LightBounds Lights::mesh_bounds(const Light& l) const {
   return b;
 }
 
-// Bounds of the shape and its emission directions. Axis and cone default to those of a point that emits in
-// all directions.
+// The bounds of a light's shape and of its emission directions. Without further information, axis and cone
+// are those of a point that emits in all directions.
 LightBounds Lights::shape_bounds(const Light& l) const {
   LightBounds b;
   const auto absolute = [](const V3& v) { return V3(std::abs(v.x), std::abs(v.y), std::abs(v.z)); };
@@ -138,7 +140,8 @@ Lights::Drawn Lights::by_table(std::uint32_t word) const {
   return {i, lights_[i].probability};
 }
 
-// Word w below table_words_ stands for the table's word kTableShare * w.
+// How many of the words below table_words_ choose the light i by the table. Of these words, w stands for the
+// table's word kTableShare * w.
 std::uint64_t Lights::table_words(std::uint32_t i) const {
   const std::uint64_t first = i == 0 ? 0 : std::uint64_t{last_[i - 1]} + 1, end = std::uint64_t{last_[i]} + 1;
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;

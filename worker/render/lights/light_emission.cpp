@@ -1,4 +1,4 @@
-// Emission of the kinds of lights by direction.
+// The light that each kind of light emits, by direction.
 #include <algorithm>
 #include <cmath>
 
@@ -20,14 +20,16 @@ C3 Lights::spot_radiance(const Light& l, const V3& towards) const {
   return value;
 }
 
-// The plane at distance 1 along the axis gets the irradiance `value` times the image, at any angle: a ray at
-// the cosine c to the axis meets it at distance 1 / c and the same cosine, so the intensity is value / c^3.
+// The intensity of a projector in the direction `towards`. It gives the plane at distance 1 along its axis
+// the irradiance `value` times the image, at any angle: a ray at the cosine c to the axis meets it at
+// distance 1 / c and the same cosine, so the intensity is value / c^3.
 C3 Lights::projected(const Light& l, const V3& towards) const {
   const float z = dot(towards, l.normal);
   if (!(z > 0)) return {0, 0, 0};
   const float x = dot(towards, l.axis_u) / (z * l.tan_x), y = dot(towards, l.axis_v) / (z * l.tan_y);
   if (!(std::abs(x) <= 1) || !(std::abs(y) <= 1)) return {0, 0, 0};
-  // As for cameras: x to the left, y up, from the upper left corner.
+  // As for cameras, x points to the left and y up, and uv is measured from the upper left corner of the
+  // image.
   return l.value * textures_->eval(l.radiance, {.5f - .5f * x, .5f - .5f * y}) / (z * z * z);
 }
 
@@ -42,7 +44,7 @@ float Lights::beam_share(const Light& l, float cosine) {
   return std::pow((cosine - l.cos_cutoff) * l.inv_transition, l.falloff);
 }
 
-// Uniform over the solid angle; uses 1 - cos to avoid cancellation.
+// Samples a direction uniformly over the sun's solid angle. It uses 1 - cos to avoid cancellation.
 LightSample Lights::sample_sun(const Light& l, V2 u) {
   const float one_minus = l.cone * u.x, sine = std::sqrt(one_minus * (2 - one_minus));
   const V2 circle = unit_circle(u.y) * sine;
@@ -54,8 +56,8 @@ LightSample Lights::sample_sun(const Light& l, V2 u) {
   return s;
 }
 
-// Tests whether a direction hits a sun by the chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the
-// cosine of a small angle loses.
+// The radiance of the suns that a direction d hits. Whether it hits a sun with the axis a is decided by the
+// chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the cosine of a small angle loses.
 C3 Lights::suns(const V3& direction, float pdf) const {
   C3 sum(0);
   for (const std::uint32_t i : suns_) {

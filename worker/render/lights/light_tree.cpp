@@ -8,7 +8,7 @@
 namespace ls::render {
 namespace {
 
-// cos(max(0, a - b)) and cos(a + b), for angles from 0 to pi.
+// The cosines cos(max(0, a - b)), here, and cos(min(pi, a + b)), below, for angles a and b from 0 to pi.
 float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
   return cos_a > cos_b ? 1 : cos_a * cos_b + sin_a * sin_b;
 }
@@ -19,9 +19,9 @@ float sine(float cosine) { return safe_sqrt((1 - cosine) * (1 + cosine)); }
 
 }  // namespace
 
-// Splits the lights of a node in two, by bins along each axis, minimising the sum over both halves of
-// intensity * surface area of the box * (2 - R), where R is 1 for lights that all face the same way and 0 for
-// lights that face everywhere.
+// Builds the tree. It splits the lights of a node in two, by bins along each axis, and minimises the sum over
+// both halves of intensity * surface area of the box * (2 - R), where R is 1 for lights that all face the
+// same way and 0 for lights that face everywhere.
 class LightTree::Builder {
  public:
   Builder(const std::vector<LightBounds>& lights, LightTree& tree) : lights_(lights), tree_(tree) {}
@@ -31,7 +31,8 @@ class LightTree::Builder {
     for (std::uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;
     tree_.trails_.resize(lights_.size());
     tree_.nodes_.reserve(2 * lights_.size() - 1);
-    // Depth first, left before right; right children wait in the stack with their parent's index.
+    // Nodes are made depth first, the left child before the right one. Right children wait on the stack with
+    // their parent's index.
     std::vector<Job> jobs{{0, static_cast<std::uint32_t>(order_.size()), 0, 0, kNoParent}};
     while (!jobs.empty()) {
       const Job job = jobs.back();
@@ -53,8 +54,8 @@ class LightTree::Builder {
  private:
   static constexpr std::uint32_t kNoParent = 0xffffffffu;
   static constexpr int kBins = 16;
-  // From this depth on, lights are halved by their order: 2^24 lights become single at depth 30 + 24, and
-  // trails have 64 bits.
+  // From depth kDeepest on, lights are halved by their order, without regard to cost. So 2^24 lights are all
+  // separated at depth 30 + 24, which fits the 64 bits of a trail.
   static constexpr int kDeepest = 30;
   struct Job {
     std::uint32_t begin, end;
@@ -114,7 +115,8 @@ class LightTree::Builder {
     return n;
   }
 
-  // Returns the first light of the right half; each half has at least one.
+  // Returns the position, in the order of lights, of the first one of the right half; each half has at least
+  // one.
   std::uint32_t split(const Job& job) {
     const std::uint32_t half = job.begin + (job.end - job.begin) / 2;
     if (job.depth >= kDeepest) return half;
@@ -201,7 +203,7 @@ std::uint64_t LightTree::left_share(std::uint32_t node, std::uint64_t words, con
   const double a = importance(nodes_[node + 1], x, n), b = importance(nodes_[nodes_[node].right], x, n);
   if (!(a + b > 0) || !std::isfinite(a + b)) return words - words / 2;
   const auto share = static_cast<std::uint64_t>(std::floor(static_cast<double>(words) * (a / (a + b)) + .5));
-  // Every child that may have a word gets at least one.
+  // Every child whose importance is positive gets at least one word, if there are two or more.
   const std::uint64_t at_least = a > 0 && words > 1 ? 1 : 0, at_most = b > 0 && words > 1 ? words - 1 : words;
   return std::clamp(share, at_least, at_most);
 }

@@ -11,9 +11,10 @@
 // n, or its opposite, and the direction to the centre, minus that radius; in a medium there is no cos i. A
 // light is sampled by descending from the root, choosing among children in proportion to their importance.
 //
-// Random words are split, not real numbers: each child gets a whole number of its parent's words, so the
-// probability of a light is exactly the number of words that reach it. All arithmetic is plain float32 and
-// float64 without library functions other than square roots: the same on every machine.
+// Random words are split, not real numbers. The root has all 32-bit words, or as many as the caller gives it,
+// and each child gets a whole number of its parent's words. So the probability of a light is exactly the
+// number of words that reach it over the number of all words. All arithmetic is plain float32 and float64
+// without library functions other than square roots: the same on every machine.
 #pragma once
 
 #include <cstdint>
@@ -34,16 +35,16 @@ struct LightBounds {
 class LightTree {
  public:
   LightTree() = default;
-  // Takes 1 to kMaxLights lights.
+  // Builds the tree of `lights`, of which there must be 1 to kMaxLights.
   static LightTree build(const std::vector<LightBounds>& lights);
   static constexpr std::size_t kMaxLights = std::size_t{1} << 24;
 
   struct Found {
     std::uint32_t light = 0;  // index into the vector that the tree was built from
-    std::uint64_t words = 0;  // how many of all words reach it; at least 1
+    std::uint64_t words = 0;  // how many of the words reach this light; at least 1
   };
-  // The light that word number `word` of `words` (at most 2^32) reaches. n: the normal at x; zero in a
-  // medium.
+  // The light that word number `word` of `words` reaches when lights are sampled at the point x. `words` is
+  // at most 2^32. n is the surface normal at x, or zero if x is in a medium.
   Found find(std::uint64_t word, std::uint64_t words, const V3& x, const V3& n) const;
   std::uint64_t words_of(std::uint32_t light, std::uint64_t words, const V3& x, const V3& n) const;
 
@@ -64,7 +65,7 @@ class LightTree {
   };
   class Builder;
   static float importance(const Node& node, const V3& x, const V3& n);
-  // The number of words of this inner node that its left child gets.
+  // How many of the `words` that reach the inner node `node` its left child gets.
   std::uint64_t left_share(std::uint32_t node, std::uint64_t words, const V3& x, const V3& n) const;
 
   std::vector<Node> nodes_;

@@ -8,10 +8,11 @@
 namespace ls::render {
 namespace {
 
-// The directions from x to the sphere's emitting side, as 1 - cos of their half angle, without cancellation
-// (docs/measurements/stability.md N26). 2: all directions, for an inner side seen from inside; 0: none, where
-// the emitting side faces away. Points on the surface itself, accurate to a few ulps of their coordinates,
-// count as being on the emitting side: sampling and density must agree on them.
+// The cone of directions from x to the sphere's emitting side, as 1 - cos of its half angle, without
+// cancellation (docs/measurements/stability.md N26). The value 2 means all directions, for an inner side seen
+// from inside; 0 means none, where the emitting side faces away. Points on the surface itself, accurate to a
+// few ulps of their coordinates, count as being on the emitting side: sampling and density must agree on
+// them.
 float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
   const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20 * reach);
@@ -64,7 +65,8 @@ Lights::Point Lights::cylinder_point(const Light& l, V2 u) const {
   return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * l.sign, {u.y, u.x}, {}};
 }
 
-// The first number chooses the triangle and is then rescaled for reuse.
+// Samples a point on a mesh. numbers.x chooses the triangle and is then rescaled to be used again for the
+// point.
 Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) const {
   const double target = (numbers.x + .5) * 0x1p-32 * l.cdf.back();
   const auto it = std::upper_bound(l.cdf.begin(), l.cdf.end() - 1, target);
@@ -77,7 +79,7 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
            v2 = geometry_->positions[idx[2]];
   Point y;
   y.p = v0 * b0 + v1 * b1 + v2 * b2;
-  // In double: the square of a small triangle's area underflows in float32.
+  // The normal is computed in double, because the square of a small triangle's area underflows in float32.
   const V3d n = V3d(v1 - v0).cross(V3d(v2 - v0));
   y.n = V3(n * (l.sign / n.length()));
   y.uv = {b1, b2};
@@ -89,7 +91,7 @@ Lights::Point Lights::mesh_point(const Light& l, const LightNumbers& numbers) co
 }
 
 std::optional<LightSample> Lights::sample_area(const Light& l, const Point& y, const V3& x, float p) const {
-  // Just in front of the light, so that the shadow ray ends before it.
+  // `target` lies just in front of the light, so that the shadow ray ends before it.
   const V3 target = offset_point(y.p, y.n, l.reach, y.n);
   const V3 f = target - x;
   const float d2 = dot(f, f);
@@ -122,11 +124,13 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   constexpr double kEndless = std::numeric_limits<double>::infinity();
   double t = intersect(sphere, V3d(x), V3d(s.direction), 0, kEndless);
   if (l.sign < 0) {
-    // From inside take the far wall, also if x lies on the near one and rounding put it just outside.
+    // Seen from inside, the ray ends at the far wall of the sphere, also if x lies on the near wall and
+    // rounding put it just outside.
     const double far = intersect(sphere, V3d(x), V3d(s.direction), t, kEndless);
     if (std::isfinite(far)) t = far;
   }
-  // At the rim rounding may miss the sphere: use the ray's point nearest to it.
+  // At the rim of the sphere the ray may miss it by rounding; then the point of the ray nearest to the sphere
+  // is used.
   const double reach = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * reach - sphere.center).normalized();
   const V3 y(sphere.center + n * sphere.radius);
@@ -140,8 +144,8 @@ std::optional<LightSample> Lights::sample_sphere(const Light& l, V2 u, const V3&
   return s;
 }
 
-// Evaluated in the sampled direction itself, as for paths that leave the scene, so that both use the same
-// density.
+// Samples the environment map. Its radiance and density are evaluated in the sampled direction itself, as for
+// paths that leave the scene, so that both use the same density.
 std::optional<LightSample> Lights::sample_map(const LightNumbers& numbers) const {
   const V3 direction = map_->sample(numbers.x, numbers.y);
   const EnvironmentMap::Light light = map_->at(direction);

@@ -1,8 +1,8 @@
-// The lights of a world: choice, sampling and densities.
+// The lights of a world: how they are chosen and sampled, and with which densities.
 //
-// A light with a position has a pivot: the point about which equi-angular sampling of a segment is done. For
-// an area light it is the sampled point; for a sphere its centre (the point itself is sampled once the vertex
-// on the segment is known).
+// A light with a position has a pivot: the point about which a segment of a path is sampled equi-angularly
+// (equiangular.h). The pivot of an area light is the point that is sampled on it. For a sphere it is the
+// centre, because the point on the sphere is sampled only once the vertex on the segment is known.
 #pragma once
 
 #include <cstdint>
@@ -23,10 +23,11 @@ namespace ls::render {
 struct LightSample {
   V3 direction;        // unit, from the shaded point towards the light
   float distance = 0;  // to the light along it; infinity for distant lights
-  // the light's point, moved off its surface: the end of shadow rays (not for distant lights)
+  // The point sampled on the light, moved off its surface: shadow rays end there. Not set for distant lights.
   V3 target{0, 0, 0};
   C3 radiance;  // arriving if unobstructed; for delta lights the irradiance on a plane facing it
-  // per steradian, including the choice of the light; for delta lights the probability of the choice only
+  // The density of `direction` per steradian, including the probability of choosing the light. For delta
+  // lights it is the probability of choosing the light alone.
   float pdf = 0;
   bool delta = false;
 };
@@ -37,7 +38,8 @@ struct LightNumbers {
   std::uint32_t light = 0, x = 0, y = 0;
 };
 
-// The chosen light, and for area lights the numbers that determine the point on it.
+// The chosen light, the probability with which it was chosen, and, for area lights, the numbers that
+// determine the point on it.
 struct LightChoice {
   std::uint32_t light = 0;
   float probability = 0;
@@ -47,38 +49,41 @@ struct LightChoice {
 
 class Lights {
  public:
-  // Sets the light index of the surfaces of `geometry`. Lights without power or area are left out and
-  // counted. `images` loads environment maps; scenes without one do not need it.
+  // Builds the list of the scene's lights and sets the light index of the surfaces of `geometry`. Lights
+  // without power or area are left out and counted. `images` loads environment maps; scenes without one do
+  // not need it.
   static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                               const ImageLoader& images = {});
 
-  // false: no light can be sampled by next-event estimation
+  // False if there is no light that next-event estimation can sample.
   bool can_sample() const { return !lights_.empty(); }
   bool any_with_place() const { return any_with_place_; }
   std::vector<V3> points() const;  // positions of all lights without extent
-  // Chooses before the shaded point is known: half by power, half uniformly.
+  // Chooses a light before the shaded point is known: with probability 1/2 in proportion to power, else
+  // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
-  // Chooses for the point x of a surface of normal n, or of a medium (n = 0); by a tree if there are many
-  // lights.
+  // Chooses a light for the point x on a surface of normal n, or in a medium (n = 0). If there are many
+  // lights, they are chosen by a tree (light_tree.h).
   LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
     return chosen(numbers, alone_ ? only_one() : draw(numbers.light, x, n));
   }
-  // Requires a light with a position.
+  // The pivot of the chosen light, which must have a position.
   V3 pivot(const LightChoice& choice) const;
-  // Light arriving at x from the chosen light; nullopt if none can (behind, outside the cone, zero solid
-  // angle).
+  // Samples the light that arrives at x from the chosen light. Returns nullopt if none can arrive: if x is
+  // behind the light or outside its cone, or if the light has zero solid angle.
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
 
-  // Emission of a surface light in the direction w, from the surface to the viewer.
+  // The radiance that a surface light emits at `hit` in the direction w, which points from the surface to the
+  // viewer.
   C3 emitted(const SurfaceHit& hit, const V3& w) const;
   // Density, per steradian at x and including the choice of the light, with which choose(numbers, x, n) and
-  // sample() find this point of a surface light.
+  // sample() find the point `hit` of a surface light. `direction` points from x to the hit.
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0)) const;
   V3 pivot(const SurfaceHit& hit) const;
   // Environment radiance for a path that leaves the scene in this direction (a unit vector), weighted against
-  // sampling it as a light. `pdf`: of the direction, per steradian; infinity gives the full radiance, for
-  // directions that were not sampled. A constant environment is never sampled: it is smooth, and paths that
-  // leave find it.
+  // sampling it as a light. `pdf` is the density, per steradian, with which the path sampled the direction.
+  // Infinity gives the full radiance, for directions that were not sampled. A constant environment is never
+  // sampled: it is smooth, and paths that leave find it.
   C3 environment(const V3& direction, float pdf) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
     if (!kBuilt.environment_maps || !map_) return beside;
@@ -89,7 +94,8 @@ class Lights {
   bool has_environment() const { return map_ || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_ ? &*map_ : nullptr; }
 
-  // Lets points in media use the tree too, if there is one; for integrators without segment sampling.
+  // From this call on, lights are chosen by the tree for points in media too, if there is a tree. For
+  // integrators that do not sample points on segments.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }
@@ -125,14 +131,16 @@ class Lights {
   }
   struct Light {
     Kind kind = Kind::point;
-    // intensity (point, spot), irradiance (directional; projector: for a texture of 1 on the plane at
-    // distance 1), radiance (sun; uniform area lights)
+    // The strength of the light. For point and spot it is the intensity; for directional the irradiance; for
+    // projector the irradiance on the plane at distance 1 for a texture of 1; for sun and uniform area lights
+    // the radiance.
     C3 value;
     TextureIndex radiance;  // texture of area lights; projected texture of spot, projector
     bool textured = false;
     bool beam = false;     // area lights: radiance depends on the angle
     bool uniform = false;  // area lights: neither textured nor a beam
-    // parallelogram: corner and edges; disk: centre and axes; directional: direction of travel
+    // For a parallelogram: its corner and edges. For a disk: its centre and axes. For directional: the
+    // direction of travel.
     V3 position, axis_u, axis_v, normal;
     V2 uv0, uv_u, uv_v;  // parallelogram: uv at the corner and along the edges
     double area = 0;
@@ -152,7 +160,7 @@ class Lights {
     FacePoint face;
   };
 
-  // Index range of a shape's primitives in Geometry's lists, where they are contiguous.
+  // The index range of the primitives of one shape in Geometry's lists, in which they are contiguous.
   struct Range {
     std::uint32_t first = kNone, count = 0;
   };
@@ -191,7 +199,7 @@ class Lights {
   Point area_point(const Light& light, const LightNumbers& numbers) const;
   Point mesh_point(const Light& light, const LightNumbers& numbers) const;
   Point cylinder_point(const Light& light, V2 u) const;
-  // p: the probability with which the light was chosen.
+  // In the next functions p is the probability with which the light was chosen.
   std::optional<LightSample> sample_area(const Light& light, const Point& y, const V3& x, float p) const;
   std::optional<LightSample> sample_sphere(const Light& light, V2 u, const V3& x, float p) const;
   std::optional<LightSample> sample_map(const LightNumbers& numbers) const;
@@ -199,7 +207,8 @@ class Lights {
   C3 suns(const V3& direction, float pdf) const;
   C3 spot_radiance(const Light& light, const V3& towards) const;
   C3 projected(const Light& light, const V3& towards) const;
-  // Radiance towards a viewer at this cosine > 0 from the normal.
+  // The radiance of an area light at `uv` and `face` towards a viewer whose direction has the cosine `cosine`
+  // > 0 to the normal.
   C3 area_radiance(const Light& light, V2 uv, const FacePoint* face, float cosine) const {
     return light.uniform ? light.value : varying_radiance(light, uv, face, cosine);
   }
@@ -208,7 +217,7 @@ class Lights {
   static double beam_flux(const Light& light);  // per unit radiance and area; pi without a beam
 
   std::vector<Light> lights_;
-  std::vector<std::uint32_t> suns_;  // indices of the suns
+  std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
   // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]: its probability is exactly their share.
   std::vector<std::uint32_t> last_;
   bool alone_ = false;  // a single light: no choice needed
@@ -217,8 +226,9 @@ class Lights {
   C3 environment_{0, 0, 0};
   std::optional<EnvironmentMap> map_;
   float map_probability_ = 0;
-  // With many lights, those with a position come first in the list and are in the tree. Their words of the
-  // table, the first ones, are redistributed by the tree at each point, except every kTableShare-th.
+  // If there are many lights, those with a position come first in the list and are in the tree. The first
+  // words of the table choose these lights; at each point the tree redistributes these words among them,
+  // except every kTableShare-th word, which the table keeps.
   LightTree tree_;
   std::uint64_t tree_words_ = 0, table_words_ = 0;
   bool tree_in_media_ = false;

@@ -12,7 +12,8 @@ namespace ls::render {
 namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
-// Degrees. Directions in float32 are accurate to 4e-6 degrees; a smaller disk becomes a point.
+// The smallest sun [degrees]. Directions in float32 are accurate to 4e-6 degrees; a disk smaller than
+// kSmallestSun becomes a point.
 constexpr double kSmallestSun = 1e-3;
 
 }  // namespace
@@ -89,7 +90,7 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const Primitives&
   }
   const LightBounds box = shape_bounds(l);
   l.reach = std::max(largest(box.low), largest(box.high));
-  // A null surface on a wall: shadow rays must end in front of both.
+  // If a null surface lies on a wall, shadow rays must end in front of both.
   if (g.surfaces[shape].null) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
   g.surfaces[shape].light = static_cast<std::uint32_t>(lights_.size());
   lights_.push_back(std::move(l));
@@ -205,8 +206,9 @@ void Lights::set_beam(Light& l, const AreaEmitter& e) {
   l.falloff = static_cast<float>(e.falloff);
 }
 
-// 2 pi integral of share(c) c dc: with c = cutoff + w s in between, w = beam - cutoff,
-// w integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
+// The flux of a beam per unit radiance and area: 2 pi integral of share(c) c dc, where beam and cutoff are
+// cosines. With w = beam - cutoff and c = cutoff + w s between the two cosines, the integral is w
+// integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
 double Lights::beam_flux(const Light& l) {
   if (!l.beam) return kPiD;
   const double cutoff = l.cos_cutoff, beam = l.cos_beam, w = beam - cutoff, p = l.falloff;
@@ -238,8 +240,8 @@ double Lights::power(const Light& l, float radius) const {
   return luminance(textures_->mean(l.radiance)) * beam_flux(l) * l.area;
 }
 
-// Half by power, half uniform: no light's probability is below 1/2n. Probabilities are exact shares of the
-// 2^32 random words.
+// The probability of each of the n lights is half its share of the power plus half of 1/n, so none is below
+// 1/(2n). Probabilities are exact shares of the 2^32 random words.
 void Lights::set_probabilities(float radius) {
   std::vector<double> p;
   double sum = 0;
@@ -251,7 +253,7 @@ void Lights::set_probabilities(float radius) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     acc += (sum > 0 && std::isfinite(sum) ? .5 * p[i] / sum : uniform) + uniform;
     const bool is_last = i + 1 == p.size();
-    // At least one word each, so that last_ is strictly increasing.
+    // Each light gets at least one word, so that last_ is strictly increasing.
     const std::uint64_t edge =
         is_last ? std::uint64_t{1} << 32
                 : std::max(before + 1, static_cast<std::uint64_t>(std::llround(acc * 0x1p32)));

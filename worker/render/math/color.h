@@ -1,4 +1,4 @@
-// Scene colours in the renderer's type.
+// Converts the scene's colours to the renderer's type.
 #pragma once
 
 #include "common/scene/scene.h"

@@ -1,5 +1,5 @@
-// Vectors, frames and formulas shared by all parts of the renderer. All in float32 with few branches, unless
-// noted otherwise.
+// Vectors, frames and formulas shared by all parts of the renderer. They compute in float32, with few
+// branches, unless noted otherwise.
 #pragma once
 
 #include <Imath/ImathVec.h>
@@ -37,18 +37,18 @@ inline V3 normalize(const V3& v) {
   const float l2 = dot(v, v);
   return l2 > 0 ? v * (1 / std::sqrt(l2)) : v;
 }
-// Reflects w about the unit vector m, both pointing away from the surface.
+// Reflects w about the unit vector m. Both w and m, and the result, point away from the surface.
 inline V3 reflect(const V3& w, const V3& m) { return m * (2 * dot(w, m)) - w; }
 
-// Rec. 709 luminance.
+// The luminance of linear RGB, by the primaries of Rec. 709.
 inline float luminance(const C3& c) { return .212671f * c.x + .715160f * c.y + .072169f * c.z; }
 inline float max_component(const C3& c) { return std::max(c.x, std::max(c.y, c.z)); }
 inline float mean_component(const C3& c) { return (c.x + c.y + c.z) * (1.f / 3); }
 inline bool is_black(const C3& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline bool is_finite(const V3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// Right-handed orthonormal frame about a unit n (Duff et al. 2017, "Building an Orthonormal Basis,
-// Revisited").
+// A right-handed orthonormal frame (s, t, n) about a unit vector n (Duff et al. 2017, "Building an
+// Orthonormal Basis, Revisited").
 struct Frame {
   V3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
 
@@ -92,10 +92,10 @@ inline V2 unit_circle(float u) {
   return turn & 2 ? V2(-c, -s) : V2(c, s);
 }
 
-// Sample transformations, u in [0, 1)^2.
+// The functions below transform uniform random numbers u in [0, 1)^2 into samples.
 //
-// Uniform on the unit disk, continuous and of low distortion (Shirley and Chiu 1997); the centre maps to the
-// origin.
+// A point uniform on the unit disk. The map is continuous and of low distortion (Shirley and Chiu 1997); the
+// centre of the square maps to the origin.
 inline V2 concentric_disk(const V2& u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
   if (x == 0 && y == 0) return {0, 0};
@@ -103,7 +103,7 @@ inline V2 concentric_disk(const V2& u) {
   const SinCos a = sin_cos_eighth(kPi / 4 * (wide ? y / x : x / y));
   return wide ? V2(x * a.cos, x * a.sin) : V2(y * a.sin, y * a.cos);
 }
-// Cosine-distributed about +z: density cos / pi.
+// A direction distributed as the cosine to +z: its density is cos / pi per steradian.
 inline V3 cosine_hemisphere(const V2& u) {
   const V2 d = concentric_disk(u);
   return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};

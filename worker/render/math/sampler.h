@@ -1,5 +1,6 @@
-// The random numbers of one sample: a pure function of (seed, pixel, sample index, vertex, purpose). Even
-// sample indices form half A, odd ones half B; each half of each pixel is its own scrambled Sobol sequence.
+// The random numbers of one sample of a pixel. They are a pure function of (seed, pixel, sample index,
+// vertex, purpose). Even sample indices form half A, odd ones half B; each half of each pixel is its own
+// scrambled Sobol sequence.
 #pragma once
 
 #include <array>
@@ -10,7 +11,8 @@
 
 namespace ls::render {
 
-// What a group of numbers is used for. A new purpose gets a new value: the values determine the image's bits.
+// What a group of random numbers is used for. The values determine the bits of the image, so existing values
+// must not change: a new purpose gets a new value.
 enum class Purpose : std::uint32_t {
   camera,
   hero,
@@ -31,7 +33,7 @@ enum class Purpose : std::uint32_t {
   end  // not a purpose: their number
 };
 
-// Four numbers for one purpose at one path vertex.
+// Four random numbers for one purpose at one vertex of a path.
 struct Group {
   std::array<std::uint32_t, 4> bits;
   float u(int i) const { return unit_float(bits[static_cast<std::size_t>(i)]); }
@@ -39,7 +41,8 @@ struct Group {
 
 class SampleStream {
  public:
-  // Vertices that get low-discrepancy points; later ones, which gain nothing from them, get hashed numbers.
+  // The number of vertices of a path whose numbers are low-discrepancy points. Later vertices, which gain
+  // nothing from such points, get hashed numbers.
   static constexpr int kSobolVertices = 6;
 
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
@@ -53,7 +56,7 @@ class SampleStream {
                         kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
     return hashed(slot(vertex, purpose));
   }
-  // A stream of as many numbers as a tracker needs.
+  // A stream of unbounded length, for a tracker, which does not know in advance how many numbers it needs.
   RandomStream stream(int vertex, Purpose purpose) const {
     return RandomStream(combine(sample_, slot(vertex, purpose)));
   }
@@ -74,7 +77,8 @@ class SampleStream {
   }
   static const MixedSlots kMixedSlots;
 
-  // A Sobol sequence of 32-bit points has 2^32 members; later samples are hashed.
+  // `sequence` is the key of the half, `index` the index of the sample in it. A Sobol sequence of 32-bit
+  // points has 2^32 members; samples beyond get hashed numbers.
   SampleStream(std::uint64_t sequence, std::uint64_t index)
       : sequence_(sequence),
         sample_(combine(sequence, index)),

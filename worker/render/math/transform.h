@@ -1,4 +1,5 @@
-// Affine maps in double, for scene transforms before rounding to float32.
+// Affine maps in double. The scene's transforms are applied by them, before coordinates are rounded to
+// float32.
 #pragma once
 
 #include <array>
@@ -23,8 +24,8 @@ struct Affine {
             a[6] * v.x + a[7] * v.y + a[8] * v.z};
   }
   V3d point(const V3d& p) const { return vector(p) + b; }
-  // Multiplies by the cofactor matrix (inverse transpose times determinant): correct for normals of mirroring
-  // maps too, up to sign.
+  // Transforms a normal: multiplies n by the cofactor matrix (inverse transpose times determinant): correct
+  // for normals of mirroring maps too, up to sign.
   V3d normal(const V3d& n) const {
     const V3d x(a[0], a[3], a[6]), y(a[1], a[4], a[7]), z(a[2], a[5], a[8]);
     return y.cross(z) * n.x + z.cross(x) * n.y + x.cross(y) * n.z;
@@ -41,7 +42,7 @@ struct Affine {
   // True if both the map and its inverse are finite. A subnormal determinant has no finite inverse; an
   // overflowing one no finite map.
   bool invertible() const { return finite() && std::isnormal(determinant()) && inverse().finite(); }
-  // Requires an invertible map.
+  // The inverse map. This map must be invertible.
   Affine inverse() const {
     const double d = 1 / determinant();
     Affine r;

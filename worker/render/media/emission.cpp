@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// Maximum length, in voxels of either grid, of an interval that gets an emission sample.
+// The maximum length of an interval that gets one emission sample, in voxels of the density or the emission
+// grid.
 constexpr double kOpticalDepthVoxels = 1;
 
 // A ray's position in a grid, by distance from the ray's origin: in a cell, in front of the grid, or past it.
@@ -30,11 +31,13 @@ class Steps {
   }
   bool past() const { return !more_; }
   bool inside(double at) const { return more_ && begin() <= at; }
-  // Distance at which the next cell begins, or the current one ends.
+  // The distance from the ray's origin at which the next cell begins if `at` lies before it, or the current
+  // one ends.
   double boundary(double at) const { return !more_ ? kInf : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }
-  // Conversion between distances from the ray's origin and from the grid's point of entry.
+  // local() converts a distance from the ray's origin to one from the point of entry into the grid;
+  // distance() converts back.
   float local(double t) const { return static_cast<float>(t - walk_.entry()); }
   double distance(float local) const { return walk_.entry() + local; }
   V3 index(double t) const { return walk_.index(local(t)); }
@@ -89,14 +92,15 @@ class EmissionWalk {
     if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
     if (!emitter_) return true;
     if (!emitter_->inside(at)) return false;
-    // With several channels only the first one's bound is available.
+    // If the emission grid has several channels, only the bound of the first one is available here.
     if (m_.emitter[1] != m_.emitter[0]) return true;
     const float hi = emitter_->cell().hi;
     return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
                                                         : hi > 0;
   }
 
-  // `sampled`: the density's cell, if the interval is to get an emission sample.
+  // The end of the interval that starts at `at`. `sampled` is the density grid's cell if the interval is to
+  // get an emission sample, else null.
   double end_of_constant_part(double at, const MacroCell* sampled) const {
     double to = std::min(end_, density_.boundary(at));
     if (emitter_) to = std::min(to, emitter_->boundary(at));
@@ -107,7 +111,8 @@ class EmissionWalk {
     return varies ? std::min(to, at + density_.longest()) : to;
   }
 
-  // Emission at t: radiance per length, or the radiance of the source.
+  // The emission at distance t: radiance per length, or, for emission per absorption, the radiance of the
+  // source.
   V3d source(double t) const {
     V3d e(m_.emission);
     if (!emitter_) return e;
@@ -121,7 +126,7 @@ class EmissionWalk {
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
   double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
 
-  // Absorbed share of the extinction.
+  // The share of the extinction at distance t that is absorption.
   C3 absorbing_at(double t) const {
     if (!m_.albedo[0]) return m_.absorbing;
     const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
@@ -140,7 +145,8 @@ class EmissionWalk {
     }
   }
 
-  // For intervals without density: only emission per length, whose integral over the grid is exact.
+  // Adds the emission of an interval [a, b] without density, where there is only emission per length; its
+  // integral over the grid is exact.
   void add_clear(double a, double b) {
     double field = b - a;
     for (int c = 0; c < 3; ++c) {
@@ -167,14 +173,16 @@ class EmissionWalk {
     for (int c = 0; c < channels_; ++c) through_[c] *= std::exp(-m_.sigma_t[c] * whole);
   }
 
-  // Samples the point where this channel's light is absorbed on the interval.
+  // Samples, by the random number u, the point of the interval [a, b] at which light of a channel is
+  // absorbed. s is the channel's extinction per density, and `absorbed` the share of light that the interval
+  // absorbs.
   double absorption_point(double a, double b, double s, double absorbed, double u) const {
     const Passage p = density_.pass(*m_.density, a, b, absorption_depth(u, s, absorbed));
     return p.reached ? density_.distance(p.t) : b;
   }
 
-  // Emission per absorption, sampled proportionally to absorption: the density cancels, and a constant source
-  // has no noise at all.
+  // Adds emission per absorption on [a, b], sampled in proportion to absorption: the density cancels, and a
+  // constant source has no noise at all. `whole` is the density integrated over the interval.
   void add_source(int c, double a, double b, double whole, double u) {
     const double s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
     if (!(absorbed > 0)) return;
@@ -185,14 +193,17 @@ class EmissionWalk {
     add(c, e, absorbed);
   }
 
-  // Emission per length, sampled as if the density were constant along the interval; exact if it is.
+  // Adds emission per length on [a, b], sampled as if the density were constant along the interval. If it is
+  // constant, the samples are distributed exactly as the transmittance. `whole` is the density integrated
+  // over the interval.
   void add_thin(int c, double a, double b, double whole, double u) {
     const double h = b - a, s = m_.sigma_t[c], k = s * whole / h, t = truncated_exponential(u, k, h);
     add(c, source(a + t), h * mean_transmittance(k * h) * std::exp(k * t - s * depth(a, a + t)));
   }
 
-  // Two samples combined by the balance heuristic, one uniform and one proportional to absorption, so that
-  // emission is found both in the gaps of a dense cell and at its surface.
+  // Adds emission per length on [a, b] by two samples that are combined by the balance heuristic, one uniform
+  // and one proportional to absorption. So emission is found both in the gaps of a dense cell and at its
+  // surface.
   void add_thick(int c, double a, double b, double whole, double u, double v) {
     const double h = b - a, s = m_.sigma_t[c], absorbed = -std::expm1(-s * whole);
     for (const double t : {a + u * h, absorption_point(a, b, s, absorbed, v)}) {
@@ -201,7 +212,7 @@ class EmissionWalk {
     }
   }
 
-  // Russian roulette, as for transmittance.
+  // Russian roulette, as for transmittance (medium.h): if it returns false, the integration ends.
   bool goes_on() {
     double largest = 0;
     for (int c = 0; c < channels_; ++c) largest = std::max(largest, through_[c]);
@@ -243,7 +254,7 @@ C3 emission_of_length(const Medium& m, float t_max) {
 
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
   if (m.by_channel[0]) {
-    // Each channel as if all channels had its density.
+    // Each channel is computed as if all channels had its density.
     C3 light;
     for (int c = 0; c < 3; ++c) {
       Medium one = m;

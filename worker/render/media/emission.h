@@ -11,10 +11,12 @@
 
 namespace ls::render {
 
-// Over the length t_max of a homogeneous medium; t_max may be infinite. Infinite if the integral diverges.
+// The emission, attenuated, over the length t_max of a homogeneous medium. t_max may be infinite; the result
+// is infinite if the integral diverges.
 C3 emission_of_length(const Medium& m, float t_max);
 
-// Along o + t d (d of unit length) up to t_max; an unbiased estimate.
+// An unbiased estimate of the attenuated emission of a grid along o + t d, from t = 0 to t_max; d is of unit
+// length.
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream);
 
 }  // namespace ls::render

@@ -1,4 +1,4 @@
-// Sampling of the points on a ray interval at which medium emission is evaluated (emission.cpp).
+// Samples the points on an interval of a ray at which medium emission is evaluated (emission.cpp).
 #pragma once
 
 #include <algorithm>
@@ -6,11 +6,11 @@
 
 namespace ls::render {
 
-// (1 - e^-x) / x: the mean of e^-t over [0, x].
+// The mean of e^-t over [0, x]: (1 - e^-x) / x.
 inline double mean_transmittance(double x) { return x > 0 ? -std::expm1(-x) / x : 1; }
 
-// Samples t in [0, h] with density proportional to e^(-k t); uniform where that is constant to double
-// precision.
+// Samples t in [0, h] with density proportional to e^(-k t) from the random number u. Where that density is
+// constant to double precision, t is uniform.
 inline double truncated_exponential(double u, double k, double h) {
   if (!(k * h > 1e-14)) return u * h;
   return std::min(h, -std::log1p(u * std::expm1(-k * h)) / k);
@@ -19,10 +19,12 @@ inline double truncated_exponential_pdf(double t, double k, double h) {
   return std::exp(-k * t) / (h * mean_transmittance(k * h));
 }
 
-// For a field of density rho on an interval that absorbs the share `absorbed` of the light: the integral of
-// rho up to the sampled point. s: extinction per density.
+// Samples a point on an interval with a field of density rho. The interval absorbs the share `absorbed` of
+// the light, s is the extinction per density and u a random number. Returns the integral of rho up to the
+// sampled point.
 inline double absorption_depth(double u, double s, double absorbed) { return -std::log1p(-u * absorbed) / s; }
-// Its density, per unit length, at a point of density rho with transmittance `rest`.
+// The density, per unit length, with which absorption_depth() samples a point where the field has the density
+// rho and up to which the transmittance is `rest`.
 inline double absorption_pdf(double s, double rho, double rest, double absorbed) {
   return s * rho * rest / absorbed;
 }

@@ -9,12 +9,12 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Interpolating eight float32 numbers can exceed their maximum by a few ulps (docs/measurements/stability.md
-// N09).
+// Bounds of a cell are multiplied by kInflate, because interpolation between eight float32 numbers can exceed
+// their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
 
-// The part of [t0, t1] inside the box; empty if t0 > t1. A ray parallel to a face and outside of it has an
-// empty part; if inside, that face does not limit it.
+// The part of an interval of a ray that lies inside a box: [t0, t1], empty if t0 > t1. A ray parallel to a
+// face and outside of it has an empty part; if inside, that face does not limit it.
 struct Interval {
   double t0, t1;
 };
@@ -57,8 +57,8 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
   use_cells(wanted_cell_size(density_to_sigma));
 }
 
-// Surrounds the grid by one layer of nodes from the opposite end, so that interpolation needs no test for the
-// end and macro cells bound these values too. Index coordinates grow by one.
+// Surrounds the grid by one layer of nodes copied from the opposite end, so that interpolation needs no test
+// for the end, and macro cells bound the values interpolated there too. All index coordinates grow by one.
 void Grid::repeat_ends() {
   const std::array<int, 3> n = size_;
   const std::vector<float> inner = std::move(values_);
@@ -116,8 +116,9 @@ Grid Grid::mean(const Grid& a, const Grid& b, const Grid& c) {
 }
 
 int Grid::wanted_cell_size(double density_to_sigma) const {
-  // Target: majorant x cell diagonal of about 1.44 (Fong et al. 2017, section 3.3), between 4 and 16 voxels:
-  // smaller cells cost more steps than the null collisions they save, larger ones bound too loosely.
+  // The target is that majorant times cell diagonal is about 1.44 (Fong et al. 2017, section 3.3), with cells
+  // of 4 to 16 voxels a side. Smaller cells cost more steps than the null collisions they save; larger ones
+  // bound the density too loosely.
   const Affine inverse = exact_.inverse();
   const double voxel = inverse.vector({1, 1, 1}).length();
   const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
@@ -137,8 +138,8 @@ void Grid::use_cells(int cell_size) {
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
-  // All nodes that interpolation inside the cell can touch: one more on each side than the cell covers,
-  // because the traversal's positions are rounded.
+  // [a, b] are all the nodes that interpolation inside the cell can touch: one more on each side than the
+  // cell covers, because the traversal's positions are rounded.
   int a[3], b[3];
   const int c[3] = {x, y, z};
   for (int k = 0; k < 3; ++k) {
@@ -174,12 +175,13 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
     const V3 q(o + d * t);
     return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
   };
-  // Two-point Gauss-Legendre: exact for the cubic that a trilinear field is along a line.
+  // Two-point Gauss-Legendre quadrature is exact for the cubic that a trilinear field is along a line.
   const auto integral = [&](double a, double length) {
     const double middle = a + length / 2, g = length * .28867513459481288;  // 1 / (2 sqrt 3)
     return length / 2 * (value_at(middle - g) + value_at(middle + g));
   };
-  // Planes that separate the field's patches: through nodes, or half way between them.
+  // The planes that separate the field's patches go through the nodes, or, without interpolation, half way
+  // between them.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   double plane[3], exit[3];
   for (int k = 0; k < 3; ++k) {
@@ -195,7 +197,7 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
     const double b = std::max(a, std::min<double>(t1, exit[k])), here = integral(a, b - a);
     if (p.integral + here >= wanted) {
       const double rest = wanted - p.integral;
-      // Newton's method with a bracket: the integral is monotonic.
+      // The point is found by Newton's method with a bracket, which works because the integral is monotonic.
       double lo = 0, hi = b - a, h = here > 0 ? hi * std::min(1., rest / here) : 0;
       for (int i = 0; i < 32; ++i) {
         const double excess = integral(a, h) - rest;
@@ -221,7 +223,8 @@ double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) co
   const V3d oi = exact_.point(o), di = exact_.vector(d);
   const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
   if (!(part.t0 < part.t1)) return 0;
-  // All crossings of these planes, in order; between two the field is one polynomial.
+  // `cuts` holds all crossings of the planes that separate the field's patches, in order; between two of them
+  // the field is one polynomial.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {

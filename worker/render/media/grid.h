@@ -1,4 +1,4 @@
-// A dense scalar grid, interpolated or not, with macro cells that bound its values.
+// A dense scalar grid, interpolated or not. Its macro cells, blocks of voxels, store bounds of its values.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +16,16 @@
 
 namespace ls::render {
 
-// Bounds of the density over the cell, inflated so that interpolation in float32 stays inside, and the
-// control value for ratio tracking.
+// What is stored of one macro cell: bounds of the density in it, inflated so that values interpolated in
+// float32 stay within them, and the control value for ratio tracking.
 struct MacroCell {
   float hi = 0;        // >= any interpolated value
   float control = 0;   // near the mean
   float residual = 0;  // >= |value - control|
 };
 
-// Result of integrating the field along a ray interval: stops where the integral reaches the wanted value,
-// else at the end.
+// The result of integrating the field along an interval of a ray. Integration stops at the t where the
+// integral reaches a wanted value (`reached`), else at the end of the interval.
 struct Passage {
   bool reached = false;
   float t = 0;
@@ -35,28 +35,30 @@ struct Passage {
 class Grid {
  public:
   Grid() = default;
-  // Values at integer index coordinates, x fastest. `world_to_index` maps world points to index coordinates.
-  // The grid exists inside [domain_lo, domain_hi] (index coordinates, which may reach beyond the outermost
-  // nodes: there values are clamped) and is 0 outside. `density_to_sigma`: the largest extinction per unit of
-  // value (world units); determines the size of macro cells. `wrap`: how nodes continue beyond the ends;
-  // unless it is `clamp`, the domain must be that of cell centres, [-1/2, n - 1/2].
+  // `values` are those at the nodes, the integer index coordinates, x fastest. `world_to_index` maps world
+  // points to index coordinates. The grid exists inside [domain_lo, domain_hi] (index coordinates, which may
+  // reach beyond the outermost nodes: there values are clamped) and is 0 outside. `density_to_sigma` is the
+  // largest extinction per unit of value, in world units; it determines the size of macro cells. `wrap` says
+  // how the nodes continue beyond the ends; unless it is `clamp`, the domain must be that of values at cell
+  // centres, [-1/2, n - 1/2] for n nodes.
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
 
-  // In double: for a grid that is small in its world, the terms of the index coordinates are large and nearly
-  // cancel.
+  // The index coordinates of the world point p. They are computed in double, because for a grid that is small
+  // in its world their terms are large and nearly cancel.
   V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
   VolumeFilter filter() const { return filter_; }
-  // Value at index coordinates inside the domain. kFilter must equal filter(); a template parameter so that
-  // callers decide once for many values.
+  // The value at index coordinates inside the domain. kFilter must equal filter(); it is a template parameter
+  // so that callers decide once for many values.
   template <VolumeFilter kFilter>
   float value(const V3& index) const {
     LS_COUNT(density);
     if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
     return nearest(index);
   }
-  // Value at any index coordinates, with either filter: beyond the domain the grid continues as `wrap` says.
+  // The value at any index coordinates, with the grid's own filter. Beyond the domain the grid continues as
+  // `wrap` says.
   float value_anywhere(const V3& index) const {
     LS_COUNT(density);
     const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
@@ -80,7 +82,8 @@ class Grid {
     const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
     return std::max(0.f, c0 + f[2] * (c1 - c0));
   }
-  // Value of the node whose cell contains the point; on a face between two cells, of the higher index.
+  // The value of the node whose cell contains the point. On a face between two cells it is that of the cell
+  // with the higher index.
   float nearest(const V3& index) const {
     std::size_t i[3];
     const float q[3] = {index.x, index.y, index.z};
@@ -101,25 +104,25 @@ class Grid {
   std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
   std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
 
-  // Sets the macro cells to this many voxels a side, regardless of density: for grids that are traversed
-  // together.
+  // Makes the macro cells `size` voxels wide along each axis, whatever the density. Grids that are traversed
+  // together need cells of the same size.
   void use_cells(int size);
   bool same_values(const Grid& other) const { return values_ == other.values_; }
-  // Requires grids of the same shape.
+  // The grid whose values are the means of those of a, b and c, which must have the same shape.
   static Grid mean(const Grid& a, const Grid& b, const Grid& c);
 
-  // Number of values above `limit`.
+  // The number of values above `limit`.
   std::uint64_t count_above(float limit) const;
 
-  // Integrates voxel by voxel along origin + t direction in index coordinates, over the finite interval [t0,
-  // t1]; exact up to float32 rounding. Used instead of tracking where that would meet more collisions than
-  // voxels.
+  // Integrates the field voxel by voxel along origin + t direction, in index coordinates, over the finite
+  // interval [t0, t1]. It stops early where the integral reaches `wanted`. Exact up to float32 rounding. Used
+  // in place of tracking where a tracker would have more collisions than the ray crosses voxels.
   Passage pass(const V3& origin, const V3& direction, float t0, float t1,
                double wanted = std::numeric_limits<double>::infinity()) const;
 
   // Integral of the field along o + t d, t in [t0, t1]: exact up to rounding (within a voxel the field is a
-  // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). Has no variance: the
-  // reference for tests of the trackers.
+  // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). It has no variance, so
+  // the tests of the trackers use it as the reference.
   double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
 
  private:
@@ -137,7 +140,7 @@ class Grid {
   Affine exact_;  // world to index, not rounded to float32
   VolumeFilter filter_ = VolumeFilter::trilinear;
   Wrap wrap_ = Wrap::clamp;
-  bool padded_ = false;  // a layer of nodes from the opposite end surrounds the given ones
+  bool padded_ = false;  // a layer of nodes copied from the opposite end surrounds the given ones
   float max_value_ = 0;
   int cell_size_ = 8;
   std::array<int, 3> cells_{};
@@ -168,16 +171,16 @@ class CellWalk {
     return true;
   }
   const MacroCell& cell() const { return *cell_; }
-  // Index of the cell in the cell table of `walked`, the traversed grid.
+  // The index of the current cell in the cell table of `walked`, which must be the traversed grid.
   std::size_t number(const Grid& walked) const {
     return static_cast<std::size_t>(cell_ - walked.macro_.data());
   }
-  // The cell's interval, measured from entry().
+  // The interval of the ray in the current cell, as distances from the point of entry.
   float begin() const { return begin_; }
   float end() const { return end_; }
-  // Distance from the ray's origin to the point of entry.
+  // The distance from the ray's origin to the point where it enters the grid.
   double entry() const { return entry_; }
-  // Index coordinates at t: origin() + t * direction().
+  // The index coordinates at distance t from the point of entry: origin() + t * direction().
   V3 index(float t) const { return origin_ + direction_ * t; }
   const V3& origin() const { return origin_; }
   const V3& direction() const { return direction_; }
@@ -188,7 +191,8 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary i lies at first + i * spacing; number of cells ahead; stride in the cell table.
+  // Per axis: boundary i between cells lies at the distance first_ + i * spacing_; left_ is the number of
+  // cells ahead, and stride_ the step in the cell table to the next one.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];
@@ -199,8 +203,8 @@ class CellWalk {
 inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1) {
   const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
   if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
-  // Components too small to cross a cell within the ray count as parallel to the faces: a ray outside them
-  // meets nothing.
+  // If a component of the direction is too small for the ray to cross a cell along that axis, the ray counts
+  // as parallel to that axis's faces of the domain; if it starts outside of them, it meets nothing.
   constexpr double kParallel = 1e-20;
   double from = t0, to = t1, inverse[3];
   for (int k = 0; k < 3; ++k) {

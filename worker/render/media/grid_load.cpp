@@ -16,7 +16,7 @@ namespace {
 bool is_vdb(std::string_view name) { return name.ends_with(".vdb") || name.ends_with(".nvdb"); }
 bool is_raw(std::string_view name) { return name.ends_with(".bin"); }
 
-// World to index, given scene to index.
+// The map from world to index coordinates, given that from scene to index coordinates.
 Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
   return scene_to_index * Affine::scale_translate(1 / scale, center);
 }
@@ -39,7 +39,7 @@ std::vector<float> channel(std::span<const float> interleaved, std::size_t c, st
   return values;
 }
 
-// A .vol file, or a raw grid, whose values are nodes that span its own box from face to face.
+// Loads a .vol file, or a raw grid, whose values are at nodes that span its own box from face to face.
 Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
   auto path = files.path(v.file);
@@ -106,8 +106,8 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
   out.clamped = raw.negatives;
-  // Values are at nodes. They fall to the background within one voxel of the active ones, where the grid
-  // ends, so wrapping has no effect.
+  // Values are at nodes. Within one voxel of the active voxels they fall to the background value; there the
+  // grid ends, so wrapping has no effect.
   for (std::size_t c = 0; c < of; ++c)
     out.channels.emplace_back(size, channel(values, c, of),
                               from_world(nodes_to_scene.inverse(), center, scale), V3d(0),

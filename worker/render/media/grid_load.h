@@ -1,4 +1,4 @@
-// Loads a scene's volume as grids in the world.
+// Loads one volume of the scene as grids in world space.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,9 @@ struct LoadedVolume {
   std::uint64_t clamped = 0;   // negative values set to 0
 };
 
-// Grids of the volume's channels. `center`, `scale`: scene to world. `to_sigma`: largest extinction per unit
-// of value, in world units. invalid_argument names the file and its fault.
+// Loads the grids of the volume's channels. `center` and `scale` map scene to world coordinates: p' = (p -
+// center) * scale. `to_sigma` is the largest extinction per unit of value, in world units. Fails with
+// invalid_argument if the file is at fault; the message names the file and the fault.
 Result<LoadedVolume> load_volume(const Volume& volume, const AssetLoader& files, V3d center, double scale,
                                  double to_sigma);
 

@@ -1,6 +1,6 @@
-// Participating media: free flight and transmittance. Homogeneous media in closed form; grids by delta
-// tracking with local majorants and residual ratio tracking (Novak et al. 2014) with one control value per
-// macro cell.
+// Participating media: free flight and transmittance. In homogeneous media both have a closed form. In grids
+// they are found by delta tracking with local majorants and residual ratio tracking (Novak et al. 2014) with
+// one control value per macro cell.
 //
 // Chromatic extinction: one channel, the hero, drawn once per path, decides every distance. A flight returns
 // the path weight relative to the hero (`weight`) and each channel's density of what was sampled, relative to
@@ -27,32 +27,34 @@ namespace ls::render {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// What emission is proportional to: length, or absorption.
+// What a medium's emission is proportional to: length, or absorption. For black_body it is proportional to
+// absorption, and the factor is the radiance of a black body.
 enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
 
-// Lights for which segments through a medium are also sampled equi-angularly (vertex_nee.h): none, point
-// lights, or all lights with a position.
+// The lights about which segments through a medium are also sampled equi-angularly (vertex_nee.h): none,
+// point lights, or all lights with a position.
 enum class EquiangularMode : std::uint8_t { none, points, places };
 
 struct Medium {
   bool grid = false;
   EquiangularMode equiangular_mode = EquiangularMode::none;
-  // Homogeneous: extinction and scattering [1/world unit]. Grid: extinction per unit of density; scattering
-  // is albedo times it.
+  // For a homogeneous medium: the extinction and scattering coefficients [1/world unit]. For a grid: sigma_t
+  // is the extinction per unit of density, and sigma_s is the albedo times sigma_t.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
-  // Null, or one density grid per channel: three grids of the same shape with the same macro cells. Then
-  // `density` is their mean, which is used to place points, and sigma_t is the same for all
-  // (spectral_grids.h).
+  // Null, or, if the density differs between channels, one density grid per channel: three grids of the same
+  // shape with macro cells of the same size. Then `density` is the mean of the three, which is used to place
+  // points, and sigma_t is the same for all channels (spectral_grids.h).
   std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
-  // For a grid with constant albedo: 1 - albedo, stored separately because 1 - (1 - 1e-7) in float32 is off
-  // by a fifth.
+  // For a grid with constant albedo, this is 1 - albedo, the share of extinction that is absorption. It is
+  // stored separately because 1 - (1 - 1e-7) in float32 is off by a fifth.
   C3 absorbing{1, 1, 1};
   HenyeyGreenstein phase;
-  // Emission (emission.h). Homogeneous: `emission` [radiance per world unit]. Grid: `emission` times the
-  // emitter's value, or times a black body's radiance at offset + scale times that value [K]; unless
-  // per_length, also times the absorption coefficient.
+  // The emission (emission.h). A homogeneous medium emits `emission` [radiance per world unit]. A grid emits
+  // `emission` times the value of the grid `emitter`; for black_body, `emission` times the radiance of a
+  // black body at kelvin_offset + kelvin_scale times that value [K]. Unless the kind is per_length, this is
+  // also multiplied by the absorption coefficient.
   EmissionKind emission_kind = EmissionKind::none;
   C3 emission{0, 0, 0};
   std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
@@ -60,7 +62,7 @@ struct Medium {
   int priority = 0;  // of overlapping media, those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 
-  // Scattering coefficient per unit of extinction density at a point of a grid.
+  // The scattering coefficients per unit of density at the world point p of a grid.
   C3 scattering_at(const V3& p) const {
     if (!albedo[0]) return sigma_s;
     C3 s;
@@ -79,20 +81,22 @@ struct Flight {
   C3 density{1, 1, 1};  // only meaningful in chromatic code
 };
 
-// A density above its bound would bias the result silently, so it is counted.
+// Counts how often a density above the bound of its macro cell was found. Such a density biases the result
+// without any other sign.
 struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
 
-// For grids with a density per channel; called by chromatic code only (spectral_grids.cpp).
+// free_flight() and transmittance() for grids with a density per channel (spectral_grids.cpp). Only chromatic
+// code calls them.
 Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                     RandomStream stream, MediumCounters& counters);
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream);
 
 namespace detail {
 
-// T_c / T_hero over a length: one exponential of the difference, never a quotient of underflowed ones; 1 if
-// they are equal.
+// The transmittance of channel c over that of the hero along `length`. It is one exponential of the
+// difference, because a quotient of two exponentials could be 0 / 0; exactly 1 if the extinctions are equal.
 inline float transmittance_ratio(float sigma_c, float sigma_hero, float length) {
   const float diff = sigma_c - sigma_hero;
   return diff == 0 ? 1.f : std::exp(-diff * length);
@@ -124,20 +128,21 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
 // gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
 inline constexpr float kExactDepth = 16;
 
-// `depth`: the optical depth of the first tentative collision; the stream provides the rest.
+// The free flight through a grid. `depth` is the optical depth up to the first tentative collision; the
+// random numbers of the others come from `stream`.
 template <bool kChromatic, VolumeFilter kFilter>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
   const float s = m.sigma_t[hero];
-  // The choice of exactly integrated cells must not depend on the hero: all channels must weight the same
-  // experiment.
+  // Which cells are integrated exactly must not depend on the hero, because the densities of all channels
+  // must refer to the same way of sampling.
   const float s_max = kChromatic ? max_component(m.sigma_t) : s;
-  // integral of the majorant, or, where integrated exactly, of the density
+  // The integral, so far, of the majorant or, in cells that are integrated exactly, of the density.
   [[maybe_unused]] double passed = 0;
   [[maybe_unused]] int nulls = 0;
-  // T_c / T_hero times the null collisions' sigma_c / s, combined because each factor alone may overflow
-  // float32.
+  // The ratio of the transmittances of channel c and the hero, times sigma_c / s for each null collision.
+  // Both are combined because each factor alone may overflow float32.
   [[maybe_unused]] const auto ratio = [&](int c, double integral) {
     const float sigma = m.sigma_t[c];
     if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
@@ -162,7 +167,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
   for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
     const float hi = w.cell().hi, length = w.end() - w.begin(), rate = s * hi, room = rate * length;
     if (s_max * hi * length > kExactDepth) [[unlikely]] {
-      // A hero without extinction passes through; the other channels still need the integral.
+      // A hero without extinction passes through the cell, but the other channels still need the integral.
       const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
                                         s > 0 ? double{depth} / s : std::numeric_limits<double>::infinity());
       if (p.reached) return scatter(w.entry() + p.t, passed + p.integral);
@@ -171,7 +176,8 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       continue;
     }
     if (rate > 0) {
-      // optical depth used up within the cell: distances from the cell's own beginning stay exact
+      // `gone` is the optical depth measured from the beginning of this cell, so that small distances in it
+      // stay exact.
       float gone = depth;
       for (; gone < room; gone += stream.exponential()) {
         const float t = std::min(w.begin() + gone / rate, w.end());
@@ -191,11 +197,11 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
   return f;
 }
 
-// Russian roulette of transmittance: below e^-4 a tracker survives with probability estimate / e^-4 and
-// continues with e^-4. The estimate so far decides, not the control's depth alone: a ray that misses the
-// dense voxel of an otherwise empty cell has a deep control there, compensated by its factors to a
-// transmittance of 1 (docs/measurements/stability.md N10). Only where there is a residual to track: constant
-// densities cost nothing, and their tails are exact (N05).
+// Russian roulette of transmittance: once its estimate is below e^-4, a tracker survives with probability
+// estimate / e^-4 and continues with the estimate e^-4. The estimate so far decides, not the control's depth
+// alone: a ray that misses the dense voxel of an otherwise empty cell has a deep control there, compensated
+// by its factors to a transmittance of 1 (docs/measurements/stability.md N10). Roulette is played only in
+// cells with a residual to track: constant densities cost nothing, and their tails are exact (N05).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -208,7 +214,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   // deep, so that both stay within float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
-  // Remaining optical depth of the residual up to the next collision; the remainder carries over from cell to
+  // The optical depth of the residual that remains up to the next collision; it carries over from cell to
   // cell.
   float left = stream.exponential();
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
@@ -276,8 +282,8 @@ template <bool kChromatic>
 
 }  // namespace detail
 
-// Distance to the next scattering along o + t d (d of unit length), or none before t_max. `bits` determines
-// the first tentative collision, `stream` the others.
+// Samples the distance to the next scattering along o + t d (d of unit length), if there is one before t_max.
+// The random word `bits` determines the first tentative collision, `stream` the others.
 template <Features F>
 Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, const V3& d, float t_max,
                    RandomStream stream, MediumCounters& counters) {
@@ -296,12 +302,13 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
 
-// The Flight of a medium known to have been crossed unscattered up to t, because another medium at the same
-// place ended the flight there. Grids use the exact depth, so the result does not depend on how this is
-// known.
+// The Flight (weight and density) through the medium m if it is known that the path was not scattered by m up
+// to t, because another medium at the same place ended the flight there. In grids the exact optical depth is
+// used, so that the result does not depend on how this is known.
 Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 
-// Unbiased estimate (exact where homogeneous) of the transmittance between t0 and t1.
+// An unbiased estimate of the transmittance along o + t d between t0 and t1; in homogeneous media the exact
+// value.
 template <Features F>
 C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   if constexpr (F.grids) {

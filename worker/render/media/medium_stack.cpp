@@ -18,8 +18,9 @@ void MediaState::stand(const SurfaceInfo& s, bool outside, bool through, const s
   settle(media);
 }
 
-// A sheet bounds a body together with others, or no body: a path may go around its edge, and is then already
-// inside.
+// Adds a body to those that the path is in. A sheet is a surface that is not closed: it bounds a body only
+// together with others, or none at all. A path may have come around its edge; then it is inside already, and
+// nothing is added.
 void MediaState::enter(const Body& b, bool sheet) {
   if (sheet && std::find(body_.begin(), body_.begin() + bodies_, b) != body_.begin() + bodies_) return;
   if (bodies_ == kCapacity) {
@@ -29,9 +30,9 @@ void MediaState::enter(const Body& b, bool sheet) {
   body_[static_cast<std::size_t>(bodies_++)] = b;
 }
 
-// A path that leaves a body without having entered it began inside: the background then counted as the
-// interior. The boundary's exterior becomes the background if nothing else accounts for it, but not if the
-// body was entered from a place that has a medium.
+// Removes a body from those that the path is in. A path that leaves a body without having entered it began
+// inside of it, with the body's interior counted as its background. The boundary's exterior becomes the
+// background if nothing else accounts for it, but not if the body was entered from a place that has a medium.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;

@@ -3,7 +3,7 @@
 // A boundary has an interior and an exterior medium, either of which may be none. For nested or intersecting
 // boundaries, the media at a point are the background's, plus the interior and minus the exterior of every
 // boundary around the point, so the result does not depend on the order in which a path crosses them. Of
-// these, the media of the highest priority are in effect, all at once.
+// these, the media of the highest priority are in effect, all of them together.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,8 @@
 
 namespace ls::render {
 
-// For scenes without overlaps: the medium of the side of the last boundary (Mitsuba's rule).
+// The medium of a path in scenes without overlaps: the one that the last boundary crossed has on the side
+// where the path is (Mitsuba's rule).
 struct OneMedium {
   std::uint32_t medium = kNone;
 
@@ -29,11 +30,11 @@ struct OneMedium {
 
 class MediaState {
  public:
-  // The most boundaries that a path may be inside of at once. One more makes the sample an error, which is
-  // counted.
+  // The largest number of boundaries that a path may be inside of at the same time. If it enters one more,
+  // the sample is rejected and counted.
   static constexpr int kCapacity = 32;
 
-  // Copied for every shadow ray, so only the used part is copied.
+  // The state is copied for every shadow ray; to save time, only the used parts of the arrays are copied.
   MediaState() = default;
   MediaState(const MediaState& o) { *this = o; }
   MediaState& operator=(const MediaState& o) {
@@ -49,18 +50,19 @@ class MediaState {
   bool any() const { return count_ > 0; }
   bool several() const { return count_ > 1; }
   std::uint32_t one() const { return effect_[0]; }
-  // The media in effect, in ascending order; one that is present twice is listed twice.
+  // The indices of the media in effect, in ascending order. A medium that is present twice is listed twice.
   std::span<const std::uint32_t> all() const { return {effect_.data(), static_cast<std::size_t>(count_)}; }
   bool overflowed() const { return overflowed_; }
 
-  // For scenes without overlaps.
+  // Makes m the only medium (none if m is kNone); for scenes without overlaps.
   void only(std::uint32_t m) {
     effect_[0] = m;
     count_ = m != kNone;
   }
-  // Starts outside of all boundaries.
+  // Sets the state of a path that starts outside of all boundaries, in the medium `background`.
   void start(std::uint32_t background, const std::vector<Medium>& media);
-  // Moves to this side of the boundary. `through`: coming from the other side.
+  // Updates the state of a path that now is on one side of the boundary s: outside, or else inside. `through`
+  // is true if it came from the other side.
   void stand(const SurfaceInfo& s, bool outside, bool through, const std::vector<Medium>& media);
 
  private:

@@ -16,7 +16,8 @@ struct PhaseSample {
 struct HenyeyGreenstein {
   float g = 0;
 
-  // w: direction of travel before the scattering, w1: after. Integrates to 1 over w1.
+  // The phase function [1/sr] for the direction of travel w before and w1 after the scattering. It integrates
+  // to 1 over w1.
   float value(const V3& w, const V3& w1) const {
     LS_COUNT(phase);
     const V3 diff = g >= 0 ? w - w1 : w + w1;  // x measured from the peak

@@ -1,4 +1,4 @@
-// The part of a ray in one medium, from the path's current position to the next surface.
+// A segment: the part of a ray from the path's current position, in a medium, to the next surface.
 #pragma once
 
 #include "worker/render/geometry/geometry.h"

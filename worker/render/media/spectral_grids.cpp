@@ -7,7 +7,7 @@ namespace {
 
 const Grid& grid_of(const Medium& m, int c) { return *m.by_channel[static_cast<std::size_t>(c)]; }
 
-// The channels' macro cells at a walk's position.
+// The macro cells of the three channels' grids at the current position of the walk w.
 struct Cells {
   Cells(const Medium& m, const CellWalk& w) {
     const std::size_t k = w.number(grid_of(m, 0));
@@ -18,22 +18,24 @@ struct Cells {
   const MacroCell* of[3];
 };
 
-// One flight. Uses logarithms of densities, as they exceed the range of float32.
+// The state of one flight. It keeps the logarithms of the channels' densities, because the densities exceed
+// the range of float32.
 class ChannelFlight {
  public:
   ChannelFlight(const Medium& m, int hero, const V3& o, const V3& d) : m_(m), hero_(hero), o_(o), d_(d) {}
 
   void pass(int c, double depth) { log_[c] -= depth; }
-  // Accounts for null collisions. `product`: of (majorant - density), relative to the hero's.
+  // Accounts for null collisions. `product` is, for each channel, the product over these collisions of
+  // (majorant - density), relative to that of the hero.
   void add_nulls(const double (&product)[3]) {
-    // log 0: such a flight is impossible in that channel
+    // A product of 0 gives the logarithm -infinity: such a flight is impossible in that channel.
     for (int c = 0; c < 3; ++c) log_[c] += std::log(product[c]);
   }
   Flight scattered(double t, const C3& rho) const {
     Flight f;
     f.scattered = true;
     f.t = static_cast<float>(t);
-    // Rounding may place the end of a cell's integral where the hero has no density; very rare.
+    // By rounding, an integral over a cell may, very rarely, end where the hero has no density.
     if (!(rho[hero_] > 0)) {
       f.weight = C3(0);
       return f;
@@ -82,7 +84,7 @@ Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V
   for (CellWalk w(grid_of(m, 0), o, d, 0, t_max); w.next();) {
     const Cells cells(m, w);
     const float length = w.end() - w.begin(), hi = cells.of[hero]->hi, rate = s * hi, room = rate * length;
-    // The choice of exactly integrated cells must not depend on the hero.
+    // Which cells are integrated exactly must not depend on the hero (see fly_grid in medium.h).
     if (s * cells.hi() * length > detail::kExactDepth) [[unlikely]] {
       const Passage p =
           grid_of(m, hero).pass(w.origin(), w.direction(), w.begin(), w.end(), double{depth} / s);
@@ -129,8 +131,8 @@ Flight passed_channels(const Medium& m, int hero, const V3& o, const V3& d, floa
   return flight.through(t);
 }
 
-// One collision process for all channels, at the rate of the largest residual; otherwise as
-// transmittance_grid.
+// One collision process serves all channels, at the rate of the largest residual. Otherwise this is the same
+// as transmittance_grid (medium.h).
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1,
                           RandomStream stream) {
   const float s = m.sigma_t.x;

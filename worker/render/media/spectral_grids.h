@@ -1,21 +1,22 @@
-// Grids whose density differs between channels (files with three channels): the free flight, transmittance
-// and passage functions of medium.h.
+// The functions of medium.h (free flight, transmittance and passed()) for grids whose density differs between
+// channels, that is, from files with three channels.
 //
-// Each channel has its own local majorant; the hero's decides the tentative collisions and their type. The
-// density that another channel's majorants would have given the same collisions goes into the flight's
-// `density`: the transmittance of that majorant, times its probability of null collisions. Dividing by the
-// mean of these is the balance heuristic over channels, which keeps weights below 3 where the quotients are
-// unbounded.
+// Each channel has its own local majorant. That of the hero (the channel that decides distances: medium.h)
+// determines the tentative collisions and their type. The density that another channel's majorants would have
+// given the same collisions goes into the flight's `density`: the transmittance of that majorant, times its
+// probability of null collisions. Dividing by the mean of these is the balance heuristic over channels, which
+// keeps weights below 3 where the quotients are unbounded.
 #pragma once
 
 #include "worker/render/media/medium.h"
 
 namespace ls::render {
 
-// Densities of the channels at index coordinates inside the domain of m.by_channel (or m.density).
+// The densities of the three channels at index coordinates inside the domain of m.by_channel, or, if that is
+// null, of m.density.
 C3 densities(const Medium& m, const V3& index);
 
-// passed() of medium.h, for these grids.
+// The function passed() of medium.h for grids with a density per channel.
 Flight passed_channels(const Medium& m, int hero, const V3& o, const V3& d, float t);
 
 }  // namespace ls::render

@@ -1,5 +1,6 @@
-// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. It is shared with the child process
-// that reads them, and includes that process's reply, which the kernel does not count.
+// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. The child process that reads the
+// files may use no more than what this process has left of it. The child's reply, a mapped file, counts
+// towards the limit too, although the kernel does not count it.
 #pragma once
 
 #include <sys/resource.h>
@@ -15,7 +16,8 @@ namespace ls::render {
 
 inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
 
-// Bytes that this process may still allocate, as the limit counts them.
+// The number of bytes that this process may still allocate, as the limit counts them; kNoDataLimit if there
+// is no limit.
 inline std::uint64_t data_left() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kNoDataLimit;
@@ -25,8 +27,8 @@ inline std::uint64_t data_left() {
   return limit.rlim_cur - std::min<std::uint64_t>(bytes, limit.rlim_cur);
 }
 
-// Lowers the limit by this many bytes during its lifetime, for a mapped file, which the kernel does not
-// count.
+// An object of this class lowers the limit by `bytes` as long as it lives. This accounts for a mapped file of
+// that size, which the kernel does not count.
 class DataTaken {
  public:
   DataTaken() = default;

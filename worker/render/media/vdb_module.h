@@ -1,5 +1,5 @@
 // Interface of the reader of .vdb and .nvdb files (the file determines which it is), linked only into
-// lightshaft-vdb (vdb_process.h). Plain types: no type of OpenVDB crosses it.
+// lightshaft-vdb (vdb_process.h). It uses plain types only, so that no type of OpenVDB appears in it.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,9 @@ struct LsVdbGrid {
   std::uint64_t negatives;    // values below 0, set to 0
 };
 
-// 0: ok. 1: the file or grid is at fault; 2: a limit. `error` receives a message of at most error_size bytes.
+// Reads the grid `grid_name` of the file `path`. Returns 0 if all is well, 1 if the file or the grid is at
+// fault, and 2 if a limit is exceeded, such as max_values, the largest number of values. `error` receives a
+// message of at most error_size bytes.
 int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
                 char* error, std::uint64_t error_size);
 void ls_vdb_free(LsVdbGrid* grid);

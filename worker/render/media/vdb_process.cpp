@@ -38,7 +38,8 @@ struct Descriptor {
   const int fd;
 };
 
-// Environment for the child: only variables that the loader and sanitizers need, no secrets.
+// The environment of the child process: only the variables that the loader and the sanitizers need, so that
+// no secrets are passed to it.
 std::vector<char*> environment() {
   std::vector<char*> kept;
   for (char** e = environ; *e; ++e) {
@@ -50,7 +51,8 @@ std::vector<char*> environment() {
   return kept;
 }
 
-// Runs the program and returns its exit status; `reply` becomes its kVdbReplyFd.
+// Runs the program and returns its exit status. The program inherits the file descriptor `reply` as
+// kVdbReplyFd.
 Result<int> run(const std::filesystem::path& program, std::vector<std::string> arguments, int reply) {
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -126,8 +128,8 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   if (!status) return tl::unexpected(status.error());
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
-  // Processes left behind by the program may still hold the reply: seal it against changes before reading, or
-  // reject it.
+  // Processes that the program left behind may still have the reply open. So it is sealed against changes
+  // before it is read, and rejected if that fails.
   if (::fcntl(reply.fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE) != 0) return vdb_nonsense();
   struct stat written {};
   if (::fstat(reply.fd, &written) != 0) return no_program("fstat", errno);

@@ -17,8 +17,9 @@ namespace ls::render {
 
 class VdbFile {
  public:
-  // The grid of this name; with an empty name the only grid, or "density". invalid_argument: the file is at
-  // fault; resource_exhausted: a limit is exceeded; internal: the program could not be started.
+  // Reads the grid `grid_name` of the file `path`. If grid_name is empty, it reads the only grid, or the grid
+  // "density" if there are several. Fails with invalid_argument if the file is at fault, with
+  // resource_exhausted if a limit is exceeded, and with internal if the program could not be started.
   static Result<VdbFile> read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values,
                               const std::filesystem::path& program = program_beside_us());
@@ -27,7 +28,8 @@ class VdbFile {
   VdbFile& operator=(VdbFile&&) = delete;
   ~VdbFile();
 
-  // Sizes are at least 1, values finite and not negative, the transform finite.
+  // The grid that was read. Its sizes are at least 1, its values finite and not negative, and its transform
+  // is finite.
   const LsVdbGrid& grid() const { return grid_; }
 
  private:

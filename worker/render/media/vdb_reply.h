@@ -21,8 +21,8 @@ struct VdbReply {
 };
 static_assert(sizeof(VdbReply) <= kVdbValuesAt);
 
-// Number of values of a grid with 1 or 3 channels and sizes of at least 0; the largest number for any other
-// grid and on overflow.
+// The number of values of a grid with 1 or 3 channels and sizes of at least 0. For any other grid, and on
+// overflow, it is 2^64 - 1.
 inline std::uint64_t values_of(const LsVdbGrid& grid) {
   if (grid.channels != 1 && grid.channels != 3) return ~std::uint64_t{0};
   auto count = static_cast<std::uint64_t>(grid.channels);

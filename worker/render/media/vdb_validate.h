@@ -10,13 +10,13 @@
 
 namespace ls::render {
 
-// The grid of a reply, checked: at most max_values values, finite and not negative; sizes of at least 1; a
-// finite transform. Its values stay where they are in `reply`, which must be page-aligned, as mapped memory
-// is. invalid_argument: the file is at fault, or the reply is malformed; resource_exhausted: a limit is
-// exceeded.
+// Checks the grid of a reply and returns it: it has at most max_values values, finite and not negative, sizes
+// of at least 1 and a finite transform. Its values stay where they are in `reply`, which must be
+// page-aligned, as mapped memory is. Fails with invalid_argument if the file is at fault or the reply is
+// malformed, and with resource_exhausted if a limit is exceeded.
 Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t max_values);
 
-// The error for a malformed reply.
+// The error that the caller reports for a malformed reply.
 tl::unexpected<Error> vdb_nonsense();
 
 }  // namespace ls::render

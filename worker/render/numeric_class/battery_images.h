@@ -1,12 +1,13 @@
-// Small images in formats whose decoders may round differently. Textures feed the pixels, so decoding is part
-// of the numeric class. Each is a gradient with a pattern on it, in hexadecimal digits.
+// Small images in formats whose decoders may round differently. Textures determine pixels, so decoding is
+// part of the numeric class, the digest that identifies machines that render the same bits. Each image is a
+// gradient with a pattern on it, given as the bytes of its file in hexadecimal digits.
 #pragma once
 
 #include <string_view>
 
 namespace ls::render::battery {
 
-// 32 x 32 pixels, quality 75, chroma at half the resolution.
+// A JPEG file of 32 x 32 pixels, of quality 75, with chroma at half the resolution.
 inline constexpr std::string_view kJpeg =
     "ffd8ffe000104a46494600010100000100010000ffdb004300080606070605080707070909080a0c140d0c0b0b0c1912"
     "130f141d1a1f1e1d1a1c1c20242e2720222c231c1c2837292c30313434341f27393d38323c2e333432ffdb0043010909"
@@ -27,7 +28,7 @@ inline constexpr std::string_view kJpeg =
     "09feb9fdff007ac1a5622bbb48631cb5daaeda1c1bf8039e4574eba661c8ae55058dc0703b0fbddf6fb75ac6d0969b09"
     "1402c8e25e310e973dc242dfffd9";
 
-// 16 x 16, half, DWAA.
+// An OpenEXR file of 16 x 16 pixels of type half, with DWAA compression.
 inline constexpr std::string_view kDwa =
     "762f3101020000006368616e6e656c730063686c69737400370000004200010000000000000001000000010000004700"
     "0100000000000000010000000100000052000100000000000000010000000100000000636f6d7072657373696f6e0063"
@@ -69,7 +70,7 @@ inline constexpr std::string_view kDwa =
     "43084320439843003358438037c03400352038403b4035603c88408040d8409041a842d0415841404188413042384350"
     "42002af043002d0036903ea0400840a03ff03f8040684160400842c041d841504228431042a8435043";
 
-// 8 x 8, half, B44.
+// An OpenEXR file of 8 x 8 pixels of type half, with B44 compression.
 inline constexpr std::string_view kB44 =
     "762f3101020000006368616e6e656c730063686c69737400370000004200010000000000000001000000010000004700"
     "0100000000000000010000000100000052000100000000000000010000000100000000636f6d7072657373696f6e0063"
@@ -83,7 +84,7 @@ inline constexpr std::string_view kB44 =
     "8a4967ba9aeeb8b30e800027a8dfe628618e28628a17deba501a94f565dd9ee608218e4925b8001abb1dae8427aa9b97"
     "61962dbf20149e5d75f7e19259a7a2a9a6";
 
-// 8 x 8, float, PXR24.
+// An OpenEXR file of 8 x 8 pixels of type float, with PXR24 compression.
 inline constexpr std::string_view kPxr24 =
     "762f3101020000006368616e6e656c730063686c69737400370000004200020000000000000001000000010000004700"
     "0200000000000000010000000100000052000200000000000000010000000100000000636f6d7072657373696f6e0063"

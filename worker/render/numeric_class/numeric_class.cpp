@@ -1,4 +1,5 @@
-// The numeric class: machines with the same build and the same bits in this battery render the same bits.
+// Computes the numeric class: machines that have the same build and the same bits in the battery of
+// computations below render the same bits. Each add_ function adds results to the digest.
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -31,8 +32,8 @@ void add(Sha256& h, const std::vector<T>& values) {
   h.update(std::as_bytes(std::span(values)));
 }
 
-// Values of the math library, at 4096 arguments each: every function that the renderer calls. Square roots
-// and divisions are exact everywhere.
+// Adds values of the math library: those of every function that the renderer calls, at 4096 arguments each.
+// Square roots and divisions are exact everywhere.
 void add_math(Sha256& h) {
   std::vector<float> v;
   RandomStream r(1);
@@ -51,8 +52,8 @@ void add_math_in_double(Sha256& h) {
   RandomStream r(3);
   for (int i = 0; i < 4096; ++i) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
-    // Sine and cosine of different numbers, as the renderer calls them: the compiler turns both of the same
-    // number into another function.
+    // Sine and cosine are taken of different numbers, as in the renderer: if both are of the same number, the
+    // compiler calls another function for the two.
     for (double y : {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
                      std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
                      std::hypot(u, x), std::expm1(x), std::log1p(u)}) {
@@ -62,7 +63,7 @@ void add_math_in_double(Sha256& h) {
   add(h, v);
 }
 
-// The processor's reciprocal estimates, which Embree uses and manufacturers implement differently.
+// Adds the processor's reciprocal estimates, which Embree uses and which manufacturers implement differently.
 void add_reciprocals(Sha256& h) {
   std::vector<float> v;
   for (int i = 1; i <= 4096; ++i) {
@@ -73,7 +74,7 @@ void add_reciprocals(Sha256& h) {
   add(h, v);
 }
 
-// Hits of 100,000 rays on a fixed bumpy mesh: which triangle each ray hits.
+// Adds which triangle of a fixed bumpy mesh each of 100,000 rays hits.
 void add_hits(Sha256& h) {
   constexpr int kSide = 48;
   Geometry g;
@@ -112,7 +113,8 @@ void add_hits(Sha256& h) {
 
 void push(std::vector<float>& v, const V3& w) { v.insert(v.end(), {w.x, w.y, w.z}); }
 
-// Ray hits on spheres, which the BVH leaves to our own code: which sphere, where, and its parametrisation.
+// Adds ray hits on spheres, which the BVH leaves to our own code: which sphere is hit, where, and the
+// parametrisation there.
 void add_sphere_hits(Sha256& h) {
   Geometry g;
   RandomStream r(4);
@@ -141,7 +143,7 @@ void add_sphere_hits(Sha256& h) {
   add(h, v);
 }
 
-// Samples of every kind of material.
+// Adds samples of every kind of material.
 void add_bsdf_samples(Sha256& h) {
   Scene scene;
   scene.textures = {ConstantTexture{{.7, .5, .2}}, ConstantTexture{{.15, .15, .15}},
@@ -190,7 +192,8 @@ std::vector<std::byte> bytes_of(std::string_view hex) {
   return bytes;
 }
 
-// Results of lossy image decoders, whose transforms round differently by library version and instruction set.
+// Adds the results of lossy image decoders, whose transforms round differently by library version and
+// instruction set.
 void add_decoded_images(Sha256& h) {
   for (const std::string_view picture : {battery::kJpeg, battery::kDwa, battery::kB44, battery::kPxr24}) {
     const auto image = decode_image("battery", bytes_of(picture));

@@ -1,5 +1,5 @@
-// Mesh attributes at vertices or faces, for `mesh_attribute` textures, by surface. Filled when meshes are
-// loaded, read only where such a texture is evaluated.
+// The mesh attributes, at vertices or faces, that `mesh_attribute` textures read, for each surface. They are
+// filled in when meshes are loaded, and read only where such a texture is evaluated.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct SurfaceAttributes {
     std::size_t first = 0;                      // index into values
     std::uint32_t name = 0, next = kNoChannel;  // next: next channel of the same surface
   };
-  // attributes that the scene's textures read, numbered
+  // The names of the attributes that the scene's textures read, each with its number.
   std::map<std::string, std::uint32_t, std::less<>> names;
   std::vector<std::uint32_t> first_of;  // first channel of each surface
   std::vector<Channel> channels;
@@ -35,7 +35,8 @@ struct SurfaceAttributes {
   bool empty() const { return channels.empty(); }
   std::uint64_t bytes() const { return values.size() * sizeof(C3); }
   void find_means();
-  // `corners`: three vertex indices per triangle. Black if the surface has no attribute of this name.
+  // The value at the point `at` of the attribute whose number in `names` is `name`. `corners` holds three
+  // vertex indices per triangle. The value is black if the surface has no such attribute.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
     std::uint32_t i = first_of[at.surface];
     while (i != kNoChannel && channels[i].name != name) i = channels[i].next;

@@ -27,8 +27,8 @@ float fold(float u, Wrap wrap) {
   return std::clamp(u, 0.f, 1.f);
 }
 
-// Derivative of fold(). Beyond the edges of a clamped image both neighbours() are the same texel, so slopes
-// are 0 anyway.
+// The derivative of fold() by u. Beyond the edges of a clamped image both neighbours() are the same texel, so
+// slopes are 0 anyway.
 float fold_slope(float u, Wrap wrap) {
   return wrap == Wrap::mirror && u - 2 * std::floor(u * .5f) > 1 ? -1.f : 1.f;
 }
@@ -64,7 +64,7 @@ C3 mean_of(const Texels& t) {
   return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
 }
 
-// Keeps `keep` of `have` interleaved channels, starting at `first`.
+// Reduces v, which has `have` interleaved channels, to `keep` of them, from number `first` on.
 template <class T>
 void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, std::uint32_t keep) {
   if (have == keep) return;
@@ -75,8 +75,8 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
   v.shrink_to_fit();
 }
 
-// True if the last channel is an alpha that masks: some images whose colour is the mask also have an alpha
-// that is nearly opaque.
+// True if the last channel is an alpha channel that masks, that is, falls below 1/2 somewhere. Some images
+// whose colour is the mask also have an alpha channel, but a nearly opaque one.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

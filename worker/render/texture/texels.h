@@ -13,14 +13,14 @@
 
 namespace ls::render {
 
-// IEC 61966-2-1; exactly 0 at 0 and 1 at 1.
+// Decodes an sRGB component (IEC 61966-2-1); exactly 0 at 0 and 1 at 1.
 double srgb_to_linear(double v);
 
 struct Texels {
   std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3
   std::vector<std::uint8_t> u8;                       // either u8 or f32 is used
   std::vector<float> f32;
-  std::array<float, 256> decode{};  // decoding table of u8
+  std::array<float, 256> decode{};  // the linear value of each 8-bit code
   C3 mean{0, 0, 0};
   std::uint64_t clamped = 0;  // negative values set to 0
 
@@ -33,15 +33,15 @@ struct Texels {
     if (channels == 1) return C3(f32[i]);
     return {f32[i], f32[i + 1], f32[i + 2]};
   }
-  // uv must be finite; (0, 0) is the upper left corner of the image.
+  // The filtered value at uv, which must be finite; (0, 0) is the upper left corner of the image.
   C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
-  // Derivatives by u and v of the luminance of the bilinear lookup().
+  // The derivatives by u and v of the luminance of a bilinear lookup().
   V2 slope(const V2& uv, Wrap wrap) const;
 };
 
-// Drops alpha, decodes sRGB unless `raw`, and rejects NaN and infinity with the texel's position. With
-// `alpha` the alpha channel is kept instead of the colour, if the image has one that falls below 1/2
-// somewhere.
+// Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,
+// and fails on NaN and infinity with a message that names the texel. If `alpha` is set and the image has an
+// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped.
 Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false);
 
 }  // namespace ls::render

@@ -41,7 +41,8 @@ struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  // index of the texels; the two textures of a checkerboard; the texture of a peak; the name of an attribute
+  // Indices whose meaning depends on the kind: of a bitmap's texels, of the two textures of a checkerboard,
+  // of the texture of a peak, or of an attribute's name.
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // of a constant; otherwise the mean
   UvAffine to_uv;
@@ -78,7 +79,8 @@ Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, co
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
 }
 
-// An attribute that no mesh has is never read: Geometry::build rejects all other uses.
+// The entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated,
+// because Geometry::build rejects meshes that use it and lack it.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;
@@ -103,8 +105,8 @@ C3 hue_of(const C3& c) {
   return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
 }
 
-// Means of textures that contain others, children first. A chain of n takes n passes; one that never settles
-// is a cycle.
+// Computes the means of textures that contain others, those of the contained ones first. A chain of n
+// textures takes n passes; a chain that is never finished is a cycle.
 Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {
@@ -143,7 +145,8 @@ const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv, 
   return *e;
 }
 
-// Value of any texture but checkerboards. Recurses as deep as textures nest: kMaxReferenceDepth at most.
+// The value of a texture of any kind but checkerboards. It recurses as deep as textures are nested, at most
+// kMaxReferenceDepth.
 C3 value_of(const TextureTable& table, const Entry& t, const V2& uv, const FacePoint* face) {
   if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv, face));
   if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv, face));

@@ -25,27 +25,32 @@ class TextureTable {
   TextureTable(TextureTable&&) noexcept;
   TextureTable& operator=(TextureTable&&) noexcept;
 
-  // Mesh attributes, if any texture of the scene reads them; both must outlive the table.
+  // The mesh attributes, needed if any texture of the scene reads them. What the two members refer to must
+  // outlive the table.
   struct MeshData {
     const SurfaceAttributes* attributes = nullptr;
     std::span<const std::uint32_t> corners;  // three vertex indices per triangle
   };
-  // Loads each file once. invalid_argument: an index out of range, textures that refer to each other in a
-  // cycle or deeper than kMaxReferenceDepth, a texel that is NaN or infinite (names file and texel).
+  // Builds the table of the scene's textures; `load` is called once for each file. Fails with
+  // invalid_argument on an index out of range, on textures that refer to each other in a cycle or deeper than
+  // kMaxReferenceDepth, and on a texel that is NaN or infinite (the message names the file and the texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load) {
     return build(scene, load, MeshData{});
   }
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load, MeshData meshes);
 
-  // Without `face` mesh attributes are black.
+  // The value of texture i at uv. `face` is the point on a triangle at which mesh attributes are read;
+  // without it they are black.
   C3 eval(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
-  // The texture as a scalar: its luminance; checkerboards take their other colour (see scene.h).
+  // The value of texture i at uv as a scalar: its luminance. In a checkerboard read as a scalar the two
+  // colours are swapped, as in Mitsuba (see CheckerboardTexture in scene.h).
   float number(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
-  // Derivatives by u and v of the luminance of a bilinear bitmap; 0 for other textures.
+  // The derivatives by u and v of the luminance of texture i at uv if it is a bilinear bitmap; 0 for other
+  // textures.
   V2 slope(TextureIndex i, V2 uv) const;
   double aspect(TextureIndex i) const;  // width over height of a bitmap; 1 for other textures
   bool is_constant(TextureIndex i) const;
-  C3 constant(TextureIndex i) const;  // its value if is_constant(i), else its mean
+  C3 constant(TextureIndex i) const;  // the texture's value if is_constant(i), else its mean
   C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights
   std::size_t size() const;
   std::uint64_t bytes() const;           // memory of the texels

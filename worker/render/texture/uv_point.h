@@ -7,7 +7,8 @@
 
 namespace ls::render {
 
-// A point on a triangle, for reading mesh attributes. The corners have the weights 1 - b1 - b2, b1, b2.
+// A point on a triangle, for reading mesh attributes. Its barycentric coordinates, the weights of the three
+// corners, are 1 - b1 - b2, b1 and b2.
 struct FacePoint {
   std::uint32_t surface = 0, triangle = 0;
   float b1 = 0, b2 = 0;
@@ -15,11 +16,12 @@ struct FacePoint {
 
 struct UvPoint {
   V2 uv;
-  // dp/du and dp/dv in scene units, in the local shading frame. Set only where something on the surface needs
-  // them (SurfaceInfo::wants_slopes).
+  // The derivatives dp/du and dp/dv of the position p, in scene units, in the local shading frame. They are
+  // set only where something on the surface needs them (SurfaceInfo::wants_slopes).
   V3 du{1, 0, 0}, dv{0, 1, 0};
 
-  // Set for surfaces with attributes (SurfaceInfo::wants_attributes), else null; must outlive this.
+  // The point on a triangle, for surfaces whose textures read mesh attributes
+  // (SurfaceInfo::wants_attributes); else null. It must outlive this object.
   const FacePoint* face = nullptr;
 
   UvPoint(float u, float v) : uv(u, v) {}

@@ -1,6 +1,6 @@
 // lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/media/vdb_process.h and
-// exits. Writes the reply to the inherited file kVdbReplyFd. MOST_BYTES limits its own memory plus the
-// reply's.
+// exits. Writes the reply to the inherited file kVdbReplyFd. MOST_VALUES is the largest number of values of
+// the grid. MOST_BYTES limits the memory of this program and of the reply together.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -18,7 +18,8 @@ namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // the largest grids take seconds
 
-// Ends with its parent, and limits resources to what a file can need and the parent has left.
+// Makes this process end when its parent ends, and limits its resources to what a file can need and what its
+// parent has left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -34,7 +35,7 @@ void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
 }
 
-// Peak memory so far, in bytes.
+// The peak memory of this process so far, in bytes.
 std::uint64_t taken() {
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);
@@ -74,7 +75,7 @@ int main(int argc, char** argv) {
   reply.grid = grid;
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
-  // Padded, so that the file always extends to where values begin.
+  // The reply is padded, so that its file always extends to where the values begin.
   written = written && ::ftruncate(ls::render::kVdbReplyFd, ls::render::kVdbValuesAt) == 0;
   if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);

@@ -16,9 +16,10 @@ constexpr std::uint64_t kFileBytes = std::uint64_t{8} << 30;
 constexpr std::size_t kMaxGrids = 4096;
 constexpr std::uint32_t kMaxName = 1 << 16;
 constexpr std::uint32_t kAbi = 32;
-// Neither zlib (at most 1032) nor Blosc's codecs expand a byte to more.
+// The largest number of bytes that one compressed byte can expand to: neither zlib (at most 1032) nor Blosc's
+// codecs exceed it.
 constexpr std::uint64_t kMaxExpansion = 1100;
-// Blosc buffers are split into pieces of this many bytes.
+// A buffer compressed with Blosc is split into pieces of kBloscPiece bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
 
 enum Codec : std::uint16_t { kPlain, kZip, kBlosc };
@@ -44,8 +45,8 @@ struct Entry {
   std::uint16_t codec = kPlain;
 };
 
-// The file is a sequence of segments: 16 bytes of header, then for each grid 176 bytes of metadata and its
-// name, then the grids themselves.
+// The table of all grids in the file, which is a sequence of segments: 16 bytes of header, then for each grid
+// 176 bytes of metadata and its name, then the grids themselves.
 std::vector<Entry> table_of(const NvdbBytes& file) {
   std::vector<Entry> all;
   for (std::uint64_t at = 0; at < file.size();) {
@@ -89,7 +90,7 @@ std::string names_of(const std::vector<Entry>& all) {
   return names;
 }
 
-// The grid of this name; with an empty name the only grid, or "density".
+// The grid called `wanted`. If `wanted` is empty, the only grid, or the grid "density" if there are several.
 const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
   if (all.empty()) throw Refused{1, "the file holds no grid"};
   if (wanted.empty() && all.size() == 1) return all.front();

@@ -13,7 +13,8 @@ namespace {
 
 using Coord = std::array<std::int64_t, 3>;
 
-// Offsets in the grid (672 bytes), in the tree behind it, and in nodes, which depend on the type of values.
+// Byte offsets of fields in the grid's header (672 bytes) and in the tree that follows it. Those that depend
+// on the type of values are in Layout.
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
@@ -40,7 +41,7 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// The value of a voxel: one component, or all three.
+// The value of a voxel: only the first component is used if the grid has one channel.
 using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {
@@ -101,7 +102,8 @@ class Tree {
     out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
 
-  // Finds the box of the active voxels, enlarged by one voxel, and its transform.
+  // Finds the box of the active voxels, enlarged by one voxel on each side, and the transform from its nodes
+  // to the scene.
   void place() {
     std::uint64_t count = 1;
     for (int k = 0; k < 3; ++k) {
@@ -152,7 +154,8 @@ class Tree {
     return v;
   }
 
-  // Voxel n of a leaf. Quantised leaves store codes of 1 to 16 bits, with the leaf's minimum and step.
+  // The value of voxel number n of the leaf at the offset `leaf`. Quantised leaves store codes of 1 to 16
+  // bits, with the leaf's minimum and step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
     if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
@@ -194,7 +197,8 @@ class Tree {
     return base + static_cast<std::uint64_t>(offset);
   }
 
-  // An upper node (32^3 children of 128^3 voxels) or a lower one (16^3 of 8^3).
+  // Reads an upper node (32^3 children of 128^3 voxels each) or a lower one (16^3 children of 8^3 voxels
+  // each).
   void inner(std::uint64_t node, const Coord& origin, int side) {
     const bool upper = side == kUpperSide;
     const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;
@@ -265,7 +269,7 @@ class Tree {
   Type type_ = kFloat;
   Layout layout_{};
   std::uint64_t root_ = 0;
-  Coord lo_{}, end_{};  // box that is read: [lo, end)
+  Coord lo_{}, end_{};  // the box of voxels that is read: [lo, end)
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Exception with which the module's readers reject a file; ls_vdb_read catches it.
+// The exception that the readers of .vdb and .nvdb files throw to reject a file; ls_vdb_read catches it.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ struct Refused {
   std::string text;
 };
 
-// Allocates this many values; the caller has already checked the number against the limit.
+// Allocates an array of `values` values; the caller has already checked that number against the limit.
 inline float* room_for(std::uint64_t values) {
   float* room = new (std::nothrow) float[values];
   if (!room)

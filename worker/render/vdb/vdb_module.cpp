@@ -33,7 +33,8 @@ std::string names_of(const openvdb::io::File& file) {
   return names.empty() ? "none" : names;
 }
 
-// The grid of this name; with an empty name the only grid, or "density".
+// The name of the grid to read: `wanted` or, if that is empty, the only grid, or "density" if there are
+// several.
 std::string choose(const openvdb::io::File& file, const std::string& wanted) {
   std::vector<std::string> names;
   for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
@@ -184,7 +185,8 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
   } catch (const Refused& r) {
     return say(r.code, r.text);
   } catch (const std::bad_alloc&) {
-    // A small file that asks for all memory is damaged: its counts are garbage.
+    // If reading a small file takes more memory than there is, the file is damaged, and its counts are
+    // garbage.
     std::error_code unknown;
     const auto bytes = std::filesystem::file_size(path, unknown);
     if (!unknown && bytes < kSmallFile) return say(1, kDamaged);

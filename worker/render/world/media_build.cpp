@@ -15,12 +15,14 @@ namespace {
 Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
 Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
 
-// Largest extinction: beyond it, products with a density and a length leave float32.
+// The largest extinction [1/world unit]: beyond it, its products with a density and a length leave the range
+// of float32.
 constexpr double kMaxExtinction = 1e30;
-// Largest emission: beyond it, its sum exceeds the largest value of a sample.
+// The largest emission: beyond it, its sum along a ray exceeds the largest radiance of a sample.
 constexpr double kMaxEmission = 1e25;
 
-// Rejects a g that rounds to 1 in float32, like 0.99999999: the phase function does not exist there.
+// The phase function i of the scene. Rejects a g that rounds to 1 in float32, like 0.99999999, because for g
+// = 1 the phase function does not exist.
 Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
   const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
   if (!hg) return HenyeyGreenstein{0};
@@ -34,7 +36,7 @@ Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
   return HenyeyGreenstein{g};
 }
 
-// sigma: per world unit; largest: of the density.
+// Checks the extinction sigma [1/world unit] of a medium whose largest density is `largest`.
 Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
   for (const double s : sigma) {
     if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
@@ -46,7 +48,7 @@ Result<void> check_extinction(const Rgb& sigma, double largest, double world_sca
   return {};
 }
 
-// Sets the medium's emission to `factor` times values of at most `largest`.
+// Sets the emission of m to `factor` times values that are at most `largest`.
 Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, double largest) {
   for (const double e : factor)
     if (!(e * largest <= kMaxEmission))
@@ -104,7 +106,8 @@ Result<void> HeteroBuilder::density() {
   sigma = {per_unit, per_unit, per_unit};
   Volume shape = volume;
   if (auto* c = std::get_if<ConstVolume>(&shape)) {
-    // The colour goes into the coefficients; the grid is 1 inside the medium.
+    // A constant density, which may be a colour, is multiplied into the coefficients; the grid is then 1
+    // inside the medium.
     sigma = times(c->value, per_unit);
     c->value = {1, 1, 1};
   }
@@ -141,7 +144,8 @@ Result<void> HeteroBuilder::albedo() {
   }
   auto loaded = load(volume, per_unit);
   if (!loaded) return tl::unexpected(loaded.error());
-  // Lookups are clamped to 1: no medium scatters more than it extinguishes.
+  // The albedo is clamped to 1 where it is read, because no medium scatters more light than it extinguishes;
+  // larger values are counted.
   for (const Grid& g : loaded->channels) w.inputs.add(HealthCause::bright_albedo, g.count_above(1));
   out.albedo = keep(*loaded);
   return {};
@@ -166,7 +170,7 @@ Result<void> HeteroBuilder::medium_emission_of(EmissionKind kind, const Volume& 
     const C3 b = black_body_radiance(kelvin(c->value[0]));
     return shine(out, EmissionKind::per_absorption, {k * b.x, k * b.y, k * b.z}, 1);
   }
-  // Forces small cells, so that those without emission can be skipped.
+  // This density_to_sigma forces small macro cells, so that those without emission can be skipped.
   constexpr double kFine = 1e30;
   auto loaded = load(source, kFine);
   if (!loaded) return tl::unexpected(loaded.error());

@@ -8,9 +8,10 @@
 
 namespace ls::render {
 
-// Fills w.media, one per scene medium, and w.grids; counts corrected values in w.inputs. Media that neither
-// the camera nor a surface refers to keep their index, but nothing is loaded for them. w.geometry gives the
-// world's scale. invalid_argument names the file or medium and its fault.
+// Fills w.media, with one medium per medium of the scene, and w.grids, and counts corrected values in
+// w.inputs. Media that neither the camera nor a surface refers to keep their index, but nothing is loaded for
+// them. w.geometry must be built, because it gives the world's scale. Fails with invalid_argument; the
+// message names the file or medium and its fault.
 Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w);
 
 }  // namespace ls::render

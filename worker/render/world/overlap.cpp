@@ -12,9 +12,9 @@
 namespace ls::render {
 namespace {
 
-// Limit of pairs to examine. Boxes are sorted by their start along x, and touching pairs are searched until
-// one is found: n log n unless many boxes overlap along x; if more pairs than this do, they are assumed to
-// touch.
+// The largest number of pairs of boxes to examine. Boxes are sorted by their start along x, and pairs that
+// overlap along x are examined until one touches, which takes n log n time unless many boxes overlap along x.
+// If more than kMaxPairs pairs overlap along x, some are assumed to touch.
 constexpr std::size_t kMaxPairs = std::size_t{1} << 24;
 
 bool any_touch(std::vector<SurfaceBox> boxes) {
@@ -29,8 +29,8 @@ bool any_touch(std::vector<SurfaceBox> boxes) {
   return false;
 }
 
-// True if there is a boundary that does not have the surrounding medium `ambience` on either side, although
-// that medium surrounds it.
+// True if there is a boundary that has the medium `ambience` on neither side, so that `ambience` may surround
+// it.
 bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
   if (ambience == kNone) return false;
   return std::any_of(g.surfaces.begin(), g.surfaces.end(), [&](const SurfaceInfo& s) {
@@ -40,7 +40,8 @@ bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
 
 constexpr int kMaxCrossings = 1 << 12;  // per ray that determines the camera's media
 
-// Records boundaries that the ray leaves before entering them, so those around its origin.
+// Counts in `left` each boundary that the ray leaves before it enters it: these are the boundaries around the
+// ray's origin.
 using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // surface, instance
 void note_left(const World& w, V3 o, const V3& d, Left& left) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, bool> seen;
@@ -74,7 +75,7 @@ MediaState camera_media(const World& w) {
   const CameraRay ray =
       w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
   Left left;
-  // Neither axes nor diagonals, which are prone to grazing hits.
+  // The directions are neither along axes nor along diagonals, where hits are often grazing.
   for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
     note_left(w, ray.o, V3(d.normalized()), left);
   const auto around = [&](const auto& entry) { return entry.second >= 2; };

@@ -43,30 +43,33 @@ class World {
   bool coincident = false;        // some surfaces coincide, one of them null (coincident.h)
   bool lights_on_others = false;  // emitting null surfaces are among the coincident ones
   Features need;
-  bool use_media = true;  // false: the integrator `path`, which ignores media
-  // there are homogeneous media and lights with a position: segments are also sampled equi-angularly
+  bool use_media = true;  // false for the integrator `path`, which ignores media
+  // True if there are homogeneous media and lights with a position: then segments are also sampled
+  // equi-angularly.
   bool equiangular = false;
-  bool equiangular_points = false;  // the same in grids, if there are point lights inside
+  bool equiangular_points = false;  // the same in grids, if there are point lights in them or near them
   bool null_transmission = false;   // some surface has null transmission: shadow rays must collect it
-  // shadow rays are traced boundary by boundary, for null transmission or because they may cross media
+  // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
+  // media.
   bool shadows_walk = false;
   bool distant_mis = false;  // the integrator is `volpath_distant_mis` (segment_nee.h); its options follow
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
   bool hide_emitters = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
-  // Passing a null boundary or a null-transmitting surface counts as a segment: true for Mitsuba's `path`,
-  // false for its `volpath`.
+  // True if passing a null boundary or a null-transmitting surface counts as a segment for max_depth, as in
+  // Mitsuba's `path`; false if not, as in its `volpath`.
   bool passing_counts = false;
   int rr_depth = 5;
   std::uint64_t seed = 0;
   FrameSize size;
-  // Origin of the image within the full frame, in pixels: a crop renders the same pixels as the full frame.
+  // The position of the image's top left pixel in the full frame, in pixels: a cropped image has the same
+  // pixels there as the full frame.
   int origin_x = 0, origin_y = 0;
 
   AovSet aovs;
-  // For the ID AOVs: shape and material identifiers of each surface. A hit inside of an instance has the
-  // instance's identifier in the place of the shape's.
+  // For the ID AOVs: the identifiers of the shape and the material of each surface, and of each instance. A
+  // hit inside an instance has the instance's identifier in place of the shape's.
   std::vector<float> shape_ids, material_ids, instance_ids;
 
   Health inputs;  // corrected scene inputs, by cause

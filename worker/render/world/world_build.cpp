@@ -15,7 +15,7 @@
 namespace ls::render {
 namespace {
 
-// The features required by the scene's needs.
+// The features that a scene with the needs n requires of the integrator.
 Features features_of(const scene::Needs& n) {
   return {.media = n.media,
           .grids = n.grids,
@@ -24,7 +24,7 @@ Features features_of(const scene::Needs& n) {
           .passing = n.boundaries || n.null_transmission};
 }
 
-// The features required by the finished world: never more than those by needs.
+// The features that the finished world requires: never more than features_of() gives for the scene's needs.
 Features found_in(const World& w) {
   Features f;
   const auto& surfaces = w.geometry.surfaces;
@@ -57,7 +57,8 @@ void note_surface_needs(const Scene& scene, World& w) {
     SurfaceInfo& s = w.geometry.surfaces[i];
     const auto& emitter = scene.shapes[i].emitter;
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
-    // For a mesh, uv changes nothing else; other shapes' frames would rotate, and with them the samples.
+    // The uv AOV requests uv only of meshes with uv, where uv changes nothing else. The frames of other
+    // shapes would rotate, and with them the samples.
     s.wants_uv = s.wants_uv || (w.aovs.has(Aov::uv) && s.uvs);
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
@@ -66,8 +67,8 @@ void note_surface_needs(const Scene& scene, World& w) {
   }
 }
 
-// Cryptomatte identifiers from the names of shapes and materials; from their index in the list if the scene
-// has no names.
+// Sets the Cryptomatte identifiers of surfaces from the names of shapes and materials, or from their index in
+// the list if the scene has no names.
 void name_surfaces(const Scene& scene, World& w) {
   const auto id = [](const std::vector<Label>& labels, std::size_t i, auto member,
                      std::string_view else_named) {
@@ -81,8 +82,8 @@ void name_surfaces(const Scene& scene, World& w) {
     w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
 }
 
-// True if a point light lies in a grid, or within a tenth of its size: flights rarely sample the light
-// scattered close to it, as 1 / distance^2.
+// True if a point light lies in a grid, or within a tenth of its size: close to the light the scattered light
+// grows as 1 / distance^2, and free flights rarely end there.
 bool a_point_shines_in_a_grid(const World& w) {
   const std::vector<V3> points = w.lights.points();
   return std::any_of(w.media.begin(), w.media.end(), [&](const Medium& m) {
@@ -98,8 +99,8 @@ bool a_point_shines_in_a_grid(const World& w) {
   });
 }
 
-// A crop is rendered with the pixels of the full frame: the same samples give the same bits. At a size other
-// than the crop's own, it is the same part of a correspondingly scaled frame.
+// A crop renders the pixels of the full frame: the same samples give the same bits. If the image is rendered
+// at a size other than that of the crop, it is the same part of a correspondingly scaled frame.
 void place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;
@@ -114,7 +115,7 @@ void place_camera(const Scene& scene, const RenderSettings& settings, World& w) 
   w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
 }
 
-// Experimental builds without some parts reject scenes that need those.
+// Fails if the world needs a part of the renderer that this build leaves out (built.h).
 Result<void> check_built(const World& w) {
   const bool has = kBuiltFeatures.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
                    (kBuilt.null_transmission || !w.null_transmission) &&
@@ -226,7 +227,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
-  w.need.overlaps = found.overlaps || w.coincident;        // depends on positions in the shapes' files
+  w.need.overlaps = found.overlaps || w.coincident;        // known only once the shapes are read
   w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
   if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
   if (!w.need.covers(found))
@@ -245,8 +246,9 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if (m.grid ? w.equiangular_points : w.equiangular)
       m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
   }
-  // Equi-angular sampling picks a light before the shading point is known. MIS needs the same pmf at
-  // vertices, so the tree is used in media only when no segment is sampled.
+  // Equi-angular sampling chooses a light before the shading point is known. Multiple importance sampling
+  // needs the same probability of the light at vertices. So for points in media the tree is used only if no
+  // segments are sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
   return std::shared_ptr<const World>(world);

@@ -1,4 +1,5 @@
-// Describes a built world: what it has and leaves out, and the memory of each structure.
+// Describes a built world (WorldReport): which features it uses and which it does not, and the memory of each
+// structure.
 #include <fmt/format.h>
 
 #include "worker/render/world/world.h"
@@ -10,7 +11,7 @@ std::string counted(std::uint64_t n, std::string_view what) {
   return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
 }
 
-// "12 triangles, 2 spheres"
+// The numbers of primitives by kind, as in "12 triangles, 2 spheres".
 std::string primitives(const Geometry& g) {
   std::string text;
   const auto add = [&](std::uint64_t n, std::string_view what) {
