@@ -22,7 +22,8 @@ namespace ls {
 
 inline constexpr int kProtocolVersion = 1;
 
-// The pure task: (job, tile, round). The same unit gives the same bits anywhere in its numeric class.
+// A unit: the work of one render task, which is one round (range of samples) of one tile of a job. Rendering
+// the same unit gives the same bits on every machine of one numeric class.
 struct UnitKey {
   JobId job;
   TileIndex tile = 0;
@@ -37,15 +38,16 @@ struct BlobRef {
   bool operator==(const BlobRef&) const = default;
 };
 
-// Everything a worker needs to know about a job. Sent before the job's first lease on a stream.
+// Everything that a worker needs to know about a job. The coordinator sends it before the job's first lease
+// on a connection.
 struct JobBrief {
   JobId job;
   Digest scene;  // blob: the canonical scene (common/scene/json/serialize.h)
   RenderSettings settings;
   Digest settings_digest;
   std::vector<BlobRef> assets;  // only those that the scene uses
-  // The coordinator's analysis of the scene's needs (common/scene/analysis/needs.h), for the worker to
-  // compare with its own; empty: not sent.
+  // What the scene needs of the renderer, according to the coordinator (common/scene/analysis/needs.h). The
+  // worker compares it with its own analysis. Empty: not sent.
   std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
@@ -58,7 +60,8 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units leased to a worker. They are rendered and reported one by one, in order.
+// Units that the coordinator has assigned to one worker until a deadline. The worker renders and reports them
+// one by one, in order.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -66,9 +69,9 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. `load` and `build` are sent with the first
-// result of a world: fetching the job's files, and reading them and building the world (wall time of the
-// loading thread).
+// Seconds that a worker spent on a unit besides rendering it. Two of them concern the job's world (the scene
+// prepared for rendering) and are sent only with the first result rendered from it: `load` is the time to
+// fetch the job's files, `build` the wall time in which the loading thread read them and built the world.
 struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // packing the result: encoding and digest
