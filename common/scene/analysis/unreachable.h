@@ -1,5 +1,5 @@
-// Interior media that no camera path can enter. Decided from the scene description alone, so conservative for
-// meshes.
+// Finds media inside shapes that no camera path can enter. The decision uses the scene description alone,
+// without mesh files, so it is conservative for meshes.
 #pragma once
 
 #include <vector>
