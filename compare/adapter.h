@@ -20,8 +20,10 @@ struct Adapter {
   // True for commands with {time}: the program is run once, and lists the images that it made. False for
   // commands with {spp}: it is run once per image, each time from the start.
   bool lists = false;
-  std::uint64_t first_spp = 4;   // for runs with {spp}
-  double most_seconds = 0;       // per run, in addition to the race's time, for loading and compilation
+  std::uint64_t first_spp = 4;  // samples per pixel of the first run of a command with {spp}
+  // seconds that a run may take, for loading and compilation, in addition to those that follow from the
+  // race's time
+  double most_seconds = 0;
   std::set<std::string> scenes;  // names of the only scenes that it can render; empty: all
   std::filesystem::path folder;  // {adapter}: the folder of the JSON file
 };

@@ -12,7 +12,7 @@ struct Prediction {
   std::size_t entrant = 0, seed = 0;
   // `spp` and `spent` are the samples per pixel and the core seconds used when the prediction was made.
   double spp = 0, spent = 0;
-  double target = 0;                     // relMSE, as estimated by the image
+  double target = 0;                     // the relMSE to be reached, as the image estimates it
   double predicted = 0, lo = 0, hi = 0;  // remaining core seconds, with the 95 % interval
   std::optional<double> actual;          // nullopt: not reached by the end of the race, hence later than hi
   bool within() const { return actual && *actual >= lo && *actual <= hi; }

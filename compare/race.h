@@ -51,7 +51,7 @@ struct JudgedPoint {
   double seconds = 0;  // on the race's clock
   bool last = false;
   std::optional<ImageError> estimate;
-  double mse = 0, relmse = 0;  // against the reference; not above 0: hidden by the reference's noise
+  double mse = 0, relmse = 0;  // errors against the reference; 0 or less: hidden by the reference's noise
 };
 struct JudgedLane {
   std::size_t entrant = 0, seed = 0;

@@ -32,7 +32,7 @@ struct Conditions {
 struct Checkpoint {
   double spp = 0;
   Cost cost;
-  bool last = false;                   // the racer's last one
+  bool last = false;                   // true for the racer's last image
   std::optional<ImageError> estimate;  // the image's own error estimate; ours only
   std::filesystem::path picture;
 };

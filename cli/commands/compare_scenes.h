@@ -16,7 +16,7 @@ struct CompareOptions {
   std::vector<std::string> scenes;
   std::vector<std::string> integrators;  // empty: the scene's
   std::vector<race::Adapter> programs;
-  race::Conditions conditions;    // except the size
+  race::Conditions conditions;    // all conditions except the size of the image
   std::optional<FrameSize> size;  // empty: the scene's
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;

@@ -19,7 +19,7 @@ struct FileCopy {
 struct Converted {
   std::string text;
   Digest digest;                 // of the scene that the text describes
-  std::vector<FileCopy> copies;  // files that are not in place yet
+  std::vector<FileCopy> copies;  // files that are not in place yet, and must be copied
 };
 
 // Converts a scene for the file `out`. If `out` is in the folder of the original scene, file names are

@@ -40,11 +40,11 @@ class LocalFarm {
 
   // What has been observed of the worker.
   double load_seconds() const;
-  std::optional<std::string> scene_fault() const;  // why no world could be built from the scene
+  std::optional<std::string> scene_fault() const;  // why the scene could not be prepared for rendering
   std::optional<Error> agent_error() const;        // the error with which the agent ended
 
  private:
-  struct Watched;  // the backend, with observation
+  struct Watched;  // wraps the render backend and records how it fares
   explicit LocalFarm(Options options);
   Result<std::unique_ptr<worker::RenderBackend>> make_backend() const;
 

@@ -15,7 +15,7 @@ struct ProgressFigures {
   double samples_per_second = 0;
   std::optional<double> relmse;
   std::optional<double> eta_seconds;
-  std::string trouble;      // why the job is waiting
+  std::string trouble;      // why the job is waiting, if it is
   std::string frames = {};  // for sequences: "3 of 10 frames"
   std::optional<std::pair<double, double>> eta_ci95 = {};
   std::optional<std::pair<double, double>> relmse_ci95 = {};

@@ -26,7 +26,7 @@ inline constexpr std::size_t kMostCurvePoints = 512;  // drawn per curve; longer
 // A predicted point: the x at which the first curve will reach the target.
 struct Ahead {
   double x = 0, x_lo = 0, x_hi = 0;  // interval in x; x_lo = x_hi = 0: none
-  double x_with_more = 0;            // with more workers; 0: unknown
+  double x_with_more = 0;            // the x at which it is reached with more workers; 0: unknown
 };
 
 struct LogPlot {

@@ -28,7 +28,7 @@ class AssetSource {
 
 struct ReadOptions {
   std::map<std::string, std::string> defines;  // $name -> value; unused ones cause a warning
-  bool strict = false;                         // warnings become errors
+  bool strict = false;                         // true: warnings are errors
   // The frame number, for sequences (jobs with several frames): it replaces each run of # in file names and
   // is the value of $frame.
   std::optional<std::uint32_t> frame = std::nullopt;
@@ -36,7 +36,7 @@ struct ReadOptions {
 };
 
 struct ReadResult {
-  std::optional<Scene> scene;  // absent if there is any error
+  std::optional<Scene> scene;  // nullopt if there is any error
   std::vector<Diagnostic> diagnostics;
 };
 

@@ -229,7 +229,7 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on the emission
   double temperature_scale = 1, temperature_offset = 0;
-  int priority = 0;  // as for a homogeneous medium
+  int priority = 0;  // of overlapping media, all those of the highest priority are in effect
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
@@ -258,7 +258,7 @@ struct SpotEmitter {  // at the origin of to_world, emitting along its +z
   Rgb intensity{1, 1, 1};
   double cutoff_angle = 20;             // degrees from the axis; dark beyond
   double beam_width = 15;               // full intensity within; linear in the angle between the two
-  std::optional<TextureIndex> texture;  // projected, as in Mitsuba
+  std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
 // Radiance from all directions: an image in latitude-longitude form. In its own space the top row is +y; on

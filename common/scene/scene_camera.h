@@ -27,7 +27,8 @@ struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   double focus_distance = 1;
   std::optional<MediumIndex> medium;  // the medium around the camera
   Projection projection = Projection::perspective;
-  std::optional<TextureIndex> aperture_scale;  // over the frame: factor on the aperture's radius at a pixel
+  // image over the frame: at each pixel the factor on the aperture's radius
+  std::optional<TextureIndex> aperture_scale;
   bool operator==(const Sensor&) const = default;
 };
 

@@ -20,16 +20,17 @@ struct ValidateCase {
   // Statistical cases of the table are judged by two confidence intervals: the one at `band_level` must lie
   // within the band, the one at `level` must contain the answer.
   double band_level = 0;
-  std::uint64_t nonfinite = 0;  // bad samples: any makes the case fail
+  std::uint64_t nonfinite = 0;  // number of faulty samples; a single one makes the case fail
   double seconds = 0;
-  std::string why;  // of a failure
+  std::string why;  // reason of the failure; empty: the case passed
   // For the table's own cases: a one-sentence description; "statistical", with the share of the answer that
   // the interval must lie within, or "exact", with the tolerance.
   std::string rows, about, kind;
   double band = 0;
   std::string why_band;  // reason for a wider band
   std::uint64_t paths = 0;
-  bool too_wide = false;  // failed only because the interval is too wide: more paths may help
+  // true if the case failed only because its interval is too wide, so that more paths may help
+  bool too_wide = false;
   bool passed() const { return why.empty(); }
 };
 

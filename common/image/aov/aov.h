@@ -42,7 +42,7 @@ inline constexpr std::size_t kAovs = 16;
 // The type of an AOV's values, and the divisor of their mean.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface; the mean is over these
-  of_all,   // likewise, but the mean is over all samples: 0 where nothing is hit
+  of_all,   // sums over the samples that hit a surface; the mean is over all samples: a miss counts as 0
   light,    // components of the radiance; the mean is over all samples
   ids       // identifiers, each with its number of samples
 };

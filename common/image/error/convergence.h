@@ -60,12 +60,13 @@ const char* to_string(ConvergenceStatus::Kind kind);
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {
-  double spp = 0;                                                     // at the target
+  double spp = 0;  // mean samples per pixel at which the target is reached
   double core_seconds = 0, core_seconds_lo = 0, core_seconds_hi = 0;  // remaining; 95 % interval
 };
-// What is needed until the estimated relMSE reaches `target`, rounded up to a whole round. Zeros: already
-// reached. nullopt: no point has a positive error and time. The slope is the fitted one, drawn to 1 as far as
-// the points leave it open (a Gaussian prior of standard deviation 0.15).
+// Returns what is needed until the estimated relMSE reaches `target`, rounded up to a whole round (range of
+// samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error and time.
+// The slope is the fitted one, drawn to 1 as far as the points leave it open (a Gaussian prior of standard
+// deviation 0.15).
 //
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples has become 1.0 at 256 (the bench scene `tint`). A straight line through all

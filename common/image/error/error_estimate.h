@@ -174,7 +174,7 @@ class Checkpoints {
     RoundIndex reached = 0;  // last folded round + 1
     bool stopped = false;
   };
-  bool ready(const Tile& tile) const;  // for the next checkpoint
+  bool ready(const Tile& tile) const;  // true if the tile has its figures for the next checkpoint
   void change(TileIndex index, const std::function<void(Tile&)>& edit);
   void settle();
 

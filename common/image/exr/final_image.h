@@ -36,8 +36,9 @@ struct Provenance {
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  std::optional<std::uint64_t> seed = {};  // nullopt, here and below: unknown, and not written
-  std::optional<double> seconds = {};      // render time
+  // for this and the following: nullopt means unknown, and is not written
+  std::optional<std::uint64_t> seed = {};
+  std::optional<double> seconds = {};  // render time
   // "clean", or canonical_json() of the Health; empty: unknown, and not written.
   std::string health;
   CryptomatteManifests manifests = {};
@@ -46,7 +47,7 @@ struct Provenance {
   std::optional<ConvergenceStatus> convergence_status =
       {};  // includes the convergence curve, which the film alone does not have
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
-  std::map<std::string, std::string> notes = {};  // further texts, likewise
+  std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
 struct FinalImage {
   std::vector<std::byte> exr;

@@ -83,7 +83,7 @@ class Film {
 
   // Figures of the image.
   std::uint64_t samples() const;       // over all pixels
-  std::uint64_t memory_bytes() const;  // of the sums and identifiers
+  std::uint64_t memory_bytes() const;  // memory taken by the sums and identifiers
   // Returns the sum over all tiles with samples, in tile order; the error of other tiles is unknown.
   TileError error() const;
   std::uint64_t pixels_without_samples() const;

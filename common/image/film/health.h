@@ -56,11 +56,11 @@ struct HealthLocation {
     return y != o.y ? y < o.y : x != o.x ? x < o.x : sample < o.sample;
   }
 };
-inline constexpr std::size_t kHealthLocations = 8;  // kept per cause
+inline constexpr std::size_t kHealthLocations = 8;  // number of locations that are kept per cause
 
 struct HealthEntry {
   std::uint64_t count = 0;
-  std::vector<HealthLocation> first;  // the smallest, in ascending order; empty for inputs
+  std::vector<HealthLocation> first;  // the locations that come first, in ascending order; empty for inputs
   bool operator==(const HealthEntry&) const = default;
 };
 

@@ -16,7 +16,7 @@ namespace ls {
 
 struct PartialSource {
   std::string name;                                      // for the messages
-  std::function<Result<std::vector<std::byte>>()> read;  // may be called twice
+  std::function<Result<std::vector<std::byte>>()> read;  // reads the file; may be called twice
 };
 
 struct Merged {

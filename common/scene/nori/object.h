@@ -44,7 +44,8 @@ class Object {
 
   // Returns the nested objects with this tag that are not the value of a parameter.
   std::vector<const Element*> nested(std::string_view tag);
-  const Element* only(std::string_view tag);  // reports a second one
+  // the single nested object with this tag; a second one is reported
+  const Element* only(std::string_view tag);
   void finish();
   // Like finish() for an unsupported object: reports only unknown parameters.
   void finish_refused();

@@ -31,7 +31,8 @@ std::optional<Element> camera(const Element& e, const Element* sampler, Report& 
 
 struct Integrator {
   Element element;
-  bool inmedium = false;  // Kombu: the camera is inside the medium of the mesh around it
+  // from Kombu, a descendant of Nori: the camera is inside the medium of the mesh around it
+  bool inmedium = false;
 };
 std::optional<Integrator> integrator(const Element& e, Report& report);
 
