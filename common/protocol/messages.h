@@ -105,7 +105,7 @@ struct UnitFailure {
   bool operator==(const UnitFailure&) const = default;
 };
 
-// From worker to coordinator.
+// Messages from worker to coordinator, from here on.
 struct WorkerHello {
   int protocol = kProtocolVersion;
   std::string name;
@@ -151,7 +151,7 @@ struct LeaseReturned {
 using FromWorker =
     std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
 
-// From coordinator to worker.
+// Messages from coordinator to worker, from here on.
 struct Welcome {
   WorkerId worker;
   // A number that grows with every registration of this worker; the coordinator closes the connections of

@@ -32,7 +32,8 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
   UvTransform to_uv;
-  // For an opacity: use the image's alpha channel if it falls below 1/2 somewhere, otherwise its colour.
+  // For a texture that is an opacity. If true, the value is the image's alpha channel if that falls below 1/2
+  // somewhere, otherwise the image's colour.
   bool alpha = false;
   bool operator==(const BitmapTexture&) const = default;
 };
@@ -318,7 +319,7 @@ struct Scene {
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
   std::string aovs;  // AOVs that the scene requests: names of common/image/aov/aov.h, separated by commas
-  // For each shape and instance; empty unless requested (ReadOptions::labels).
+  // The labels of all shapes and of all instances, by index; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;
   bool operator==(const Scene&) const = default;
 };

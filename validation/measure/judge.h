@@ -23,8 +23,9 @@ struct ValidateCase {
   std::uint64_t nonfinite = 0;  // number of faulty samples; a single one makes the case fail
   double seconds = 0;
   std::string why;  // reason of the failure; empty: the case passed
-  // For the table's own cases: a one-sentence description; "statistical", with the share of the answer that
-  // the interval must lie within, or "exact", with the tolerance.
+  // For the cases of the table: the rows that the case covers, a one-sentence description, and the kind of
+  // test: "statistical", where `band` is the share of the answer that the interval must lie within, or
+  // "exact", where it is the tolerance.
   std::string rows, about, kind;
   double band = 0;
   std::string why_band;  // reason for a wider band

@@ -129,7 +129,7 @@ class Film {
                                                    bool with_tail = true);
   static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels,
                                                   bool with_tail = true);
-  // `before`: the tile before its last round; null if not available.
+  // Estimates the error of a tile. `before` is the same tile before its last round; null if not available.
   static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
   static std::vector<std::byte> tile_bytes(const Tile* tile, TileIndex index);

@@ -81,7 +81,8 @@ struct Health {
 // Returns {"too_large":{"count":3,"first":[[x,y,sample],...]}} with sorted keys and without spaces; {} if
 // healthy.
 std::string canonical_json(const Health& health);
-// Rejects anything that canonical_json does not write; an unknown cause becomes `unnamed`.
+// Parses a Health. Anything that canonical_json() does not write is an error; an unknown cause becomes
+// `unnamed`.
 Result<Health> parse_health(std::string_view json);
 
 // Checks the health of a unit with these pixels and samples. invalid_argument: it names pixels or samples

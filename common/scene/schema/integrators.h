@@ -15,8 +15,8 @@ struct IntegratorRow {
   std::string_view name;         // the dialect's, or ours
   std::string_view ours;         // IntegratorSettings::name
   std::optional<int> max_depth;  // implied by the name
-  // True for another method with the same result that is not implemented here: scenes that request it get a
-  // warning.
+  // True if the name stands for another method with the same result that is not implemented here: scenes that
+  // request it get a warning.
   bool other_method = false;
 };
 
